@@ -1,1 +1,25 @@
+//! Decoupling of flexible tactile sensor arrays.
+//!
+//! A tactile skin of conductive rubber is read through crossed row-wires and column-wires. Every reading is the
+//! parallel connection of many electrode nodes; *decoupling* recovers the deformation of each node from the
+//! row-column resistances. The modules tell that story in order, and each uses only the ones before it:
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
+//! | [`scene`] | what happens to the sensor: which deformations are drawn |
+//! | [`dataset`] | samples (one row-wire each), drawn as whole snapshots; splits |
+//! | [`network`] | the three-layer network, its start, its scaling, its file |
+//! | [`training`] | methods, the stepped [`training::Trainer`], why it stopped |
+//! | [`decoupling`] | resistances to deformation: network, linear map, mean |
+//! | [`evaluation`] | axis errors, tables, a whole run from settings to report |
+//! | [`surface`] | smooth surfaces through the nodes |
+//! | [`export`] | files for other programs |
+//! | [`cli`] | the work without a window |
+//! | `app` | the window (feature `gui`) |
 
+pub mod dataset;
+pub mod network;
+
+pub mod scene;
+pub mod sensor;

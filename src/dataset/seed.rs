@@ -1,0 +1,38 @@
+use std::fmt;
+
+use rand::{SeedableRng, rngs::ChaCha8Rng};
+use serde::{Deserialize, Serialize};
+
+/// The one number from which everything random in a run follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Seed(pub u64);
+
+/// What randomness is for. Each use has a stream of its own, so that, say, more training samples change neither the
+/// test set nor the start of the network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// Deformations of the training (and validation) set.
+    Training,
+    /// Deformations of the test set.
+    Test,
+    /// Initial weights of the network.
+    Start,
+    /// Which samples are held out for validation.
+    Split,
+}
+
+impl Seed {
+    /// The generator of one use.
+    pub fn rng(self, stream: Stream) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.0);
+        rng.set_stream(stream as u64);
+        rng
+    }
+}
+
+impl fmt::Display for Seed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}

@@ -1,0 +1,84 @@
+use rand::{Rng, seq::SliceRandom};
+
+use super::Dataset;
+
+/// A set divided for training: what the method fits, and what tells it when to stop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    /// Samples that the method fits.
+    pub training: Dataset,
+    /// Samples held out to judge each epoch; `None` if nothing was held out.
+    pub validation: Option<Dataset>,
+}
+
+/// Holds out about `fraction` of the snapshots for validation, drawn by `rng`; at least one snapshot stays for
+/// training. Whole snapshots are held out, so that no validation sample shares its moment with a training sample.
+pub fn hold_out(set: Dataset, fraction: f64, rng: &mut impl Rng) -> Split {
+    let snapshots = set.snapshots();
+    let held_out = ((snapshots as f64 * fraction).round() as usize).min(snapshots.saturating_sub(1));
+    if held_out == 0 {
+        return Split {
+            training: set,
+            validation: None,
+        };
+    }
+    let mut order: Vec<usize> = (0..snapshots).collect();
+    order.shuffle(rng);
+    let (validation, training) = order.split_at_mut(held_out);
+    let samples = |snapshots: &mut [usize]| -> Vec<usize> {
+        snapshots.sort_unstable();
+        let rows = set.rows();
+        snapshots
+            .iter()
+            .flat_map(|snapshot| snapshot * rows..(snapshot + 1) * rows)
+            .collect()
+    };
+    Split {
+        training: set.select(&samples(training)),
+        validation: Some(set.select(&samples(validation))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    fn split(samples: usize, fraction: f64) -> (Dataset, Split) {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let set = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap();
+        (set.clone(), hold_out(set, fraction, &mut Seed(0).rng(Stream::Split)))
+    }
+
+    #[test]
+    fn whole_snapshots_are_held_out_and_none_is_lost_or_shared() {
+        let (set, split) = split(200, 0.15);
+        let validation = split.validation.unwrap();
+        assert_eq!((split.training.samples(), validation.samples()), (170, 30));
+        // Every z is drawn afresh, so the first node's z names the sample.
+        let z = |set: &Dataset| set.coordinates_mm.column(2).to_vec();
+        let mut apart = [z(&split.training), z(&validation)].concat();
+        let mut whole = z(&set);
+        apart.sort_by(f64::total_cmp);
+        whole.sort_by(f64::total_cmp);
+        assert_eq!(apart, whole);
+        for (row, coordinates) in validation.coordinates_mm.rows().into_iter().enumerate() {
+            assert_eq!(
+                coordinates[0],
+                8.0 + (row % 10) as f64,
+                "snapshots stay whole and in order"
+            );
+        }
+    }
+
+    #[test]
+    fn one_snapshot_always_stays_for_training() {
+        assert_eq!(split(10, 0.9).1.validation, None);
+        assert_eq!(split(20, 0.99).1.training.samples(), 10);
+        assert_eq!(split(100, 0.0).1.validation, None);
+    }
+}

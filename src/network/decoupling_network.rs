@@ -1,0 +1,143 @@
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{MinMax, Mlp, Shape};
+
+/// A network together with its scaling: resistances in ohm in, coordinates in millimetres out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Record", into = "Record")]
+pub struct DecouplingNetwork {
+    inputs: MinMax,
+    mlp: Mlp,
+    outputs: MinMax,
+}
+
+/// Parts that do not make a network.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum NetworkError {
+    /// The scaling has limits that are missing, not finite, or out of order.
+    #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
+    Scaling(&'static str),
+    /// Layer sizes that do not follow from each other.
+    #[error("the {layer} layer has {found} weights, but {expected} follow from the scaling and the hidden nodes")]
+    LayerSize {
+        /// Which layer.
+        layer: &'static str,
+        /// Weights found.
+        found: usize,
+        /// Weights expected.
+        expected: usize,
+    },
+    /// A weight is NaN or infinite.
+    #[error("weight {index} of the {layer} layer is not a finite number")]
+    Weight {
+        /// Which layer.
+        layer: &'static str,
+        /// Which weight, row by row from 0.
+        index: usize,
+    },
+}
+
+impl DecouplingNetwork {
+    /// Joins a network with the scaling it was trained under.
+    ///
+    /// # Panics
+    /// If the network's channels are not the varying channels of the scaling.
+    pub fn new(inputs: MinMax, mlp: Mlp, outputs: MinMax) -> Self {
+        assert_eq!(inputs.varying().len(), mlp.shape().inputs);
+        assert_eq!(outputs.varying().len(), mlp.shape().outputs);
+        Self { inputs, mlp, outputs }
+    }
+
+    /// The network between the scalings.
+    pub fn mlp(&self) -> &Mlp {
+        &self.mlp
+    }
+
+    /// Scaling of the resistances.
+    pub fn inputs(&self) -> &MinMax {
+        &self.inputs
+    }
+
+    /// Scaling of the coordinates.
+    pub fn outputs(&self) -> &MinMax {
+        &self.outputs
+    }
+
+    /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4).
+    pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
+        let scaled = self.inputs.scale(resistances_ohm);
+        self.outputs.restore(self.mlp.forward(scaled.view()).view())
+    }
+}
+
+/// How a network is written: named layers, row by row, biases last.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Record {
+    input_scaling: MinMax,
+    hidden_nodes: usize,
+    /// (varying inputs + 1) × hidden nodes.
+    hidden_layer: Vec<f64>,
+    /// (hidden nodes + 1) × varying outputs.
+    output_layer: Vec<f64>,
+    output_scaling: MinMax,
+}
+
+impl From<DecouplingNetwork> for Record {
+    fn from(network: DecouplingNetwork) -> Self {
+        let (hidden_layer, output_layer) = network.mlp.layers();
+        Self {
+            hidden_nodes: network.mlp.shape().hidden,
+            hidden_layer: hidden_layer.to_vec(),
+            output_layer: output_layer.to_vec(),
+            input_scaling: network.inputs,
+            output_scaling: network.outputs,
+        }
+    }
+}
+
+impl TryFrom<Record> for DecouplingNetwork {
+    type Error = NetworkError;
+
+    fn try_from(record: Record) -> Result<Self, NetworkError> {
+        for (side, scaling) in [("input", &record.input_scaling), ("output", &record.output_scaling)] {
+            if !scaling.is_sound() {
+                return Err(NetworkError::Scaling(side));
+            }
+        }
+        let shape = Shape {
+            inputs: record.input_scaling.varying().len(),
+            hidden: record.hidden_nodes,
+            outputs: record.output_scaling.varying().len(),
+        };
+        let layers = [
+            (
+                "hidden",
+                &record.hidden_layer,
+                (shape.inputs + 1).checked_mul(shape.hidden),
+            ),
+            (
+                "output",
+                &record.output_layer,
+                shape.hidden.saturating_add(1).checked_mul(shape.outputs),
+            ),
+        ];
+        for (layer, weights, expected) in layers {
+            let found = weights.len();
+            if Some(found) != expected {
+                return Err(NetworkError::LayerSize {
+                    layer,
+                    found,
+                    expected: expected.unwrap_or(usize::MAX),
+                });
+            }
+            if let Some(index) = weights.iter().position(|weight| !weight.is_finite()) {
+                return Err(NetworkError::Weight { layer, index });
+            }
+        }
+        let mlp = Mlp::from_weights(shape, [record.hidden_layer, record.output_layer].concat());
+        Ok(Self::new(record.input_scaling, mlp, record.output_scaling))
+    }
+}

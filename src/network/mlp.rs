@@ -1,0 +1,151 @@
+use ndarray::{Array2, ArrayView1, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use super::tanh_in_place;
+
+/// How many channels each layer of the network has, biases not counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shape {
+    /// Input channels n.
+    pub inputs: usize,
+    /// Hidden nodes h.
+    pub hidden: usize,
+    /// Output channels m.
+    pub outputs: usize,
+}
+
+impl Shape {
+    /// Weights and biases of the hidden layer.
+    pub fn hidden_weights(self) -> usize {
+        (self.inputs + 1) * self.hidden
+    }
+
+    /// Weights and biases of the output layer.
+    pub fn output_weights(self) -> usize {
+        (self.hidden + 1) * self.outputs
+    }
+
+    /// All weights and biases.
+    pub fn weights(self) -> usize {
+        self.hidden_weights() + self.output_weights()
+    }
+}
+
+/// A multilayer perceptron: `y = [tanh([x, 1] W), 1] V` with W (n+1 × h) and V (h+1 × m), the biases in their last
+/// rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mlp {
+    shape: Shape,
+    /// W then V, each row by row.
+    weights: Vec<f64>,
+}
+
+impl Mlp {
+    /// A network whose weights are all zero.
+    pub fn zeros(shape: Shape) -> Self {
+        Self::from_weights(shape, vec![0.0; shape.weights()])
+    }
+
+    /// A network of these weights: W row by row, then V row by row.
+    ///
+    /// # Panics
+    /// If there are not `shape.weights()` of them.
+    pub fn from_weights(shape: Shape, weights: Vec<f64>) -> Self {
+        assert_eq!(weights.len(), shape.weights());
+        Self { shape, weights }
+    }
+
+    /// Channels of each layer.
+    pub fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    /// All weights: W row by row, then V row by row.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// As [`Self::weights`], to be changed.
+    pub fn weights_mut(&mut self) -> &mut [f64] {
+        &mut self.weights
+    }
+
+    /// W and V, each row by row.
+    pub fn layers(&self) -> (&[f64], &[f64]) {
+        self.weights.split_at(self.shape.hidden_weights())
+    }
+
+    /// W: n+1 × h, biases in the last row.
+    pub fn hidden_layer(&self) -> ArrayView2<'_, f64> {
+        let shape = (self.shape.inputs + 1, self.shape.hidden);
+        ArrayView2::from_shape(shape, self.layers().0).expect("checked when built")
+    }
+
+    /// V: h+1 × m, biases in the last row.
+    pub fn output_layer(&self) -> ArrayView2<'_, f64> {
+        let shape = (self.shape.hidden + 1, self.shape.outputs);
+        ArrayView2::from_shape(shape, self.layers().1).expect("checked when built")
+    }
+
+    /// Outputs (samples × m) for inputs (samples × n).
+    pub fn forward(&self, inputs: ArrayView2<'_, f64>) -> Array2<f64> {
+        let mut outputs = Array2::zeros((inputs.nrows(), self.shape.outputs));
+        let mut hidden = vec![0.0; self.shape.hidden];
+        let (w, v) = self.layers();
+        for (input, mut output) in inputs.rows().into_iter().zip(outputs.rows_mut()) {
+            affine(w, input, &mut hidden);
+            tanh_in_place(&mut hidden);
+            let output = output.as_slice_mut().expect("a row of a standard array is contiguous");
+            affine(v, ArrayView1::from(&hidden), output);
+        }
+        outputs
+    }
+}
+
+/// `output = [input, 1] · layer`, the layer row by row with its biases last.
+fn affine(layer: &[f64], input: ArrayView1<'_, f64>, output: &mut [f64]) {
+    let width = output.len();
+    let (rows, biases) = layer.split_at(input.len() * width);
+    output.copy_from_slice(biases);
+    if width == 0 {
+        return;
+    }
+    for (row, value) in rows.chunks_exact(width).zip(input) {
+        for (sum, weight) in output.iter_mut().zip(row) {
+            *sum += value * weight;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn two_layers_by_hand() {
+        let shape = Shape {
+            inputs: 2,
+            hidden: 2,
+            outputs: 1,
+        };
+        let mlp = Mlp::from_weights(shape, vec![0.1, -0.4, 0.2, 0.5, 0.3, -0.6, 2.0, -3.0, 0.7]);
+        let y = mlp.forward(array![[1.0, -2.0]].view());
+        let (first, second) = ((0.1 - 0.4 + 0.3_f64).tanh(), (-0.4 - 1.0 - 0.6_f64).tanh());
+        assert!((y[[0, 0]] - (2.0 * first - 3.0 * second + 0.7)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn without_inputs_it_answers_a_constant() {
+        let shape = Shape {
+            inputs: 0,
+            hidden: 1,
+            outputs: 2,
+        };
+        let mlp = Mlp::from_weights(shape, vec![0.0, 5.0, 6.0, 1.0, 2.0]);
+        assert_eq!(
+            mlp.forward(Array2::zeros((3, 0)).view()),
+            array![[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]]
+        );
+    }
+}

@@ -1,0 +1,169 @@
+use ndarray::{Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Scaling of channels to [−1, 1] by their smallest and largest training value, with constant channels removed and
+/// restored: `removeconstantrows` and `mapminmax` of the field's reference toolbox.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MinMax {
+    /// Smallest training value of each channel.
+    minimum: Vec<f64>,
+    /// Largest training value of each channel.
+    maximum: Vec<f64>,
+}
+
+/// Why channels cannot be scaled.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ScalingError {
+    /// No samples.
+    #[error("there are no samples to scale")]
+    Empty,
+    /// A value is NaN or infinite.
+    #[error("sample {sample}, channel {channel}: {value} is not a finite number")]
+    NotFinite {
+        /// Sample, from 0.
+        sample: usize,
+        /// Channel, from 0.
+        channel: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The range of a channel overflows.
+    #[error("channel {channel} ranges from {minimum} to {maximum}: too wide to scale; give it in larger units")]
+    Range {
+        /// Channel, from 0.
+        channel: usize,
+        /// Its smallest value.
+        minimum: f64,
+        /// Its largest value.
+        maximum: f64,
+    },
+}
+
+impl MinMax {
+    /// Takes the ranges of `values` (samples × channels).
+    ///
+    /// # Errors
+    /// No samples, a value that is not finite, or a range that overflows.
+    pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
+        if values.nrows() == 0 {
+            return Err(ScalingError::Empty);
+        }
+        if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            return Err(ScalingError::NotFinite { sample, channel, value });
+        }
+        let extreme = |pick: fn(f64, f64) -> f64| -> Vec<f64> {
+            let first = values.row(0).to_owned();
+            let folded = values.axis_iter(Axis(0)).fold(first, |mut extreme, sample| {
+                extreme.zip_mut_with(&sample, |extreme, &value| *extreme = pick(*extreme, value));
+                extreme
+            });
+            folded.to_vec()
+        };
+        let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
+        for (channel, (&minimum, &maximum)) in minimum.iter().zip(&maximum).enumerate() {
+            if !(maximum - minimum).is_finite() {
+                return Err(ScalingError::Range {
+                    channel,
+                    minimum,
+                    maximum,
+                });
+            }
+        }
+        Ok(Self { minimum, maximum })
+    }
+
+    /// Number of channels, constant ones included.
+    pub fn channels(&self) -> usize {
+        self.minimum.len()
+    }
+
+    /// Whether the file this came from made sense: equally many finite limits in order.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.minimum.len() == self.maximum.len()
+            && self
+                .minimum
+                .iter()
+                .zip(&self.maximum)
+                .all(|(low, high)| low <= high && (high - low).is_finite())
+    }
+
+    /// The channels that vary, which are what a network is given.
+    pub fn varying(&self) -> Vec<usize> {
+        (0..self.channels())
+            .filter(|&channel| self.minimum[channel] < self.maximum[channel])
+            .collect()
+    }
+
+    /// Middle and half width of a channel's range.
+    fn range(&self, channel: usize) -> (f64, f64) {
+        let half_width = 0.5 * (self.maximum[channel] - self.minimum[channel]);
+        (self.minimum[channel] + half_width, half_width)
+    }
+
+    /// Physical values (samples × channels) to scaled ones (samples × varying channels).
+    pub fn scale(&self, values: ArrayView2<'_, f64>) -> Array2<f64> {
+        let varying = self.varying();
+        let mut scaled = values.select(Axis(1), &varying);
+        for (mut column, &channel) in scaled.columns_mut().into_iter().zip(&varying) {
+            let (middle, half_width) = self.range(channel);
+            column.mapv_inplace(|value| (value - middle) / half_width);
+        }
+        scaled
+    }
+
+    /// Scaled values (samples × varying channels) back to physical ones (samples × channels), constants restored.
+    pub fn restore(&self, scaled: ArrayView2<'_, f64>) -> Array2<f64> {
+        let mut values = Array2::zeros((scaled.nrows(), self.channels()));
+        for (mut column, &constant) in values.columns_mut().into_iter().zip(&self.minimum) {
+            column.fill(constant);
+        }
+        for (column, &channel) in scaled.columns().into_iter().zip(&self.varying()) {
+            let (middle, half_width) = self.range(channel);
+            values
+                .column_mut(channel)
+                .assign(&column.mapv(|value| value * half_width + middle));
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn extremes_become_one_and_constants_come_back() {
+        let values = array![[1.0, 7.0, -3.0], [3.0, 7.0, 5.0], [2.0, 7.0, 1.0]];
+        let scaling = MinMax::fit(values.view()).unwrap();
+        assert_eq!(scaling.varying(), [0, 2]);
+        let scaled = scaling.scale(values.view());
+        assert_eq!(scaled, array![[-1.0, -1.0], [1.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(scaling.restore(scaled.view()), values);
+    }
+
+    #[test]
+    fn one_sample_has_only_constants() {
+        let scaling = MinMax::fit(array![[1e-300, 1e300]].view()).unwrap();
+        assert_eq!(scaling.scale(array![[1.0, 2.0]].view()).dim(), (1, 0));
+        assert_eq!(scaling.restore(Array2::zeros((1, 0)).view()), array![[1e-300, 1e300]]);
+    }
+
+    #[test]
+    fn what_cannot_be_scaled_is_named() {
+        let nan = MinMax::fit(array![[1.0, 2.0], [1.0, f64::NAN]].view()).unwrap_err();
+        assert!(matches!(
+            nan,
+            ScalingError::NotFinite {
+                sample: 1,
+                channel: 1,
+                ..
+            }
+        ));
+        let wide = MinMax::fit(array![[-1e308], [1e308]].view()).unwrap_err();
+        assert!(matches!(wide, ScalingError::Range { channel: 0, .. }));
+        assert_eq!(MinMax::fit(Array2::zeros((0, 3)).view()), Err(ScalingError::Empty));
+    }
+}

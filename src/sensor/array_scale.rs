@@ -1,0 +1,210 @@
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The most wires, or nodes on a wire, that an array may have.
+pub const LARGEST_COUNT: usize = 512;
+
+/// The scale `M1×M2_M3×M4` of a sensor array, in the notation of the paper (section 2.2).
+///
+/// Parses `10x6_3x18` and `10×6_3×18`, prints the latter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ArrayScale {
+    rows: usize,
+    nodes_per_row: usize,
+    nodes_per_column: usize,
+    columns: usize,
+}
+
+/// Why a text or four numbers are not an array scale.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum ArrayScaleError {
+    /// The text does not have the form `M1×M2_M3×M4`.
+    #[error("'{0}' is not an array scale: write M1xM2_M3xM4, for example 10x10_5x30")]
+    Form(String),
+    /// A count is zero or too large.
+    #[error("the number of {what} is {count}: it must be from 1 to {LARGEST_COUNT}")]
+    Count {
+        /// Which of the four counts.
+        what: &'static str,
+        /// Its value.
+        count: usize,
+    },
+}
+
+impl ArrayScale {
+    /// The three arrays of the paper's Table 3, smallest first.
+    pub const PRESETS: [Self; 3] = [
+        Self::derived(10, 6, 3),
+        Self::derived(10, 8, 4),
+        Self::derived(10, 10, 5),
+    ];
+
+    /// `M4 = 3·M2` as the paper requires: as many equations per row-wire as coordinates.
+    const fn derived(rows: usize, nodes_per_row: usize, nodes_per_column: usize) -> Self {
+        Self {
+            rows,
+            nodes_per_row,
+            nodes_per_column,
+            columns: 3 * nodes_per_row,
+        }
+    }
+
+    /// An array of `rows` (M1) row-wires with `nodes_per_row` (M2) nodes over `columns` (M4) column-wires with
+    /// `nodes_per_column` (M3) nodes.
+    ///
+    /// # Errors
+    /// A count outside `1..=LARGEST_COUNT`.
+    pub fn new(
+        rows: usize,
+        nodes_per_row: usize,
+        nodes_per_column: usize,
+        columns: usize,
+    ) -> Result<Self, ArrayScaleError> {
+        for (what, count) in [
+            ("row-wires (M1)", rows),
+            ("nodes on a row-wire (M2)", nodes_per_row),
+            ("nodes on a column-wire (M3)", nodes_per_column),
+            ("column-wires (M4)", columns),
+        ] {
+            if !(1..=LARGEST_COUNT).contains(&count) {
+                return Err(ArrayScaleError::Count { what, count });
+            }
+        }
+        Ok(Self {
+            rows,
+            nodes_per_row,
+            nodes_per_column,
+            columns,
+        })
+    }
+
+    /// M1, row-wires on top.
+    pub fn rows(self) -> usize {
+        self.rows
+    }
+
+    /// M2, nodes on each row-wire.
+    pub fn nodes_per_row(self) -> usize {
+        self.nodes_per_row
+    }
+
+    /// M3, nodes on each column-wire.
+    pub fn nodes_per_column(self) -> usize {
+        self.nodes_per_column
+    }
+
+    /// M4, column-wires at the bottom: the resistances read for each row-wire.
+    pub fn columns(self) -> usize {
+        self.columns
+    }
+
+    /// 3·M2, the coordinates of one row-wire's nodes.
+    pub fn coordinates_per_row(self) -> usize {
+        3 * self.nodes_per_row
+    }
+
+    /// What to tell a user whose array departs from the paper's rule M4 = 3·M2.
+    pub fn note(self) -> Option<String> {
+        let equations = self.columns;
+        let coordinates = self.coordinates_per_row();
+        (equations != coordinates).then(|| {
+            let kind = if equations < coordinates { "fewer" } else { "more" };
+            format!("{equations} column-wires, {kind} than the 3·M2 = {coordinates} of the paper's rule")
+        })
+    }
+}
+
+impl Default for ArrayScale {
+    /// The paper's main array, 10×10_5×30.
+    fn default() -> Self {
+        Self::PRESETS[2]
+    }
+}
+
+impl FromStr for ArrayScale {
+    type Err = ArrayScaleError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let form = || ArrayScaleError::Form(text.to_owned());
+        let mut counts = [0; 4];
+        let (top, bottom) = text.trim().split_once('_').ok_or_else(form)?;
+        for (layer, pair) in [top, bottom].iter().zip(counts.chunks_exact_mut(2)) {
+            let (first, second) = layer.split_once(['x', 'X', '×']).ok_or_else(form)?;
+            pair[0] = first.trim().parse().map_err(|_| form())?;
+            pair[1] = second.trim().parse().map_err(|_| form())?;
+        }
+        Self::new(counts[0], counts[1], counts[2], counts[3])
+    }
+}
+
+impl fmt::Display for ArrayScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            rows,
+            nodes_per_row,
+            nodes_per_column,
+            columns,
+        } = self;
+        f.pad(&format!("{rows}×{nodes_per_row}_{nodes_per_column}×{columns}"))
+    }
+}
+
+impl TryFrom<String> for ArrayScale {
+    type Error = ArrayScaleError;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
+    }
+}
+
+impl From<ArrayScale> for String {
+    fn from(scale: ArrayScale) -> Self {
+        scale.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_crosses_parse_and_the_proper_one_prints() {
+        for text in ["10x6_3x18", "10×6_3×18", " 10X6_3x18 "] {
+            assert_eq!(text.parse::<ArrayScale>().unwrap().to_string(), "10×6_3×18");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_scale_is_named() {
+        for text in [
+            "10x6",
+            "",
+            "10x6_3",
+            "ax6_3x18",
+            "10x6_3x18x2",
+            "-1x6_3x18",
+            "1e3x6_3x18",
+            "10×6×3×18",
+        ] {
+            let error = text.parse::<ArrayScale>().unwrap_err();
+            assert!(matches!(error, ArrayScaleError::Form(_)), "{text}: {error}");
+        }
+        for text in ["0x6_3x18", "10x6_3x0", "10x6_3x513"] {
+            let error = text.parse::<ArrayScale>().unwrap_err();
+            assert!(matches!(error, ArrayScaleError::Count { .. }), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn departing_from_the_papers_rule_is_allowed_with_a_note() {
+        assert_eq!("10x6_3x18".parse::<ArrayScale>().unwrap().note(), None);
+        let note = "10x6_3x20".parse::<ArrayScale>().unwrap().note().unwrap();
+        assert!(
+            note.contains("20") && note.contains("more") && note.contains("18"),
+            "{note}"
+        );
+    }
+}

@@ -1,0 +1,166 @@
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::ArrayScale;
+
+/// Where the electrode nodes are when nothing presses, in millimetres.
+///
+/// The paper gives the height (5), the gap between wires (1) and row-wires at x = 8..17. The other values are an
+/// assumption: the layout, of 330 scanned, under which the model comes closest to the paper's Tables 1 and 3.
+/// Row-wires run along y, column-wires along x, z points up from the column-wires.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geometry {
+    /// Distance of the undeformed row-wires above the column-wires.
+    pub height_mm: f64,
+    /// x of the first row-wire.
+    pub row_x0_mm: f64,
+    /// Distance between row-wires.
+    pub row_pitch_mm: f64,
+    /// Distance between the nodes on a row-wire; the row is centred over the column-wires.
+    pub node_pitch_mm: f64,
+    /// y of the first column-wire.
+    pub column_y0_mm: f64,
+    /// Distance between column-wires.
+    pub column_pitch_mm: f64,
+    /// x of the first node on each column-wire.
+    pub column_node_x0_mm: f64,
+    /// Distance between the nodes on a column-wire.
+    pub column_node_pitch_mm: f64,
+}
+
+/// A geometry that no sensor can have.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum GeometryError {
+    /// A length is NaN or infinite.
+    #[error("{what} is {value}: give a finite length in millimetres")]
+    NotFinite {
+        /// Which length.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A length that must be positive is not.
+    #[error("{what} is {value} mm: it must be above 0")]
+    NotPositive {
+        /// Which length.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl Default for Geometry {
+    fn default() -> Self {
+        Self {
+            height_mm: 5.0,
+            row_x0_mm: 8.0,
+            row_pitch_mm: 1.0,
+            node_pitch_mm: 2.0,
+            column_y0_mm: 1.0,
+            column_pitch_mm: 1.0,
+            column_node_x0_mm: 14.0,
+            column_node_pitch_mm: 5.0,
+        }
+    }
+}
+
+impl Geometry {
+    /// What the program tells its user about the default values.
+    pub const ASSUMPTION: &'static str = "The paper gives height, wire gap and row positions (x = 8 to 17 mm). Node \
+         pitch and column-node positions are assumed: the layout, of 330 scanned, that comes closest to its tables.";
+
+    /// Checks that every length is finite and that height and pitches are positive.
+    ///
+    /// # Errors
+    /// The first length that is not.
+    pub fn check(&self) -> Result<(), GeometryError> {
+        let Self {
+            height_mm,
+            row_x0_mm,
+            row_pitch_mm,
+            node_pitch_mm,
+            column_y0_mm,
+            column_pitch_mm,
+            column_node_x0_mm,
+            column_node_pitch_mm,
+        } = *self;
+        let offsets = [
+            ("the first row-wire's x", row_x0_mm),
+            ("the first column-wire's y", column_y0_mm),
+            ("the first column node's x", column_node_x0_mm),
+        ];
+        let lengths = [
+            ("the height", height_mm),
+            ("the row pitch", row_pitch_mm),
+            ("the node pitch", node_pitch_mm),
+            ("the column pitch", column_pitch_mm),
+            ("the column node pitch", column_node_pitch_mm),
+        ];
+        for (what, value) in offsets.into_iter().chain(lengths) {
+            if !value.is_finite() {
+                return Err(GeometryError::NotFinite { what, value });
+            }
+        }
+        for (what, value) in lengths {
+            if value <= 0.0 {
+                return Err(GeometryError::NotPositive { what, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// x of row-wire `row`.
+    pub fn row_x_mm(&self, row: usize) -> f64 {
+        self.row_x0_mm + self.row_pitch_mm * row as f64
+    }
+
+    /// y of node `node` on every row-wire.
+    pub fn node_y_mm(&self, scale: ArrayScale, node: usize) -> f64 {
+        let columns_centre = self.column_y0_mm + self.column_pitch_mm * (scale.columns() - 1) as f64 / 2.0;
+        columns_centre + self.node_pitch_mm * (node as f64 - (scale.nodes_per_row() - 1) as f64 / 2.0)
+    }
+
+    /// Undeformed position of node `node` on row-wire `row`.
+    pub fn row_node_mm(&self, scale: ArrayScale, row: usize, node: usize) -> DVec3 {
+        DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)
+    }
+
+    /// Position of node `node` on column-wire `column`; the bottom layer never moves.
+    pub fn column_node_mm(&self, column: usize, node: usize) -> DVec3 {
+        DVec3::new(
+            self.column_node_x0_mm + self.column_node_pitch_mm * node as f64,
+            self.column_y0_mm + self.column_pitch_mm * column as f64,
+            0.0,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_layout_is_the_documented_one() {
+        let scale = ArrayScale::default();
+        let geometry = Geometry::default();
+        assert_eq!(geometry.row_node_mm(scale, 9, 0), DVec3::new(17.0, 6.5, 5.0));
+        assert_eq!(geometry.column_node_mm(29, 4), DVec3::new(34.0, 30.0, 0.0));
+    }
+
+    #[test]
+    fn impossible_lengths_are_named() {
+        let flat = Geometry {
+            height_mm: 0.0,
+            ..Geometry::default()
+        };
+        assert!(flat.check().unwrap_err().to_string().contains("height"));
+        let nan = Geometry {
+            node_pitch_mm: f64::NAN,
+            ..Geometry::default()
+        };
+        assert!(nan.check().unwrap_err().to_string().contains("node pitch"));
+        assert_eq!(Geometry::default().check(), Ok(()));
+    }
+}

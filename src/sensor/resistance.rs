@@ -1,0 +1,204 @@
+use glam::DVec3;
+use ndarray::Array3;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{ArrayScale, Geometry, GeometryError};
+
+/// Resistance per millimetre of rubber used where nothing else is said. The paper gives none: g scales every
+/// resistance alike, so no relative error depends on it.
+pub const DEFAULT_RESISTIVITY_OHM_PER_MM: f64 = 100.0;
+
+/// The resistance model of one array: Eq. (1)-(2) of the paper and its derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorModel {
+    /// How many wires and nodes.
+    pub scale: ArrayScale,
+    /// Where they are.
+    pub geometry: Geometry,
+    /// g, resistance per millimetre of rubber.
+    pub resistivity_ohm_per_mm: f64,
+}
+
+/// Why the model cannot answer.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SensorError {
+    /// The geometry is impossible.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// g is not a positive number.
+    #[error("the resistance per millimetre is {0}: it must be above 0 and finite")]
+    Resistivity(f64),
+    /// A resistance came out as zero, infinite or NaN.
+    #[error(
+        "row {row}, column {column}: the resistance is {resistance_ohm} ohm; a node touches a column-wire or a length is out of range"
+    )]
+    Resistance {
+        /// Row-wire, from 0.
+        row: usize,
+        /// Column-wire, from 0.
+        column: usize,
+        /// What came out.
+        resistance_ohm: f64,
+    },
+}
+
+impl SensorModel {
+    /// An array with the assumed geometry and resistivity.
+    pub fn new(scale: ArrayScale) -> Self {
+        Self {
+            scale,
+            geometry: Geometry::default(),
+            resistivity_ohm_per_mm: DEFAULT_RESISTIVITY_OHM_PER_MM,
+        }
+    }
+
+    /// Checks geometry and resistivity.
+    ///
+    /// # Errors
+    /// What is impossible.
+    pub fn check(&self) -> Result<(), SensorError> {
+        self.geometry.check()?;
+        let g = self.resistivity_ohm_per_mm;
+        if g > 0.0 && g.is_finite() {
+            Ok(())
+        } else {
+            Err(SensorError::Resistivity(g))
+        }
+    }
+
+    /// Position of a node displaced by `displacement_mm`, whose z counts downwards (compression is positive).
+    pub fn displaced_mm(&self, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
+        let rest = self.geometry.row_node_mm(self.scale, row, node);
+        DVec3::new(
+            rest.x + displacement_mm.x,
+            rest.y + displacement_mm.y,
+            rest.z - displacement_mm.z,
+        )
+    }
+
+    /// Row-column resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them),
+    /// written to `resistances_ohm` (M4), Eq. (2):
+    ///
+    /// `1/R_lk = Σ_i Σ_j 1 / (g · |p_li + u_li − q_kj|)`
+    ///
+    /// # Errors
+    /// A resistance that is not a positive finite number.
+    ///
+    /// # Panics
+    /// If the slices do not have M2 and M4 elements.
+    pub fn row_resistances_into(
+        &self,
+        row: usize,
+        displacements_mm: &[DVec3],
+        resistances_ohm: &mut [f64],
+    ) -> Result<(), SensorError> {
+        assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
+        assert_eq!(resistances_ohm.len(), self.scale.columns());
+        let (y0, pitch) = (self.geometry.column_y0_mm, self.geometry.column_pitch_mm);
+        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
+        resistances_ohm.fill(0.0);
+        for (node, &displacement) in displacements_mm.iter().enumerate() {
+            let position = self.displaced_mm(row, node, displacement);
+            for j in 0..self.scale.nodes_per_column() {
+                let dx = position.x - self.geometry.column_node_mm(0, j).x;
+                let across2 = dx * dx + position.z * position.z;
+                for (column, sum) in resistances_ohm.iter_mut().enumerate() {
+                    let dy = position.y - (y0 + pitch * column as f64);
+                    *sum += 1.0 / (across2 + dy * dy).sqrt();
+                }
+            }
+        }
+        for (column, value) in resistances_ohm.iter_mut().enumerate() {
+            *value = self.resistivity_ohm_per_mm / *value;
+            if !(*value > 0.0 && value.is_finite()) {
+                return Err(SensorError::Resistance {
+                    row,
+                    column,
+                    resistance_ohm: *value,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`Self::row_resistances_into`], in a new vector of M4 resistances in ohm.
+    ///
+    /// # Errors
+    /// A resistance that is not a positive finite number.
+    pub fn row_resistances(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Vec<f64>, SensorError> {
+        let mut resistances_ohm = vec![0.0; self.scale.columns()];
+        self.row_resistances_into(row, displacements_mm, &mut resistances_ohm)?;
+        Ok(resistances_ohm)
+    }
+
+    /// Analytic derivatives ∂R_lk/∂u_li of row-wire `row`, in ohm per millimetre: shape M4 × M2 × 3, the last axis
+    /// being ux, uy, uz (uz downwards).
+    ///
+    /// With s = Σ 1/d and R = g/s, ∂R/∂u = (g/s²) Σ_j (∂d/∂u)/d² and ∂d/∂u = (dx, dy, −z)/d.
+    ///
+    /// # Errors
+    /// A resistance that is not a positive finite number.
+    pub fn row_jacobian(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Array3<f64>, SensorError> {
+        let resistances_ohm = self.row_resistances(row, displacements_mm)?;
+        let shape = (self.scale.columns(), self.scale.nodes_per_row(), 3);
+        let mut jacobian = Array3::zeros(shape);
+        for (column, &resistance) in resistances_ohm.iter().enumerate() {
+            let per_sum = resistance * resistance / self.resistivity_ohm_per_mm;
+            for (node, &displacement) in displacements_mm.iter().enumerate() {
+                let position = self.displaced_mm(row, node, displacement);
+                let mut derivative = DVec3::ZERO;
+                for j in 0..self.scale.nodes_per_column() {
+                    let apart = position - self.geometry.column_node_mm(column, j);
+                    derivative += DVec3::new(apart.x, apart.y, -apart.z) / apart.length().powi(3);
+                }
+                for (axis, value) in derivative.to_array().into_iter().enumerate() {
+                    jacobian[[column, node, axis]] = per_sum * value;
+                }
+            }
+        }
+        Ok(jacobian)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One node over one column node: R is g times their distance.
+    #[test]
+    fn a_single_pair_is_the_rubber_between_two_points() {
+        let mut model = SensorModel::new("1x1_1x1".parse().unwrap());
+        model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
+        model.resistivity_ohm_per_mm = 470.0;
+        let pressed = DVec3::new(0.0, 0.0, 1.0);
+        assert_eq!(model.row_resistances(0, &[pressed]).unwrap(), [470.0 * 4.0]);
+    }
+
+    #[test]
+    fn resistivity_only_scales() {
+        for g in [1e-12, 1.0, 1e12] {
+            let mut model = SensorModel::new(ArrayScale::default());
+            let rest = vec![DVec3::ZERO; 10];
+            let reference = model.row_resistances(3, &rest).unwrap();
+            model.resistivity_ohm_per_mm = g;
+            for (scaled, value) in model.row_resistances(3, &rest).unwrap().iter().zip(&reference) {
+                let ratio = scaled / value * DEFAULT_RESISTIVITY_OHM_PER_MM / g;
+                assert!((ratio - 1.0).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn a_touching_node_is_an_error_and_a_nearly_touching_one_is_not() {
+        let mut model = SensorModel::new("1x1_1x1".parse().unwrap());
+        model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
+        let touch = DVec3::new(0.0, 0.0, model.geometry.height_mm);
+        let error = model.row_resistances(0, &[touch]).unwrap_err();
+        assert!(error.to_string().contains("row 0, column 0"), "{error}");
+        let near = DVec3::new(0.0, 0.0, model.geometry.height_mm * (1.0 - 1e-15));
+        assert!(model.row_resistances(0, &[near]).is_ok());
+        assert!(model.row_resistances(0, &[DVec3::NAN]).is_err());
+    }
+}
