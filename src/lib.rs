@@ -23,3 +23,4 @@ pub mod network;
 
 pub mod scene;
 pub mod sensor;
+pub mod training;

@@ -1,0 +1,199 @@
+use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+use ndarray::ArrayView2;
+
+use crate::network::{Mlp, Shape, tanh_in_place};
+
+/// Samples of a block. Products run block by block, so that what they need stays in the cache and memory does not
+/// grow with the number of samples.
+pub(super) const BLOCK: usize = 256;
+
+/// Scaled inputs and targets, cut into blocks of samples for the products of training.
+#[derive(Clone, Debug)]
+pub struct Examples {
+    blocks: Vec<Block>,
+    samples: usize,
+    inputs: usize,
+    outputs: usize,
+}
+
+/// Up to [`BLOCK`] samples, each channel contiguous.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    /// A: samples × (inputs + 1), the last column being ones for the biases.
+    pub(super) inputs: Mat<f64>,
+    /// T: samples × outputs.
+    pub(super) targets: Mat<f64>,
+}
+
+impl Block {
+    pub(super) fn samples(&self) -> usize {
+        self.inputs.nrows()
+    }
+}
+
+impl Examples {
+    /// Takes scaled inputs (samples × n) and targets (samples × m).
+    ///
+    /// # Panics
+    /// If the numbers of samples differ.
+    pub fn new(inputs: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Self {
+        assert_eq!(inputs.nrows(), targets.nrows());
+        let (samples, n) = inputs.dim();
+        let cut = |first: usize| {
+            let count = BLOCK.min(samples - first);
+            Block {
+                inputs: Mat::from_fn(count, n + 1, |s, i| if i < n { inputs[[first + s, i]] } else { 1.0 }),
+                targets: Mat::from_fn(count, targets.ncols(), |s, t| targets[[first + s, t]]),
+            }
+        };
+        Self {
+            blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
+            samples,
+            inputs: n,
+            outputs: targets.ncols(),
+        }
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Number of input channels n.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Number of output channels m.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Number of errors: samples × outputs.
+    pub(super) fn errors(&self) -> f64 {
+        (self.samples * self.outputs) as f64
+    }
+
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Mean squared error of `mlp` over samples and outputs.
+    pub fn mse(&self, mlp: &Mlp, activations: &mut Activations) -> f64 {
+        let squares = self
+            .blocks
+            .iter()
+            .map(|block| activations.forward(mlp, block))
+            .sum::<f64>();
+        squares / self.errors()
+    }
+}
+
+/// What the layers answer for one block; room that is used again for every block.
+#[derive(Clone, Debug)]
+pub struct Activations {
+    /// H̃ = [H, 1]: block × (hidden + 1).
+    pub(super) hidden: Mat<f64>,
+    /// E = H̃V − T: block × outputs.
+    pub(super) errors: Mat<f64>,
+}
+
+impl Activations {
+    /// Room for a network of this size.
+    pub fn new(shape: Shape) -> Self {
+        Self {
+            hidden: Mat::from_fn(
+                BLOCK,
+                shape.hidden + 1,
+                |_, node| if node < shape.hidden { 0.0 } else { 1.0 },
+            ),
+            errors: Mat::zeros(BLOCK, shape.outputs),
+        }
+    }
+
+    /// Runs the network on `block`; returns the sum of squared errors.
+    pub(super) fn forward(&mut self, mlp: &Mlp, block: &Block) -> f64 {
+        let (shape, samples) = (mlp.shape(), block.samples());
+        let (w, v) = mlp.layers();
+        let w = MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden);
+        let v = MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs);
+        let mut hidden = self.hidden.as_mut().subrows_mut(0, samples);
+        matmul(
+            hidden.as_mut().subcols_mut(0, shape.hidden),
+            Accum::Replace,
+            &block.inputs,
+            w,
+            1.0,
+            Par::Seq,
+        );
+        for node in 0..shape.hidden {
+            tanh_in_place(column_mut(hidden.as_mut(), node));
+        }
+        let mut errors = self.errors.as_mut().subrows_mut(0, samples);
+        matmul(errors.as_mut(), Accum::Replace, hidden.as_ref(), v, 1.0, Par::Seq);
+        let mut squares = 0.0;
+        for output in 0..shape.outputs {
+            let targets = column(block.targets.as_ref(), output);
+            for (error, target) in column_mut(errors.as_mut(), output).iter_mut().zip(targets) {
+                *error -= target;
+                squares += *error * *error;
+            }
+        }
+        squares
+    }
+}
+
+/// A column of a matrix whose columns are contiguous.
+pub(super) fn column(matrix: MatRef<'_, f64>, index: usize) -> &[f64] {
+    let column = matrix
+        .col(index)
+        .try_as_col_major()
+        .expect("columns of a column-major matrix are contiguous");
+    column.as_slice()
+}
+
+/// A column of a matrix whose columns are contiguous.
+pub(super) fn column_mut(matrix: MatMut<'_, f64>, index: usize) -> &mut [f64] {
+    let column = matrix.col_mut(index).try_as_col_major_mut();
+    column
+        .expect("columns of a column-major matrix are contiguous")
+        .as_slice_mut()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+
+    pub(in crate::training) fn random_examples(samples: usize, inputs: usize, outputs: usize, seed: u64) -> Examples {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |columns| Array2::from_shape_simple_fn((samples, columns), || rng.random_range(-1.0..1.0));
+        Examples::new(draw(inputs).view(), draw(outputs).view())
+    }
+
+    pub(in crate::training) fn random_mlp(inputs: usize, hidden: usize, outputs: usize, seed: u64) -> Mlp {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let shape = Shape {
+            inputs,
+            hidden,
+            outputs,
+        };
+        Mlp::from_weights(
+            shape,
+            (0..shape.weights()).map(|_| rng.random_range(-1.0..1.0)).collect(),
+        )
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_network_itself() {
+        let mlp = random_mlp(3, 5, 2, 1);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut draw = |columns| Array2::from_shape_simple_fn((BLOCK * 2 + 7, columns), || rng.random_range(-1.0..1.0));
+        let (inputs, targets) = (draw(3), draw(2));
+        let expected = (mlp.forward(inputs.view()) - &targets).mapv(|e| e * e).mean().unwrap();
+        let mse = Examples::new(inputs.view(), targets.view()).mse(&mlp, &mut Activations::new(mlp.shape()));
+        assert!((mse - expected).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,102 @@
+use serde::{Deserialize, Serialize};
+
+use super::{Evaluation, Examples, NormalEquations, SettingError, StopReason, examples::Activations, method::in_range};
+use crate::network::Mlp;
+
+/// Settings of Levenberg-Marquardt (Hagan and Menhaj 1994), with the field's usual defaults.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevenbergMarquardtSettings {
+    /// First damping: large values take short steps down the gradient, small ones full Gauss-Newton steps.
+    pub mu: f64,
+    /// Factor on mu after a step that lowers the error.
+    pub mu_decrease: f64,
+    /// Factor on mu after a step that does not.
+    pub mu_increase: f64,
+    /// Damping at which training gives up.
+    pub mu_max: f64,
+}
+
+impl Default for LevenbergMarquardtSettings {
+    fn default() -> Self {
+        Self {
+            mu: 1e-3,
+            mu_decrease: 0.1,
+            mu_increase: 10.0,
+            mu_max: 1e10,
+        }
+    }
+}
+
+impl LevenbergMarquardtSettings {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
+        in_range("mu", self.mu, SMALLEST_MU..=1e300)?;
+        in_range("the decrease of mu", self.mu_decrease, 1e-6..=0.999)?;
+        in_range("the increase of mu", self.mu_increase, 1.001..=1e6)?;
+        in_range("the largest mu", self.mu_max, self.mu..=1e300)
+    }
+}
+
+/// Below this, mu is lost in the rounding of any sum of squares worth damping.
+const SMALLEST_MU: f64 = 1e-20;
+
+/// Levenberg-Marquardt at work. A rejected step only factors the gathered products again, with a larger mu.
+pub struct LevenbergMarquardt {
+    settings: LevenbergMarquardtSettings,
+    mu: f64,
+    mse: f64,
+    equations: NormalEquations,
+    activations: Activations,
+    step: Vec<f64>,
+    candidate: Mlp,
+}
+
+impl LevenbergMarquardt {
+    /// Gathers the normal equations at the start.
+    pub fn new(settings: LevenbergMarquardtSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut equations = NormalEquations::new(mlp.shape(), examples);
+        let evaluation = equations.gather(mlp, examples);
+        let method = Self {
+            settings,
+            mu: settings.mu,
+            mse: evaluation.mse,
+            equations,
+            activations: Activations::new(mlp.shape()),
+            step: vec![0.0; mlp.weights().len()],
+            candidate: mlp.clone(),
+        };
+        (method, evaluation)
+    }
+
+    /// The present damping.
+    pub fn mu(&self) -> f64 {
+        self.mu
+    }
+
+    /// Moves `mlp` to weights of lower error and gathers the equations there.
+    ///
+    /// # Errors
+    /// [`StopReason::MuLarge`] if no damping up to the largest gives such weights.
+    pub fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+        while self.mu <= self.settings.mu_max {
+            if self.equations.solve(mlp, self.mu, &mut self.step) {
+                let moved = mlp.weights().iter().zip(&self.step).map(|(weight, step)| weight + step);
+                self.candidate
+                    .weights_mut()
+                    .iter_mut()
+                    .zip(moved)
+                    .for_each(|(weight, moved)| *weight = moved);
+                let mse = examples.mse(&self.candidate, &mut self.activations);
+                // Written so that NaN is rejected.
+                if mse < self.mse {
+                    std::mem::swap(mlp, &mut self.candidate);
+                    self.mu = (self.mu * self.settings.mu_decrease).max(SMALLEST_MU);
+                    self.mse = mse;
+                    return Ok(self.equations.gather(mlp, examples));
+                }
+            }
+            self.mu *= self.settings.mu_increase;
+        }
+        Err(StopReason::MuLarge)
+    }
+}

@@ -1,0 +1,112 @@
+use serde::{Deserialize, Serialize};
+
+use super::{Evaluation, Examples, SettingError, StopReason, backpropagation::Backpropagation, method::in_range};
+use crate::network::Mlp;
+
+/// Settings of gradient descent with momentum, with the field's usual defaults.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MomentumSettings {
+    /// α, the learning rate.
+    pub learning_rate: f64,
+    /// η, the momentum factor.
+    pub momentum: f64,
+}
+
+impl Default for MomentumSettings {
+    fn default() -> Self {
+        Self {
+            learning_rate: 0.01,
+            momentum: 0.9,
+        }
+    }
+}
+
+impl MomentumSettings {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
+        in_range("the learning rate", self.learning_rate, f64::MIN_POSITIVE..=1e300)?;
+        in_range("the momentum factor", self.momentum, 0.0..=1.0)
+    }
+}
+
+/// Gradient descent that mixes in the previous **gradient**, Eq. (11) of the paper:
+/// `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`, g the negative gradient. (The field's `traingdm` mixes in the previous
+/// step instead.) Before the first step g(N−1) is taken as g(N).
+#[derive(Debug)]
+pub struct Momentum {
+    settings: MomentumSettings,
+    backpropagation: Backpropagation,
+    previous_gradient: Vec<f64>,
+}
+
+impl Momentum {
+    /// Takes the gradient at the start.
+    pub fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut backpropagation = Backpropagation::new(mlp);
+        let evaluation = backpropagation.evaluate(mlp, examples);
+        let previous_gradient = backpropagation.gradient.clone();
+        let method = Self {
+            settings,
+            backpropagation,
+            previous_gradient,
+        };
+        (method, evaluation)
+    }
+
+    /// The learning rate.
+    pub fn learning_rate(&self) -> f64 {
+        self.settings.learning_rate
+    }
+
+    /// Moves `mlp` by one step.
+    ///
+    /// # Errors
+    /// [`StopReason::Diverged`] if the error there is not finite.
+    pub fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+        let MomentumSettings {
+            learning_rate,
+            momentum,
+        } = self.settings;
+        let gradients = self.backpropagation.gradient.iter().zip(&self.previous_gradient);
+        for (weight, (now, before)) in mlp.weights_mut().iter_mut().zip(gradients) {
+            *weight -= learning_rate * ((1.0 - momentum) * now + momentum * before);
+        }
+        self.previous_gradient.copy_from_slice(&self.backpropagation.gradient);
+        let evaluation = self.backpropagation.evaluate(mlp, examples);
+        let finite = evaluation.mse.is_finite() && evaluation.gradient_norm.is_finite();
+        if finite {
+            Ok(evaluation)
+        } else {
+            Err(StopReason::Diverged)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::examples::tests::{random_examples, random_mlp};
+
+    #[test]
+    fn steps_follow_equation_11() {
+        let (mut mlp, examples) = (random_mlp(3, 2, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = MomentumSettings {
+            learning_rate: 0.1,
+            momentum: 0.7,
+        };
+        let gradient = |mlp: &Mlp| {
+            let mut backpropagation = Backpropagation::new(mlp);
+            backpropagation.evaluate(mlp, &examples);
+            backpropagation.gradient
+        };
+        let (mut method, _) = Momentum::new(settings, &mlp, &examples);
+        let (start, g0) = (mlp.weights().to_vec(), gradient(&mlp));
+        method.step(&mut mlp, &examples).unwrap();
+        let (first, g1) = (mlp.weights().to_vec(), gradient(&mlp));
+        method.step(&mut mlp, &examples).unwrap();
+        for k in 0..start.len() {
+            assert!((first[k] - (start[k] - 0.1 * g0[k])).abs() < 1e-15);
+            assert!((mlp.weights()[k] - (first[k] - 0.1 * (0.3 * g1[k] + 0.7 * g0[k]))).abs() < 1e-15);
+        }
+    }
+}

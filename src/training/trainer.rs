@@ -1,0 +1,211 @@
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{
+    EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, examples::Activations,
+    method::Algorithm,
+};
+use crate::network::Mlp;
+
+/// How to train.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainingSettings {
+    /// The method and its settings.
+    pub method: Method,
+    /// When to stop.
+    pub stopping: StoppingRules,
+}
+
+impl TrainingSettings {
+    /// Checks the ranges of all settings.
+    ///
+    /// # Errors
+    /// The first setting out of range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        self.method.check()?;
+        self.stopping.check()
+    }
+}
+
+/// What is trained on and watched, scaled.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// What the method fits.
+    pub training: Examples,
+    /// What decides which weights are best and when to stop, if anything was held out.
+    pub validation: Option<Examples>,
+    /// What is only watched.
+    pub test: Option<Examples>,
+}
+
+/// Why training cannot begin.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum TrainingError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// Nothing to learn.
+    #[error("every target is constant in the training set: there is nothing to learn; draw more samples")]
+    NothingVaries,
+    /// No hidden nodes.
+    #[error("the network has no hidden nodes: give at least 1")]
+    NoHiddenNodes,
+}
+
+/// A training in progress: a value that is stepped one epoch at a time, so that pausing is not stepping.
+pub struct Trainer {
+    settings: TrainingSettings,
+    problem: Problem,
+    algorithm: Algorithm,
+    mlp: Mlp,
+    best: Best,
+    history: Vec<EpochRecord>,
+    stop_reason: Option<StopReason>,
+    elapsed: Duration,
+    activations: Activations,
+}
+
+/// The weights of the lowest validation error, or training error where nothing is held out.
+#[derive(Debug)]
+struct Best {
+    mlp: Mlp,
+    epoch: usize,
+    mse: f64,
+}
+
+impl Trainer {
+    /// Prepares training from the weights of `start`; evaluates them as epoch 0.
+    ///
+    /// # Errors
+    /// Settings out of range, or nothing to train.
+    pub fn new(start: Mlp, problem: Problem, settings: TrainingSettings) -> Result<Self, TrainingError> {
+        settings.check()?;
+        if start.shape().outputs == 0 {
+            return Err(TrainingError::NothingVaries);
+        }
+        if start.shape().hidden == 0 {
+            return Err(TrainingError::NoHiddenNodes);
+        }
+        let begun = Instant::now();
+        let (algorithm, evaluation) = Algorithm::new(&settings.method, &start, &problem.training);
+        let mut trainer = Self {
+            settings,
+            algorithm,
+            best: Best {
+                mlp: start.clone(),
+                epoch: 0,
+                mse: f64::INFINITY,
+            },
+            history: Vec::new(),
+            stop_reason: None,
+            elapsed: Duration::ZERO,
+            activations: Activations::new(start.shape()),
+            mlp: start,
+            problem,
+        };
+        trainer.record(evaluation);
+        trainer.elapsed = begun.elapsed();
+        Ok(trainer)
+    }
+
+    /// Runs one epoch, unless the training has ended. Returns why it has ended, if it has.
+    pub fn step(&mut self) -> Option<StopReason> {
+        if self.stop_reason.is_none() {
+            let begun = Instant::now();
+            match self.algorithm.step(&mut self.mlp, &self.problem.training) {
+                Ok(evaluation) => self.record(evaluation),
+                Err(reason) => self.stop_reason = Some(reason),
+            }
+            self.elapsed += begun.elapsed();
+        }
+        self.stop_reason
+    }
+
+    /// Ends the training by the user's wish.
+    pub fn stop(&mut self) {
+        self.stop_reason.get_or_insert(StopReason::Stopped);
+    }
+
+    fn record(&mut self, evaluation: Evaluation) {
+        let Evaluation { mse, gradient_norm } = evaluation;
+        let mut watch = |examples: &Option<Examples>| {
+            let examples = examples.as_ref()?;
+            Some(examples.mse(&self.mlp, &mut self.activations))
+        };
+        let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
+        let deciding = validation_mse.unwrap_or(mse);
+        let before = self.history.last();
+        let epoch = before.map_or(0, |last| last.epoch + 1);
+        let mut validation_failures = before.map_or(0, |last| last.validation_failures);
+        if deciding < self.best.mse {
+            self.best.mse = deciding;
+            self.best.epoch = epoch;
+            self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
+            validation_failures = 0;
+        } else if validation_mse.is_some() && deciding > self.best.mse {
+            validation_failures += 1;
+        }
+        self.history.push(EpochRecord {
+            epoch,
+            training_mse: mse,
+            validation_mse,
+            test_mse,
+            gradient_norm,
+            parameter: self.algorithm.parameter(),
+            validation_failures,
+        });
+        self.stop_reason = self.reason_to_stop(epoch, evaluation, validation_failures);
+    }
+
+    fn reason_to_stop(&self, epoch: usize, now: Evaluation, validation_failures: usize) -> Option<StopReason> {
+        let rules = self.settings.stopping;
+        let reasons = [
+            (!now.mse.is_finite(), StopReason::Diverged),
+            (now.mse <= rules.goal_mse, StopReason::GoalReached),
+            (now.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
+            (validation_failures >= rules.max_fail, StopReason::ValidationRose),
+            (epoch >= rules.epochs, StopReason::EpochsReached),
+        ];
+        reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
+    }
+
+    /// How it is trained.
+    pub fn settings(&self) -> &TrainingSettings {
+        &self.settings
+    }
+
+    /// The best weights so far: of the lowest validation error, or training error where nothing is held out.
+    pub fn best(&self) -> &Mlp {
+        &self.best.mlp
+    }
+
+    /// The epoch of [`Self::best`].
+    pub fn best_epoch(&self) -> usize {
+        self.best.epoch
+    }
+
+    /// Every epoch so far, the start first.
+    pub fn history(&self) -> &[EpochRecord] {
+        &self.history
+    }
+
+    /// The latest epoch.
+    pub fn latest(&self) -> &EpochRecord {
+        self.history
+            .last()
+            .expect("the start is recorded when the trainer is made")
+    }
+
+    /// Why the training has ended, if it has.
+    pub fn stop_reason(&self) -> Option<StopReason> {
+        self.stop_reason
+    }
+
+    /// Time spent in training, pauses not counted.
+    pub fn elapsed(&self) -> Duration {
+        self.elapsed
+    }
+}
