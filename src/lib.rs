@@ -19,6 +19,8 @@
 //! | `app` | the window (feature `gui`) |
 
 pub mod dataset;
+pub mod decoupling;
+pub mod evaluation;
 pub mod network;
 
 pub mod scene;

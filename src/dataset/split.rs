@@ -11,11 +11,11 @@ pub struct Split {
     pub validation: Option<Dataset>,
 }
 
-/// Holds out about `fraction` of the snapshots for validation, drawn by `rng`; at least one snapshot stays for
-/// training. Whole snapshots are held out, so that no validation sample shares its moment with a training sample.
-pub fn hold_out(set: Dataset, fraction: f64, rng: &mut impl Rng) -> Split {
+/// Holds out `held_out` snapshots for validation, drawn by `rng`; at least one snapshot stays for training. Whole
+/// snapshots are held out, so that no validation sample shares its moment with a training sample.
+pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
     let snapshots = set.snapshots();
-    let held_out = ((snapshots as f64 * fraction).round() as usize).min(snapshots.saturating_sub(1));
+    let held_out = held_out.min(snapshots.saturating_sub(1));
     if held_out == 0 {
         return Split {
             training: set,
@@ -48,15 +48,15 @@ mod tests {
         sensor::SensorModel,
     };
 
-    fn split(samples: usize, fraction: f64) -> (Dataset, Split) {
+    fn split(samples: usize, held_out: usize) -> (Dataset, Split) {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap();
-        (set.clone(), hold_out(set, fraction, &mut Seed(0).rng(Stream::Split)))
+        (set.clone(), hold_out(set, held_out, &mut Seed(0).rng(Stream::Split)))
     }
 
     #[test]
     fn whole_snapshots_are_held_out_and_none_is_lost_or_shared() {
-        let (set, split) = split(200, 0.15);
+        let (set, split) = split(200, 3);
         let validation = split.validation.unwrap();
         assert_eq!((split.training.samples(), validation.samples()), (170, 30));
         // Every z is drawn afresh, so the first node's z names the sample.
@@ -77,8 +77,8 @@ mod tests {
 
     #[test]
     fn one_snapshot_always_stays_for_training() {
-        assert_eq!(split(10, 0.9).1.validation, None);
-        assert_eq!(split(20, 0.99).1.training.samples(), 10);
-        assert_eq!(split(100, 0.0).1.validation, None);
+        assert_eq!(split(10, 1).1.validation, None);
+        assert_eq!(split(20, 5).1.training.samples(), 10);
+        assert_eq!(split(100, 0).1.validation, None);
     }
 }

@@ -16,6 +16,6 @@ pub struct EpochRecord {
     pub gradient_norm: f64,
     /// The damping mu, or the learning rate, after this epoch.
     pub parameter: f64,
-    /// Epochs so far in which the validation error exceeded its best value.
+    /// How often the validation error has risen since it last fell.
     pub validation_failures: usize,
 }

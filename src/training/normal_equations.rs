@@ -382,8 +382,15 @@ mod tests {
                 assert!(equations.solve(&mlp, mu, &mut step));
                 let dense = dense_step(&mlp, &examples, mu);
                 let largest = dense.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-                let error = step.iter().zip(&dense).map(|(ours, dense)| (ours - dense).abs()).fold(0.0, f64::max);
-                assert!(error < 1e-12 * largest, "{inputs}-{hidden}-{outputs}, mu {mu}: {error} of {largest}");
+                let error = step
+                    .iter()
+                    .zip(&dense)
+                    .map(|(ours, dense)| (ours - dense).abs())
+                    .fold(0.0, f64::max);
+                assert!(
+                    error < 1e-12 * largest,
+                    "{inputs}-{hidden}-{outputs}, mu {mu}: {error} of {largest}"
+                );
             }
         }
     }

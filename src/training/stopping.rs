@@ -14,7 +14,7 @@ pub struct StoppingRules {
     pub goal_mse: f64,
     /// Length of the gradient below which the surface is taken as flat.
     pub min_gradient: f64,
-    /// Epochs in which the validation error may exceed its best value.
+    /// How often the validation error may rise from one epoch to the next before it falls again.
     pub max_fail: usize,
 }
 

@@ -139,15 +139,16 @@ impl Trainer {
         let deciding = validation_mse.unwrap_or(mse);
         let before = self.history.last();
         let epoch = before.map_or(0, |last| last.epoch + 1);
-        let mut validation_failures = before.map_or(0, |last| last.validation_failures);
         if deciding < self.best.mse {
             self.best.mse = deciding;
             self.best.epoch = epoch;
             self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
-            validation_failures = 0;
-        } else if validation_mse.is_some() && deciding > self.best.mse {
-            validation_failures += 1;
         }
+        let validation_failures = match before {
+            Some(last) if validation_mse > last.validation_mse => last.validation_failures + 1,
+            Some(last) if validation_mse == last.validation_mse => last.validation_failures,
+            _ => 0,
+        };
         self.history.push(EpochRecord {
             epoch,
             training_mse: mse,

@@ -1,0 +1,24 @@
+//! Decoupling: the resistances of rows in, the coordinates of their nodes out. Beside the network stand two
+//! baselines, so that a reader sees what the network adds.
+
+mod linear_map;
+mod training_mean;
+
+pub use linear_map::LinearMap;
+pub use training_mean::TrainingMean;
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::network::DecouplingNetwork;
+
+/// A way from resistances to coordinates.
+pub trait Decoupler {
+    /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4).
+    fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64>;
+}
+
+impl Decoupler for DecouplingNetwork {
+    fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
+        Self::decouple(self, resistances_ohm)
+    }
+}

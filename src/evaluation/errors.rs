@@ -1,0 +1,132 @@
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::Dataset;
+
+/// How far decoupled coordinates are from the true ones.
+///
+/// The paper's errors (AveZerr and its sisters) are the mean over samples and nodes of |decoupled − true| / |true| in
+/// percent of the **coordinate**. That flatters, for a node is never lower than 80 % of the height, so the same error
+/// also stands in millimetres and in percent of full scale.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// AveZerr. `None` if a true z is 0, where it has no meaning; likewise below.
+    pub z_percent: Option<f64>,
+    /// AveXerr.
+    pub x_percent: Option<f64>,
+    /// AveYerr.
+    pub y_percent: Option<f64>,
+    /// Mean |decoupled z − z|.
+    pub z_mm: f64,
+    /// [`Self::z_mm`] in percent of the stroke, the distance a node can travel.
+    pub z_full_scale_percent: f64,
+    /// Largest |decoupled z − z|.
+    pub worst_mm: f64,
+    /// Where it is.
+    pub worst_node: NodeAddress,
+}
+
+/// A node of one snapshot; all counted from 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeAddress {
+    /// Snapshot of the set.
+    pub snapshot: usize,
+    /// Row-wire.
+    pub row: usize,
+    /// Node on the row-wire.
+    pub node: usize,
+}
+
+impl Errors {
+    /// Compares `decoupled_mm` (samples × 3·M2) with the coordinates of `truth`, whose nodes can travel `stroke_mm`.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn measure(truth: &Dataset, decoupled_mm: &Array2<f64>, stroke_mm: f64) -> Self {
+        assert_eq!(truth.coordinates_mm.dim(), decoupled_mm.dim());
+        let mut relative = [0.0; 3];
+        let mut total_z_mm = 0.0;
+        let mut worst_mm = 0.0;
+        let mut worst_node = NodeAddress::default();
+        let pairs = decoupled_mm.indexed_iter().zip(&truth.coordinates_mm);
+        for (((sample, channel), decoupled), true_value) in pairs {
+            let error_mm = (decoupled - true_value).abs();
+            let (node, axis) = (channel / 3, channel % 3);
+            relative[axis] += error_mm / true_value.abs();
+            if axis == 2 {
+                total_z_mm += error_mm;
+                if error_mm > worst_mm {
+                    worst_mm = error_mm;
+                    worst_node = NodeAddress {
+                        snapshot: sample / truth.rows(),
+                        row: sample % truth.rows(),
+                        node,
+                    };
+                }
+            }
+        }
+        let per_axis = (decoupled_mm.len() / 3) as f64;
+        let percent = |sum: f64| Some(100.0 * sum / per_axis).filter(|percent| percent.is_finite());
+        let z_mm = total_z_mm / per_axis;
+        Self {
+            z_percent: percent(relative[2]),
+            x_percent: percent(relative[0]),
+            y_percent: percent(relative[1]),
+            z_mm,
+            z_full_scale_percent: 100.0 * z_mm / stroke_mm,
+            worst_mm,
+            worst_node,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    fn truth(model: &SensorModel) -> Dataset {
+        Dataset::simulate(model, &Scene::default(), 20, &mut Seed(0).rng(Stream::Test)).unwrap()
+    }
+
+    #[test]
+    fn one_wrong_node_counts_as_the_definitions_say() {
+        let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
+        let mut decoupled = truth.coordinates_mm.clone();
+        decoupled[[13, 2 * 3 + 2]] += 0.3;
+        decoupled[[4, 0]] -= 0.6;
+        let errors = Errors::measure(&truth, &decoupled, 1.0);
+        let nodes = 20.0 * 6.0;
+        let z = truth.coordinates_mm[[13, 8]];
+        assert!((errors.z_percent.unwrap() - 100.0 * 0.3 / z / nodes).abs() < 1e-12);
+        assert!((errors.x_percent.unwrap() - 100.0 * 0.6 / 12.0 / nodes).abs() < 1e-12);
+        assert_eq!(errors.y_percent, Some(0.0));
+        assert!((errors.z_mm - 0.3 / nodes).abs() < 1e-12);
+        assert!((errors.z_full_scale_percent - 100.0 * errors.z_mm).abs() < 1e-12);
+        assert!((errors.worst_mm - 0.3).abs() < 1e-12);
+        assert_eq!(
+            errors.worst_node,
+            NodeAddress {
+                snapshot: 1,
+                row: 3,
+                node: 2
+            }
+        );
+    }
+
+    #[test]
+    fn a_coordinate_of_zero_leaves_no_percentage() {
+        let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
+        model.geometry.row_x0_mm = 0.0;
+        let truth = truth(&model);
+        let errors = Errors::measure(&truth, &truth.coordinates_mm.mapv(|value| value + 0.1), 1.0);
+        assert_eq!(errors.x_percent, None);
+        assert!(errors.z_percent.is_some());
+    }
+}

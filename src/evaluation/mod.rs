@@ -1,0 +1,12 @@
+//! What a decoupler is worth: axis errors as the paper defines them and beyond, the published figures, and a whole
+//! run from settings to report.
+
+mod errors;
+mod published;
+mod run;
+mod settings;
+
+pub use errors::{Errors, NodeAddress};
+pub use published::{PublishedErrors, published_errors};
+pub use run::{Baselines, Run, RunError};
+pub use settings::{CountError, RunSettings};

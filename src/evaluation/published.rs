@@ -1,0 +1,60 @@
+use serde::Deserialize;
+
+use crate::sensor::ArrayScale;
+
+/// A row of the paper's Tables 1 to 3.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct PublishedErrors {
+    /// Number of the table.
+    pub table: u8,
+    /// Array scale.
+    pub array: ArrayScale,
+    /// Hidden nodes.
+    pub hidden: usize,
+    /// Training samples.
+    pub training_samples: usize,
+    /// AveZerr.
+    pub z_percent: f64,
+    /// AveXerr.
+    pub x_percent: f64,
+    /// AveYerr.
+    pub y_percent: f64,
+}
+
+/// All rows of the paper's Tables 1 to 3.
+pub fn published_errors() -> Vec<PublishedErrors> {
+    let text = include_str!("../../assets/published_errors.csv");
+    let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
+    rows.collect::<Result<_, _>>()
+        .expect("the file is part of the program and a test reads it")
+}
+
+impl PublishedErrors {
+    /// What the paper reports for this configuration outside cross-validation, if it does.
+    pub fn of(array: ArrayScale, hidden: usize, training_samples: usize) -> Option<Self> {
+        let matches = |row: &Self| {
+            row.table != 2 && (row.array, row.hidden, row.training_samples) == (array, hidden, training_samples)
+        };
+        published_errors().into_iter().find(matches)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_are_found_by_configuration() {
+        assert_eq!(published_errors().len(), 11);
+        let array = ArrayScale::default();
+        assert_eq!(PublishedErrors::of(array, 12, 1000).unwrap().z_percent, 2.28);
+        assert_eq!(
+            PublishedErrors::of("10x8_4x24".parse().unwrap(), 12, 1000)
+                .unwrap()
+                .y_percent,
+            2.36e-12
+        );
+        assert_eq!(PublishedErrors::of(array, 12, 100), None, "Table 2 is cross-validation");
+        assert_eq!(PublishedErrors::of(array, 13, 1000), None);
+    }
+}

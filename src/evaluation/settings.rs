@@ -1,0 +1,88 @@
+use std::ops::RangeInclusive;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::{
+    dataset::{LARGEST_SAMPLES, Seed},
+    network::LARGEST_HIDDEN,
+    scene::Scene,
+    sensor::{ArrayScale, SensorModel},
+    training::TrainingSettings,
+};
+
+/// Everything a run needs; the same settings give the same network, bit for bit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// The sensor.
+    pub sensor: SensorModel,
+    /// What happens to it.
+    pub scene: Scene,
+    /// Samples that the method fits.
+    pub samples: usize,
+    /// Samples drawn beside them and held out, to choose the best weights and to stop; 0 for none.
+    pub validation_samples: usize,
+    /// Samples drawn for the test.
+    pub test_samples: usize,
+    /// Hidden nodes.
+    pub hidden: usize,
+    /// Method, its settings, and when to stop.
+    pub training: TrainingSettings,
+    /// From which everything random follows.
+    pub seed: Seed,
+}
+
+/// A number out of its range.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
+pub struct CountError {
+    /// What is counted.
+    pub what: &'static str,
+    /// The number given.
+    pub count: usize,
+    /// What is possible.
+    pub allowed: RangeInclusive<usize>,
+}
+
+impl Default for RunSettings {
+    /// The paper's main experiment: 10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples.
+    fn default() -> Self {
+        Self {
+            sensor: SensorModel::new(ArrayScale::default()),
+            scene: Scene::default(),
+            samples: 1000,
+            validation_samples: 200,
+            test_samples: 100,
+            hidden: 12,
+            training: TrainingSettings::default(),
+            seed: Seed::default(),
+        }
+    }
+}
+
+impl RunSettings {
+    /// Checks the counts; the parts check themselves where they are used.
+    ///
+    /// # Errors
+    /// The first count out of range.
+    pub fn check_counts(&self) -> Result<(), CountError> {
+        let counts = [
+            ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
+            ("training samples", self.samples, 1..=LARGEST_SAMPLES),
+            ("validation samples", self.validation_samples, 0..=LARGEST_SAMPLES),
+            ("test samples", self.test_samples, 1..=LARGEST_SAMPLES),
+        ];
+        for (what, count, allowed) in counts {
+            if !allowed.contains(&count) {
+                return Err(CountError { what, count, allowed });
+            }
+        }
+        Ok(())
+    }
+
+    /// The distance a node can travel: the full scale of its deformation.
+    pub fn stroke_mm(&self) -> f64 {
+        self.scene.stroke_mm(&self.sensor.geometry)
+    }
+}
