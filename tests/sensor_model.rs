@@ -1,6 +1,8 @@
 //! The resistance model against golden vectors of an independent implementation, and its Jacobian against central
 //! differences.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use decoupler::sensor::{ArrayScale, Geometry, SensorModel};
 use glam::DVec3;
 use serde::Deserialize;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluation, Examples, NormalEquations, SettingError, StopReason, examples::Activations, method::in_range};
+use super::{Evaluation, Examples, NormalEquations, Setting, StopReason, examples::Activations};
 use crate::network::Mlp;
 
 /// Settings of Levenberg-Marquardt (Hagan and Menhaj 1994), with the field's usual defaults.
@@ -29,11 +29,38 @@ impl Default for LevenbergMarquardtSettings {
 }
 
 impl LevenbergMarquardtSettings {
-    pub(super) fn check(&self) -> Result<(), SettingError> {
-        in_range("mu", self.mu, SMALLEST_MU..=1e300)?;
-        in_range("the decrease of mu", self.mu_decrease, 1e-6..=0.999)?;
-        in_range("the increase of mu", self.mu_increase, 1.001..=1e6)?;
-        in_range("the largest mu", self.mu_max, self.mu..=1e300)
+    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+        let default = Self::default();
+        vec![
+            Setting {
+                name: "mu",
+                meaning: "First damping. Large: short steps down the gradient; small: full Gauss-Newton steps.",
+                default: default.mu,
+                range: SMALLEST_MU..=1e300,
+                value: &mut self.mu,
+            },
+            Setting {
+                name: "mu decrease",
+                meaning: "Factor on mu after a step that lowers the error.",
+                default: default.mu_decrease,
+                range: 1e-6..=0.999,
+                value: &mut self.mu_decrease,
+            },
+            Setting {
+                name: "mu increase",
+                meaning: "Factor on mu after a step that does not lower the error.",
+                default: default.mu_increase,
+                range: 1.001..=1e6,
+                value: &mut self.mu_increase,
+            },
+            Setting {
+                name: "largest mu",
+                meaning: "Training ends when mu exceeds this: no step lowers the error any more.",
+                default: default.mu_max,
+                range: SMALLEST_MU..=1e300,
+                value: &mut self.mu_max,
+            },
+        ]
     }
 }
 

@@ -1,10 +1,10 @@
-use std::{fmt, ops::RangeInclusive};
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{
-    Evaluation, Examples, LevenbergMarquardt, LevenbergMarquardtSettings, Momentum, MomentumSettings, StopReason,
+    Evaluation, Examples, LevenbergMarquardt, LevenbergMarquardtSettings, Momentum, MomentumSettings, Setting,
+    SettingError, StopReason,
 };
 use crate::network::Mlp;
 
@@ -16,27 +16,6 @@ pub enum Method {
     LevenbergMarquardt(LevenbergMarquardtSettings),
     /// Gradient descent with momentum, Eq. (11).
     Momentum(MomentumSettings),
-}
-
-/// A setting out of its range.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("{name} is {value}: it must be from {} to {}", .range.start(), .range.end())]
-pub struct SettingError {
-    /// Which setting.
-    pub name: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// What is allowed.
-    pub range: RangeInclusive<f64>,
-}
-
-/// Checks one setting; NaN is in no range.
-pub(super) fn in_range(name: &'static str, value: f64, range: RangeInclusive<f64>) -> Result<(), SettingError> {
-    if range.contains(&value) {
-        Ok(())
-    } else {
-        Err(SettingError { name, value, range })
-    }
 }
 
 impl Default for Method {
@@ -67,15 +46,21 @@ impl Method {
         }
     }
 
+    /// The settings that this method has, to be shown and changed.
+    pub fn settings(&mut self) -> Vec<Setting<'_>> {
+        match self {
+            Self::LevenbergMarquardt(settings) => settings.list(),
+            Self::Momentum(settings) => settings.list(),
+        }
+    }
+
     /// Checks the ranges of the settings.
     ///
     /// # Errors
     /// The first setting out of range.
     pub fn check(&self) -> Result<(), SettingError> {
-        match self {
-            Self::LevenbergMarquardt(settings) => settings.check(),
-            Self::Momentum(settings) => settings.check(),
-        }
+        let mut copy = *self;
+        copy.settings().iter().try_for_each(Setting::check)
     }
 }
 
@@ -91,7 +76,7 @@ impl fmt::Display for Method {
 /// A method at work.
 pub(super) enum Algorithm {
     LevenbergMarquardt(Box<LevenbergMarquardt>),
-    Momentum(Momentum),
+    Momentum(Box<Momentum>),
 }
 
 impl Algorithm {
@@ -104,7 +89,7 @@ impl Algorithm {
             }
             Method::Momentum(settings) => {
                 let (method, evaluation) = Momentum::new(*settings, mlp, examples);
-                (Self::Momentum(method), evaluation)
+                (Self::Momentum(Box::new(method)), evaluation)
             }
         }
     }

@@ -10,15 +10,17 @@ mod levenberg_marquardt;
 mod method;
 mod momentum;
 mod normal_equations;
+mod setting;
 mod stopping;
 mod trainer;
 
 pub use examples::Examples;
 pub use history::EpochRecord;
 pub use levenberg_marquardt::{LevenbergMarquardt, LevenbergMarquardtSettings};
-pub use method::{Method, SettingError};
+pub use method::Method;
 pub use momentum::{Momentum, MomentumSettings};
 pub use normal_equations::NormalEquations;
+pub use setting::{Setting, SettingError};
 pub use stopping::{StopReason, StoppingRules};
 pub use trainer::{Problem, Trainer, TrainingError, TrainingSettings};
 

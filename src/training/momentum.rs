@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluation, Examples, SettingError, StopReason, backpropagation::Backpropagation, method::in_range};
+use super::{Evaluation, Examples, Setting, StopReason, backpropagation::Backpropagation};
 use crate::network::Mlp;
 
 /// Settings of gradient descent with momentum, with the field's usual defaults.
@@ -23,9 +23,24 @@ impl Default for MomentumSettings {
 }
 
 impl MomentumSettings {
-    pub(super) fn check(&self) -> Result<(), SettingError> {
-        in_range("the learning rate", self.learning_rate, f64::MIN_POSITIVE..=1e300)?;
-        in_range("the momentum factor", self.momentum, 0.0..=1.0)
+    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+        let default = Self::default();
+        vec![
+            Setting {
+                name: "learning rate",
+                meaning: "Length of a step per length of the gradient (alpha).",
+                default: default.learning_rate,
+                range: f64::MIN_POSITIVE..=1e300,
+                value: &mut self.learning_rate,
+            },
+            Setting {
+                name: "momentum",
+                meaning: "Share of the previous gradient in each step (eta), from 0 to 1.",
+                default: default.momentum,
+                range: 0.0..=1.0,
+                value: &mut self.momentum,
+            },
+        ]
     }
 }
 

@@ -2,7 +2,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{SettingError, method::in_range};
+use super::SettingError;
 
 /// When a training ends by itself, with the field's usual defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,14 +38,17 @@ impl StoppingRules {
     /// # Errors
     /// The first setting out of range.
     pub fn check(&self) -> Result<(), SettingError> {
-        in_range("epochs", self.epochs as f64, 1.0..=Self::MOST_EPOCHS as f64)?;
-        in_range("goal", self.goal_mse, 0.0..=f64::MAX)?;
-        in_range("smallest gradient", self.min_gradient, 0.0..=f64::MAX)?;
-        in_range(
-            "validation failures",
-            self.max_fail as f64,
-            1.0..=Self::MOST_EPOCHS as f64,
-        )
+        let most = Self::MOST_EPOCHS as f64;
+        let values = [
+            ("epochs", self.epochs as f64, 1.0..=most),
+            ("goal", self.goal_mse, 0.0..=f64::MAX),
+            ("smallest gradient", self.min_gradient, 0.0..=f64::MAX),
+            ("validation failures", self.max_fail as f64, 1.0..=most),
+        ];
+        match values.into_iter().find(|(_, value, range)| !range.contains(value)) {
+            Some((name, value, range)) => Err(SettingError { name, value, range }),
+            None => Ok(()),
+        }
     }
 }
 
