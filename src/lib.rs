@@ -1,1 +1,3 @@
+//! Decoupling of flexible tactile sensor arrays.
 
+pub mod surface;
