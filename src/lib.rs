@@ -1,3 +1,5 @@
 //! Decoupling of flexible tactile sensor arrays.
 
+#[cfg(feature = "gui")]
+pub mod app;
 pub mod surface;

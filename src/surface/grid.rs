@@ -53,7 +53,8 @@ impl Grid {
         self.y.first_inside..=self.y.last_inside
     }
 
-    /// Whether a point lies within the nodes' bounding rectangle. Outside, the surface is extrapolated.
+    /// Whether a point lies within the nodes' bounding rectangle. Outside, the surface is extrapolated. A single row
+    /// or column has no extent; the strip that stands for it counts as inside.
     pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
         self.inside_x().contains(&ix) && self.inside_y().contains(&iy)
     }
@@ -76,7 +77,7 @@ impl GridAxis {
         let stride = nodes_mm.len().div_ceil(target.max(2));
         let last = nodes_mm.len() - 1;
         let mut kept_mm: Vec<f64> = nodes_mm.iter().copied().step_by(stride).collect();
-        if last % stride != 0 {
+        if !last.is_multiple_of(stride) {
             kept_mm.push(nodes_mm[last]);
         }
         let intervals = kept_mm.len() - 1;
@@ -102,6 +103,13 @@ impl GridAxis {
         let last_inside = points_mm.len();
         points_mm.push(last_mm);
         points_mm.extend((1..=margin_steps).map(|step| along(last_mm, last_mm + after_mm, step, margin_steps)));
+        if intervals == 0 {
+            return Self {
+                first_inside: 0,
+                last_inside: points_mm.len() - 1,
+                points_mm,
+            };
+        }
         Self {
             points_mm,
             first_inside: margin_steps,

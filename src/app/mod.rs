@@ -1,0 +1,4 @@
+//! The window.
+
+pub mod surface_view;
+pub mod theme;
