@@ -4,13 +4,13 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{self, Mesh, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2};
 
+use super::edge::TICK;
 use super::labels::Labels;
 use super::ticks::{multiples, round_steps, tick_text};
 use super::view::Colours;
 use crate::app::theme::Theme;
 
 const BAR_WIDTH: f32 = 12.0;
-const TICK: f32 = 4.0;
 const STRIPS: usize = 128;
 
 /// A vertical colour bar with ticks.

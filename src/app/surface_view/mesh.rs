@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use eframe::egui::{Color32, Mesh, Pos2};
 use glam::{DVec2, DVec3, Vec3};
 
-use super::axes::to_egui;
 use super::contour::cross_cell;
+use super::edge::to_egui;
 use super::plan::PlanAxes;
 use super::projection::Projection;
 use super::ribbon;
@@ -69,16 +69,7 @@ impl Surface<'_> {
         let mut mesh = Mesh::default();
         mesh.reserve_vertices(2 * nx * ny);
         mesh.reserve_triangles(3 * nx * ny);
-        let lights = self.lights(stage);
-        for (ix, &x_mm) in self.grid.x_mm().iter().enumerate() {
-            for (iy, &y_mm) in self.grid.y_mm().iter().enumerate() {
-                let index = self.grid.index(ix, iy);
-                let value = self.values[index];
-                let light = lights.as_ref().map_or(1.0, |lights| lights[index]);
-                let colour = lit(self.colour(value), light).gamma_multiply(self.opacity(ix, iy));
-                mesh.colored_vertex(stage.point(x_mm, y_mm, value), colour);
-            }
-        }
+        self.vertices(&mut mesh, stage);
         let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
         let (columns, rows) = (
             far_to_near(self.grid.x_mm(), eye_mm.x),
@@ -125,26 +116,40 @@ impl Surface<'_> {
         }
     }
 
-    /// Lambert's law at every point, with a light that follows the viewer: from above, over the left shoulder.
-    fn lights(&self, stage: &Stage<'_>) -> Option<Vec<f32>> {
-        let Stage::Space(projection) = stage else { return None };
-        let plot_box = projection.plot_box;
-        let (nx, ny) = (self.grid.x_mm().len(), self.grid.y_mm().len());
-        let unit = |ix: usize, iy: usize| {
-            let value = self.values[self.grid.index(ix, iy)].clamp(plot_box.min_mm.z, plot_box.max_mm.z);
-            plot_box.unit(DVec3::new(self.grid.x_mm()[ix], self.grid.y_mm()[iy], value))
+    /// One vertex for every grid point, in their order.
+    fn vertices(&self, mesh: &mut Mesh, stage: &Stage<'_>) {
+        let (x_mm, y_mm) = (self.grid.x_mm(), self.grid.y_mm());
+        let places = x_mm.iter().enumerate().flat_map(|(ix, &x)| {
+            let along_y = y_mm.iter().zip(&self.values[self.grid.index(ix, 0)..]).enumerate();
+            along_y.map(move |(iy, (&y, &value))| (ix, iy, DVec3::new(x, y, value)))
+        });
+        let colour = |ix: usize, iy: usize, value: f64, light: f32| {
+            let opacity = self.opacity(ix, iy);
+            let colour = lit(self.colour(value), light);
+            if opacity < 1.0 {
+                colour.gamma_multiply(opacity)
+            } else {
+                colour
+            }
         };
-        let units: Vec<Vec3> = (0..nx * ny).map(|index| unit(index / ny, index % ny)).collect();
-        let towards_eye = Vec3::new(projection.eye.x, projection.eye.y, 0.0).normalize_or(Vec3::X);
-        let left = Vec3::new(towards_eye.y, -towards_eye.x, 0.0);
-        let light = (towards_eye * 0.35 + left * 0.55 + Vec3::Z * 0.9).normalize();
-        let at = |ix: usize, iy: usize| {
-            let slope_x = units[(ix + 1).min(nx - 1) * ny + iy] - units[ix.saturating_sub(1) * ny + iy];
-            let slope_y = units[ix * ny + (iy + 1).min(ny - 1)] - units[ix * ny + iy.saturating_sub(1)];
-            // NaN falls through `max` as darkness, on points that are not drawn.
-            AMBIENT + DIRECT * slope_x.cross(slope_y).normalize_or(Vec3::Z).dot(light).max(0.0)
-        };
-        Some((0..nx * ny).map(|index| at(index / ny, index % ny)).collect())
+        match stage {
+            Stage::Plan(plan) => {
+                for (ix, iy, place) in places {
+                    mesh.colored_vertex(plan.point(place.truncate()), colour(ix, iy, place.z, 1.0));
+                }
+            }
+            Stage::Space(projection) => {
+                let plot_box = projection.plot_box;
+                let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
+                let in_box = |place: DVec3| plot_box.unit(place.with_z(place.z.clamp(low, high)));
+                let units: Vec<Vec3> = places.clone().map(|(_, _, place)| in_box(place)).collect();
+                let shade = Shade::new(&units, y_mm.len(), projection.eye);
+                for ((ix, iy, place), unit) in places.zip(&units) {
+                    let at = to_egui(projection.point_of_unit(*unit));
+                    mesh.colored_vertex(at, colour(ix, iy, place.z, shade.at(ix, iy)));
+                }
+            }
+        }
     }
 
     /// Corners of a cell, going round it.
@@ -219,6 +224,36 @@ impl Surface<'_> {
                 }
             }
         }
+    }
+}
+
+/// Lambert's law, with a light that follows the viewer: from above, over the left shoulder.
+struct Shade<'a> {
+    units: &'a [Vec3],
+    nx: usize,
+    ny: usize,
+    light: Vec3,
+}
+
+impl<'a> Shade<'a> {
+    fn new(units: &'a [Vec3], ny: usize, eye: Vec3) -> Self {
+        let towards_eye = Vec3::new(eye.x, eye.y, 0.0).normalize_or(Vec3::X);
+        let left = Vec3::new(towards_eye.y, -towards_eye.x, 0.0);
+        let light = (towards_eye * 0.35 + left * 0.55 + Vec3::Z * 0.9).normalize();
+        Self {
+            units,
+            nx: units.len() / ny,
+            ny,
+            light,
+        }
+    }
+
+    fn at(&self, ix: usize, iy: usize) -> f32 {
+        let unit = |ix: usize, iy: usize| self.units[ix * self.ny + iy];
+        let slope_x = unit((ix + 1).min(self.nx - 1), iy) - unit(ix.saturating_sub(1), iy);
+        let slope_y = unit(ix, (iy + 1).min(self.ny - 1)) - unit(ix, iy.saturating_sub(1));
+        // NaN falls through `max` as darkness, on points that are not drawn.
+        AMBIENT + DIRECT * slope_x.cross(slope_y).normalize_or(Vec3::Z).dot(self.light).max(0.0)
     }
 }
 

@@ -8,6 +8,7 @@ mod axes;
 mod camera;
 mod colour_bar;
 mod contour;
+mod edge;
 mod labels;
 mod mesh;
 mod nodes;

@@ -3,12 +3,10 @@
 use eframe::egui::{Painter, Pos2, Rect, Stroke, StrokeKind, pos2, vec2};
 use glam::DVec2;
 
+use super::edge::{GAP, TICK};
 use super::labels::Labels;
 use super::ticks::{multiples, round_steps, tick_text};
 use crate::app::theme::Theme;
-
-const TICK: f32 = 4.0;
-const GAP: f32 = 3.0;
 
 /// A laid-out plan: x to the right, y upwards.
 pub(super) struct PlanAxes {

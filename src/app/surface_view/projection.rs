@@ -46,6 +46,9 @@ pub(super) struct PlotBox {
     pub(super) max_mm: DVec3,
     /// Sides in box units; the longer horizontal side is 1.
     sides: Vec3,
+    /// Box units per millimetre.
+    per_mm: DVec3,
+    middle_mm: DVec3,
 }
 
 impl PlotBox {
@@ -55,10 +58,16 @@ impl PlotBox {
         let size = (max_mm - min_mm).as_vec3();
         let longer = size.x.max(size.y);
         let (a, b) = ((size.x / longer).max(LEAST_SIDE), (size.y / longer).max(LEAST_SIDE));
-        let of_height = |height: f32| Self {
-            min_mm,
-            max_mm,
-            sides: Vec3::new(a, b, height),
+        let of_height = |height: f32| {
+            let sides = Vec3::new(a, b, height);
+            let per_mm = sides.as_dvec3() / (max_mm - min_mm);
+            Self {
+                min_mm,
+                max_mm,
+                sides,
+                per_mm,
+                middle_mm: 0.5 * (min_mm + max_mm),
+            }
         };
         // The picture's shape grows with the height, so halving finds the one asked for.
         let (mut low, mut high) = (*HEIGHT.start(), *HEIGHT.end());
@@ -82,12 +91,12 @@ impl PlotBox {
 
     /// Box units of a place; the middle of the box is the origin.
     pub(super) fn unit(&self, place_mm: DVec3) -> Vec3 {
-        ((place_mm - self.min_mm) / (self.max_mm - self.min_mm) - 0.5).as_vec3() * self.sides
+        ((place_mm - self.middle_mm) * self.per_mm).as_vec3()
     }
 
     /// Millimetres of a place in box units.
     pub(super) fn place_mm(&self, unit: Vec3) -> DVec3 {
-        self.min_mm + (unit / self.sides + 0.5).as_dvec3() * (self.max_mm - self.min_mm)
+        self.middle_mm + unit.as_dvec3() / self.per_mm
     }
 
     /// A corner; each part 0 or 1.
@@ -140,7 +149,12 @@ impl Projection {
 
     /// Where a place is on the screen.
     pub(super) fn point(&self, place_mm: DVec3) -> Vec2 {
-        let seen = self.matrix.project_point3(self.plot_box.unit(place_mm));
+        self.point_of_unit(self.plot_box.unit(place_mm))
+    }
+
+    /// Where a place in box units is on the screen.
+    pub(super) fn point_of_unit(&self, unit: Vec3) -> Vec2 {
+        let seen = self.matrix.project_point3(unit);
         Vec2::new(seen.x, -seen.y) * self.scale + self.offset
     }
 

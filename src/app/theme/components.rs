@@ -105,7 +105,7 @@ pub fn segmented_ui<T: Copy + PartialEq>(
             ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
             ui.horizontal(|ui| {
-                for &(option, text) in options {
+                for &(option, text) in reading_order(ui, options) {
                     let is_selected = option == selected;
                     let min_width = if fill_width { width.floor() } else { 0.0 };
                     let button = Button::selectable(is_selected, text)
@@ -131,7 +131,7 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
     let response = ui
         .horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = space(1);
-            for &(tab, text) in tabs {
+            for &(tab, text) in reading_order(ui, tabs) {
                 let is_selected = tab == selected;
                 let colour = if is_selected { palette.text } else { palette.dim };
                 let text = RichText::new(text).color(colour);
@@ -162,6 +162,15 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
         .response;
     name_group(ui, response.id, label);
     picked
+}
+
+/// From left to right also where the layout runs from right to left, as at the right end of a title.
+fn reading_order<'a, T>(ui: &Ui, options: &'a [T]) -> Vec<&'a T> {
+    if ui.layout().prefer_right_to_left() {
+        options.iter().rev().collect()
+    } else {
+        options.iter().collect()
+    }
 }
 
 fn tabs_text<'a, T: PartialEq>(tabs: &[(T, &'a str)], tab: T) -> &'a str {
