@@ -18,11 +18,12 @@
 //! | [`cli`] | the work without a window |
 //! | `app` | the window (feature `gui`) |
 
+pub mod cli;
 pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
+pub mod export;
 pub mod network;
-
 pub mod scene;
 pub mod sensor;
 pub mod training;
