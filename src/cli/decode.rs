@@ -1,10 +1,10 @@
-use std::{fs::File, io::Write, path::PathBuf};
+use std::{fs::File, io::BufReader, path::PathBuf};
 
 use clap::Args;
 
 use super::failure::Failure;
 use crate::{
-    dataset::{Reading, ResistanceReader},
+    dataset::{ReadError, Reading, ResistanceReader},
     export::{AtomicFile, NetworkFile, WriteError, write_coordinates_header, write_numbers},
 };
 
@@ -41,7 +41,7 @@ impl Decode {
             path: self.input.clone(),
             source,
         };
-        let mut reader = ResistanceReader::new(input, scale.columns()).map_err(unreadable)?;
+        let mut reader = ResistanceReader::new(BufReader::new(input), scale.columns()).map_err(unreadable)?;
         let mut output = AtomicFile::create(&self.output)?;
         let refused = |source| WriteError::io(&self.output, source);
         write_coordinates_header(scale.nodes_per_row(), &mut output).map_err(refused)?;
@@ -58,7 +58,7 @@ impl Decode {
             }
         }
         if is_empty {
-            return Err(unreadable(crate::dataset::ReadError::Empty));
+            return Err(unreadable(ReadError::Empty));
         }
         Ok(output.commit()?)
     }

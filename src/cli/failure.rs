@@ -34,9 +34,9 @@ pub(super) enum Failure {
     Output(io::Error),
     #[error("cannot open '{}': {source}", .path.display())]
     Open { path: PathBuf, source: io::Error },
-    #[error("'{}', {source}", .path.display())]
+    #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}', line {line}: resistances so far from the training range that the network has no answer", .path.display())]
+    #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
 }
 

@@ -25,6 +25,7 @@ const BLOCK: usize = 64;
 /// x_1, y_1, z_1, x_2, … of its nodes in mm. Samples come as whole snapshots of all rows. With the seed and array of
 /// a training they are its test samples.
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct Simulate {
     /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
     #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]

@@ -25,6 +25,7 @@ use crate::{
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
 /// set, with the best linear map, and with the published figures where there are any.
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct Train {
     /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
     #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
@@ -159,7 +160,7 @@ fn settings_help() -> String {
         let settings = method.settings();
         let list = settings
             .iter()
-            .map(|setting| format!("{} (default {:?})", dashed(setting.name), setting.default));
+            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
         let list = list.collect::<Vec<_>>().join(", ");
         format!("{} has {list}", method.short_name())
     };

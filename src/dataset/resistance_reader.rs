@@ -1,4 +1,4 @@
-use std::io::Read;
+use std::io::{self, BufRead};
 
 use csv::{ByteRecord, ReaderBuilder};
 use ndarray::Array2;
@@ -8,15 +8,24 @@ use thiserror::Error;
 ///
 /// The file has columns named `r_1` to `r_M4`, in any order and among others, or M4 columns without names.
 pub struct ResistanceReader<R> {
-    rows: csv::Reader<R>,
+    rows: Rows<R>,
     /// Position in the file of each resistance, in the order r_1 to r_M4.
     columns: Vec<usize>,
     /// Columns of the file.
     width: usize,
-    /// The row read next.
-    record: ByteRecord,
-    /// Whether `record` was read while looking for names.
+    /// Whether the row at hand was read while looking for names.
     waiting: bool,
+}
+
+/// The rows of a CSV file with their lines. The reader of `csv` would miscount where lines are empty, so it is given
+/// one line at a time.
+struct Rows<R> {
+    source: R,
+    text: Vec<u8>,
+    /// Line of the row at hand, from 1.
+    line: u64,
+    /// The row at hand.
+    record: ByteRecord,
 }
 
 /// Some rows of resistances.
@@ -35,10 +44,10 @@ pub enum ReadError {
     #[error("there are no rows of resistances in it")]
     Empty,
     /// A column is missing.
-    #[error("line 1: there is no column r_{0}; name the columns r_1 to r_{1}, or give {1} columns without names")]
+    #[error("there is no column r_{0}; name the columns r_1 to r_{1}, or give {1} columns without names")]
     Missing(usize, usize),
     /// A name occurs twice.
-    #[error("line 1: there are two columns r_{0}; keep one")]
+    #[error("there are two columns r_{0}; keep one")]
     Twice(usize),
     /// A row is too short or too long.
     #[error("line {line}: {found} columns where {expected} are needed, separated by commas")]
@@ -60,26 +69,60 @@ pub enum ReadError {
         /// What stands there.
         text: String,
     },
+    /// A line break that ends no row: within quotes, or a carriage return alone.
+    #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
+    LineBreak(u64),
     /// The file cannot be read on.
     #[error(transparent)]
-    Csv(#[from] csv::Error),
+    Io(#[from] io::Error),
 }
 
-impl<R: Read> ResistanceReader<R> {
+impl<R: BufRead> Rows<R> {
+    /// Goes to the next row that is not blank; false at the end.
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        loop {
+            self.text.clear();
+            if self.source.read_until(b'\n', &mut self.text)? == 0 {
+                return Ok(false);
+            }
+            self.line += 1;
+            let byte_order_mark: &[u8] = if self.line == 1 { b"\xef\xbb\xbf" } else { b"" };
+            let text = self
+                .text
+                .strip_prefix(byte_order_mark)
+                .unwrap_or(&self.text)
+                .trim_ascii();
+            if text.is_empty() {
+                continue;
+            }
+            if text.contains(&b'\r') {
+                return Err(ReadError::LineBreak(self.line));
+            }
+            let mut row = ReaderBuilder::new();
+            let mut row = row.has_headers(false).buffer_capacity(text.len()).from_reader(text);
+            row.read_byte_record(&mut self.record).map_err(io::Error::from)?;
+            self.record.trim();
+            return Ok(true);
+        }
+    }
+}
+
+impl<R: BufRead> ResistanceReader<R> {
     /// Begins reading; `channels` is M4.
     ///
     /// # Errors
     /// The columns are not as they must be.
     pub fn new(source: R, channels: usize) -> Result<Self, ReadError> {
-        let mut rows = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .from_reader(source);
-        let mut record = ByteRecord::new();
-        if !rows.read_byte_record(&mut record)? {
+        let mut rows = Rows {
+            source,
+            text: Vec::new(),
+            line: 0,
+            record: ByteRecord::new(),
+        };
+        if !rows.advance()? {
             return Err(ReadError::Empty);
         }
-        record.trim();
+        let record = &rows.record;
         let names: Vec<Option<usize>> = record.iter().map(|name| channel_of(name, channels)).collect();
         let has_names = names.iter().any(Option::is_some) || record.iter().all(|field| number(field).is_none());
         let width = record.len();
@@ -92,7 +135,6 @@ impl<R: Read> ResistanceReader<R> {
             rows,
             columns,
             width: if has_names { width } else { channels },
-            record,
             waiting: !has_names,
         })
     }
@@ -104,7 +146,7 @@ impl<R: Read> ResistanceReader<R> {
     pub fn read(&mut self, most: usize) -> Result<Option<Reading>, ReadError> {
         let mut resistances_ohm = Vec::with_capacity(most * self.columns.len());
         let mut lines = Vec::new();
-        while lines.len() < most && (self.waiting || self.rows.read_byte_record(&mut self.record)?) {
+        while lines.len() < most && (self.waiting || self.rows.advance()?) {
             self.waiting = false;
             lines.push(self.parse(&mut resistances_ohm)?);
         }
@@ -118,13 +160,13 @@ impl<R: Read> ResistanceReader<R> {
 
     /// Appends the resistances of the row at hand; returns its line.
     fn parse(&self, resistances_ohm: &mut Vec<f64>) -> Result<u64, ReadError> {
-        let line = self.record.position().map_or(0, csv::Position::line);
-        let (found, expected) = (self.record.len(), self.width);
+        let Rows { line, ref record, .. } = self.rows;
+        let (found, expected) = (record.len(), self.width);
         if found != expected {
             return Err(ReadError::Width { line, found, expected });
         }
         for &column in &self.columns {
-            let field = &self.record[column];
+            let field = &record[column];
             let value = number(field).filter(|ohm| *ohm > 0.0 && ohm.is_finite());
             resistances_ohm.push(value.ok_or_else(|| ReadError::Value {
                 line,
@@ -216,6 +258,7 @@ mod tests {
             ("negative", "1,-2\n", "column 2: '-2'"),
             ("zero", "0,2\n", "column 1: '0'"),
             ("empty", "r_1,r_2\n\n\n1,\n", "line 4, column 2: ''"),
+            ("old line ends", "1,2\r3,4\r", "line 1: there is a line break"),
             ("not text", "1,\u{0}\n", "column 2"),
         ];
         for (sentence, text, expected) in cases {

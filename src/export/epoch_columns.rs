@@ -9,8 +9,8 @@ use crate::training::EpochRecord;
 
 /// The history of a training as columns of equal length: a third of the size of records, and what a plotting program
 /// wants.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, try_from = "Columns", into = "Columns")]
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(try_from = "Columns", into = "Columns")]
 pub(super) struct History(pub(super) Vec<EpochRecord>);
 
 #[derive(Default, Serialize, Deserialize)]
@@ -23,12 +23,6 @@ struct Columns {
     gradient_norm: Vec<Number>,
     parameter: Vec<Number>,
     validation_failures: Vec<usize>,
-}
-
-impl Clone for History {
-    fn clone(&self) -> Self {
-        Self(self.0.clone())
-    }
 }
 
 impl From<History> for Columns {

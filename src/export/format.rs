@@ -13,17 +13,15 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
         return "0".to_owned();
     }
     let scientific = format!("{value:.2e}");
+    if !(1e-3..99_999.5).contains(&value.abs()) {
+        return scientific;
+    }
     // The exponent after rounding: 9.999 is 10.0.
     let exponent = scientific
         .split_once('e')
         .and_then(|(_, exponent)| exponent.parse().ok());
-    match exponent {
-        Some(exponent @ -3_i32..=4) => {
-            let decimals = usize::try_from(2 - exponent).unwrap_or(0);
-            format!("{value:.decimals$}")
-        }
-        _ => scientific,
-    }
+    let decimals = 2_i32.saturating_sub(exponent.unwrap_or(0));
+    format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
 /// [`format_number`] with the percent sign.
