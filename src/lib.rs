@@ -20,6 +20,7 @@
 
 #[cfg(feature = "gui")]
 pub mod app;
+pub mod cli;
 pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
