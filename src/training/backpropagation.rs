@@ -2,7 +2,8 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
 use super::{
     Evaluation, Examples,
-    examples::{Activations, BLOCK, column, column_mut},
+    activations::Activations,
+    examples::{BLOCK, column, column_mut},
 };
 use crate::network::Mlp;
 

@@ -1,11 +1,12 @@
-use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+use faer::{Mat, MatMut, MatRef};
 use ndarray::ArrayView2;
 
-use crate::network::{Mlp, Shape, tanh_in_place};
+use super::activations::Activations;
+use crate::network::Mlp;
 
 /// Samples of a block. Products run block by block, so that what they need stays in the cache and memory does not
 /// grow with the number of samples.
-pub(super) const BLOCK: usize = 256;
+pub(super) const BLOCK: usize = 512;
 
 /// Scaled inputs and targets, cut into blocks of samples for the products of training.
 #[derive(Clone, Debug)]
@@ -89,60 +90,6 @@ impl Examples {
     }
 }
 
-/// What the layers answer for one block; room that is used again for every block.
-#[derive(Clone, Debug)]
-pub struct Activations {
-    /// H̃ = [H, 1]: block × (hidden + 1).
-    pub(super) hidden: Mat<f64>,
-    /// E = H̃V − T: block × outputs.
-    pub(super) errors: Mat<f64>,
-}
-
-impl Activations {
-    /// Room for a network of this size.
-    pub fn new(shape: Shape) -> Self {
-        Self {
-            hidden: Mat::from_fn(
-                BLOCK,
-                shape.hidden + 1,
-                |_, node| if node < shape.hidden { 0.0 } else { 1.0 },
-            ),
-            errors: Mat::zeros(BLOCK, shape.outputs),
-        }
-    }
-
-    /// Runs the network on `block`; returns the sum of squared errors.
-    pub(super) fn forward(&mut self, mlp: &Mlp, block: &Block) -> f64 {
-        let (shape, samples) = (mlp.shape(), block.samples());
-        let (w, v) = mlp.layers();
-        let w = MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden);
-        let v = MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs);
-        let mut hidden = self.hidden.as_mut().subrows_mut(0, samples);
-        matmul(
-            hidden.as_mut().subcols_mut(0, shape.hidden),
-            Accum::Replace,
-            &block.inputs,
-            w,
-            1.0,
-            Par::Seq,
-        );
-        for node in 0..shape.hidden {
-            tanh_in_place(column_mut(hidden.as_mut(), node));
-        }
-        let mut errors = self.errors.as_mut().subrows_mut(0, samples);
-        matmul(errors.as_mut(), Accum::Replace, hidden.as_ref(), v, 1.0, Par::Seq);
-        let mut squares = 0.0;
-        for output in 0..shape.outputs {
-            let targets = column(block.targets.as_ref(), output);
-            for (error, target) in column_mut(errors.as_mut(), output).iter_mut().zip(targets) {
-                *error -= target;
-                squares += *error * *error;
-            }
-        }
-        squares
-    }
-}
-
 /// A column of a matrix whose columns are contiguous.
 pub(super) fn column(matrix: MatRef<'_, f64>, index: usize) -> &[f64] {
     let column = matrix
@@ -166,6 +113,7 @@ pub(super) mod tests {
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
+    use crate::network::Shape;
 
     pub(in crate::training) fn random_examples(samples: usize, inputs: usize, outputs: usize, seed: u64) -> Examples {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

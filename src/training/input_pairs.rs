@@ -2,20 +2,22 @@ use faer::{Mat, MatMut, MatRef};
 
 use super::{
     Examples,
-    examples::{BLOCK, Block, column, column_mut},
+    elementwise::scale_into,
+    examples::{BLOCK, Block, column_mut},
 };
 
 /// The most memory for keeping the pairs of all blocks; above it each block's pairs are made anew every time, which
 /// costs a few percent of the product they enter.
 const LARGEST_KEPT_BYTES: usize = 32 << 20;
 
-/// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: block × n1(n1+1)/2. They never change during training.
+/// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a
+/// sample are contiguous and enter the product as they are. They never change during training.
 #[derive(Debug)]
 pub(super) enum InputPairs {
     /// One matrix per block.
     Kept(Vec<Mat<f64>>),
-    /// Room for one block.
-    Made(Mat<f64>),
+    /// Room for one block, and for one sample of it.
+    Made(Mat<f64>, Vec<f64>),
 }
 
 impl InputPairs {
@@ -23,11 +25,12 @@ impl InputPairs {
         let n1 = examples.inputs() + 1;
         let pairs = n1 * (n1 + 1) / 2;
         if examples.samples() * pairs * size_of::<f64>() > LARGEST_KEPT_BYTES {
-            return Self::Made(Mat::zeros(BLOCK, pairs));
+            return Self::Made(Mat::zeros(pairs, BLOCK), vec![0.0; n1]);
         }
+        let mut sample = vec![0.0; n1];
         let filled = |block: &Block| {
-            let mut kept = Mat::zeros(block.samples(), pairs);
-            fill(block.inputs.as_ref(), kept.as_mut());
+            let mut kept = Mat::zeros(pairs, block.samples());
+            fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
             kept
         };
         Self::Kept(examples.blocks().iter().map(filled).collect())
@@ -37,14 +40,19 @@ impl InputPairs {
     pub(super) fn of(&mut self, index: usize, block: &Block) -> MatRef<'_, f64> {
         match self {
             Self::Kept(blocks) => blocks[index].as_ref(),
-            Self::Made(room) => {
-                fill(block.inputs.as_ref(), room.as_mut().subrows_mut(0, block.samples()));
-                room.as_ref().subrows(0, block.samples())
+            Self::Made(room, sample) => {
+                fill(
+                    block.inputs.as_ref(),
+                    sample,
+                    room.as_mut().subcols_mut(0, block.samples()),
+                );
+                room.as_ref().subcols(0, block.samples())
             }
         }
     }
 
     /// Writes the symmetric n1 × n1 matrix whose lower triangle is packed column by column.
+    #[inline(always)]
     pub(super) fn unpack(packed: &[f64], n1: usize, square: &mut [f64]) {
         let mut rest = packed;
         for b in 0..n1 {
@@ -58,13 +66,17 @@ impl InputPairs {
     }
 }
 
-fn fill(inputs: MatRef<'_, f64>, mut pairs: MatMut<'_, f64>) {
+fn fill(inputs: MatRef<'_, f64>, sample: &mut [f64], mut pairs: MatMut<'_, f64>) {
     let n1 = inputs.ncols();
-    let order = (0..n1).flat_map(|b| (b..n1).map(move |a| (a, b)));
-    for (pair, (a, b)) in order.enumerate() {
-        let factors = column(inputs, a).iter().zip(column(inputs, b));
-        for (product, (x, y)) in column_mut(pairs.as_mut(), pair).iter_mut().zip(factors) {
-            *product = x * y;
+    for index in 0..inputs.nrows() {
+        for (value, input) in sample.iter_mut().zip(inputs.row(index).iter()) {
+            *value = *input;
+        }
+        let mut rest = column_mut(pairs.as_mut(), index);
+        for b in 0..n1 {
+            let (products, below) = rest.split_at_mut(n1 - b);
+            scale_into(products, sample[b], &sample[b..]);
+            rest = below;
         }
     }
 }

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluation, Examples, NormalEquations, Setting, StopReason, examples::Activations};
+use super::{Evaluation, Examples, NormalEquations, Setting, StopReason};
 use crate::network::Mlp;
 
 /// Settings of Levenberg-Marquardt (Hagan and Menhaj 1994), with the field's usual defaults.
@@ -73,7 +73,6 @@ pub struct LevenbergMarquardt {
     mu: f64,
     mse: f64,
     equations: NormalEquations,
-    activations: Activations,
     step: Vec<f64>,
     candidate: Mlp,
 }
@@ -88,7 +87,6 @@ impl LevenbergMarquardt {
             mu: settings.mu,
             mse: evaluation.mse,
             equations,
-            activations: Activations::new(mlp.shape()),
             step: vec![0.0; mlp.weights().len()],
             candidate: mlp.clone(),
         };
@@ -113,7 +111,7 @@ impl LevenbergMarquardt {
                     .iter_mut()
                     .zip(moved)
                     .for_each(|(weight, moved)| *weight = moved);
-                let mse = examples.mse(&self.candidate, &mut self.activations);
+                let mse = self.equations.mse(&self.candidate, examples);
                 // Written so that NaN is rejected.
                 if mse < self.mse {
                     std::mem::swap(mlp, &mut self.candidate);

@@ -2,7 +2,9 @@
 //!
 //! Everything here works on scaled values and knows nothing of sensors.
 
+mod activations;
 mod backpropagation;
+mod elementwise;
 mod examples;
 mod history;
 mod input_pairs;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, examples::Activations,
+    EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations,
     method::Algorithm,
 };
 use crate::network::Mlp;

@@ -1,0 +1,59 @@
+//! Products of columns, entry by entry, in the machine's vector registers.
+
+/// Writes `a ∘ b`.
+pub(super) fn multiply_into(product: &mut [f64], a: &[f64], b: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for ((product, a), b) in product.iter_mut().zip(a).zip(b) {
+            *product = a * b;
+        }
+    });
+}
+
+/// Writes `factor · a`.
+pub(super) fn scale_into(product: &mut [f64], factor: f64, a: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (product, a) in product.iter_mut().zip(a) {
+            *product = factor * a;
+        }
+    });
+}
+
+/// Multiplies `values` by `factors`.
+pub(super) fn multiply(values: &mut [f64], factors: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (value, factor) in values.iter_mut().zip(factors) {
+            *value *= factor;
+        }
+    });
+}
+
+/// Writes the slope of tanh where its value is `h`: 1 − h².
+pub(super) fn tanh_slopes_into(slopes: &mut [f64], h: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (slope, h) in slopes.iter_mut().zip(h) {
+            *slope = 1.0 - h * h;
+        }
+    });
+}
+
+/// Subtracts `targets` from `outputs`; returns the sum of squares, in eight partial sums of fixed order.
+pub(super) fn subtract(outputs: &mut [f64], targets: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    pulp::Arch::new().dispatch(|| {
+        let whole = outputs.len() - outputs.len() % LANES;
+        let (outputs, last_outputs) = outputs.split_at_mut(whole);
+        let (targets, last_targets) = targets.split_at(whole);
+        for (outputs, targets) in outputs.chunks_exact_mut(LANES).zip(targets.chunks_exact(LANES)) {
+            for ((output, target), sum) in outputs.iter_mut().zip(targets).zip(&mut sums) {
+                *output -= target;
+                *sum += *output * *output;
+            }
+        }
+        for ((output, target), sum) in last_outputs.iter_mut().zip(last_targets).zip(&mut sums) {
+            *output -= target;
+            *sum += *output * *output;
+        }
+    });
+    sums.iter().sum()
+}
