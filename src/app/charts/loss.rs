@@ -4,10 +4,13 @@ use egui_plot::{Line, PlotPoints, VLine};
 use super::plot_style::{decade_text, decades, legend, plot, thinned};
 use crate::{app::theme::Theme, export::format_number, training::EpochRecord};
 
+/// Picks one of an epoch's errors.
+type ErrorOf = fn(&EpochRecord) -> Option<f64>;
+
 /// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights.
 pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
     let palette = Theme::of(ui).palette;
-    let curves: [(&str, Color32, fn(&EpochRecord) -> Option<f64>); 3] = [
+    let curves: [(_, Color32, ErrorOf); 3] = [
         ("training", palette.training_series, |epoch| Some(epoch.training_mse)),
         ("validation", palette.validation_series, |epoch| epoch.validation_mse),
         ("test", palette.test_series, |epoch| epoch.test_mse),
@@ -16,7 +19,7 @@ pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
         .legend(legend())
         .y_grid_spacer(decades)
         .y_axis_formatter(|mark, _| decade_text(mark))
-        .label_formatter(|position| hover_text(position))
+        .label_formatter(hover_text)
         .show(ui, |plot_ui| {
             for (name, colour, error) in curves {
                 let points: Vec<[f64; 2]> = thinned(history)

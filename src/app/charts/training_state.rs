@@ -4,6 +4,9 @@ use egui_plot::{Line, PlotPoints};
 use super::plot_style::{decade_text, decades, legend, plot, thinned};
 use crate::{app::theme::Theme, training::EpochRecord};
 
+/// Picks one of an epoch's quantities.
+type QuantityOf = fn(&EpochRecord) -> f64;
+
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
 pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &str) {
     let palette = Theme::of(ui).palette;
@@ -17,7 +20,7 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &
             .y_grid_spacer(decades)
             .y_axis_formatter(|mark, _| decade_text(mark))
             .show(ui, |plot_ui| {
-                let curves: [(&str, Color32, fn(&EpochRecord) -> f64); 2] = [
+                let curves: [(_, Color32, QuantityOf); 2] = [
                     ("gradient", palette.training_series, |epoch| epoch.gradient_norm),
                     (parameter_name, palette.test_series, |epoch| epoch.parameter),
                 ];

@@ -1,10 +1,10 @@
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 
 use crate::app::{
     action::Action,
     charts,
     state::{BottomTab, State},
-    theme::{Theme, tabs_ui},
+    theme::{placeholder_ui, tabs_ui},
 };
 
 /// The charts below the surfaces.
@@ -25,15 +25,13 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         return actions;
     }
     let Some((run, result)) = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?))) else {
-        ui.centered_and_justified(|ui| {
-            ui.label(RichText::new("No training yet").color(Theme::of(ui).palette.dim));
-        });
+        placeholder_ui(ui, "Errors by epoch appear here once a network trains.");
         return actions;
     };
     match state.look.tab {
         BottomTab::Loss => charts::loss_ui(ui, &run.history, result.best_epoch),
         BottomTab::TrainingState => {
-            charts::training_state_ui(ui, &run.history, run.settings.training.method.parameter_name())
+            charts::training_state_ui(ui, &run.history, run.settings.training.method.parameter_name());
         }
         BottomTab::ErrorHistogram => charts::error_histogram_ui(ui, &run.test.set, &result.decoupled_mm),
         BottomTab::Regression => charts::regression_ui(ui, &run.test.set, &result.decoupled_mm),

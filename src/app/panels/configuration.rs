@@ -1,7 +1,7 @@
 use eframe::egui::{CollapsingHeader, ComboBox, RichText, ScrollArea, Slider, Ui};
 
 use super::{
-    fields::{capitalised, count_ui, field_ui, quantity_ui},
+    fields::{capitalised, count_ui, field_ui, input_text, quantity_ui},
     sensor_section::sensor_section_ui,
 };
 use crate::{
@@ -132,11 +132,7 @@ fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
         shown.response
     });
     for setting in method.settings() {
-        let hint = format!(
-            "{} Default {}.",
-            setting.meaning,
-            crate::export::format_number(setting.default)
-        );
+        let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
     }
     let stopping = &mut draft.training.stopping;

@@ -4,10 +4,7 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Align, DragValue, Layout, Response, RichText, Ui, emath::Numeric};
 
-use crate::{
-    app::theme::{Theme, space},
-    export::format_number,
-};
+use crate::app::theme::{Theme, space};
 
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
@@ -49,7 +46,7 @@ fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, u
         .update_while_editing(false);
     if !N::INTEGRAL {
         drag = drag
-            .custom_formatter(|value, _| format_number(value))
+            .custom_formatter(|value, _| input_text(value))
             .custom_parser(|text| text.trim().parse().ok());
     }
     ui.add_sized([space(18), space(6)], drag)
@@ -61,4 +58,26 @@ pub fn capitalised(name: &str) -> String {
     letters
         .next()
         .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A number as one would type it: all its digits, and no more.
+pub fn input_text(value: f64) -> String {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_show_what_was_typed() {
+        for text in ["0", "0.001", "20", "1e10", "1e-7", "-3.25", "123456"] {
+            assert_eq!(input_text(text.parse().unwrap()), text);
+        }
+    }
 }

@@ -9,7 +9,7 @@ use crate::{
         state::{RightCard, State},
         surface_view::{ColourBar, Colours, SurfaceView, SurfaceViewResponse, ViewMode},
         test_view::{Frame, TestView},
-        theme::{Theme, card_frame, segmented_ui, semibold, space, type_size},
+        theme::{Theme, card_frame, placeholder_ui, segmented_ui, semibold, space, type_size},
     },
     export::format_number,
 };
@@ -80,10 +80,10 @@ fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         });
     });
     let (Some(test), Some((decoupled, error))) = (state.test(), &state.frames.decoupled) else {
-        ui.centered_and_justified(|ui| {
-            let text = "Press Train: the surface that the network decouples takes shape here while it learns.";
-            ui.label(RichText::new(text).color(Theme::of(ui).palette.dim));
-        });
+        placeholder_ui(
+            ui,
+            "Press Train: the surface that the network decouples takes shape here while it learns.",
+        );
         return;
     };
     let card = match state.look.right {

@@ -185,3 +185,16 @@ fn name_group(ui: &Ui, id: Id, label: &str) {
         node.set_label(label);
     });
 }
+
+/// A sentence in the middle of an empty card: why there is nothing, and what to do.
+pub fn placeholder_ui(ui: &mut Ui, text: &str) {
+    let dim = Theme::of(ui).palette.dim;
+    let text = RichText::new(text).color(dim);
+    let width = ui.available_width().min(space(80));
+    let galley_height = 3.0 * type_size().body;
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.5 * (ui.available_height() - galley_height)).max(0.0));
+        ui.set_max_width(width);
+        ui.label(text);
+    });
+}
