@@ -24,7 +24,10 @@ pub fn plot<'a>(ui: &Ui, id: &'static str, x_name: &'static str, y_name: &'stati
 
 /// A legend at the upper right.
 pub fn legend() -> Legend {
-    Legend::default().position(Corner::RightTop).background_alpha(0.6)
+    Legend::default()
+        .position(Corner::RightTop)
+        .background_alpha(0.6)
+        .follow_insertion_order(true)
 }
 
 /// Every so many items, so that at most [`MOST_POINTS`] and the last one remain.
@@ -38,30 +41,51 @@ pub fn thinned<T: Copy>(items: &[T]) -> impl Iterator<Item = T> + '_ {
         .copied()
 }
 
-/// Whole decades, for a chart that draws the decimal logarithm.
+/// Marks for a chart that draws the decimal logarithm: whole decades, and 2 and 5 between them where few are seen.
 pub fn decades(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let (first, last) = (low.floor(), high.ceil());
-    // So few that their numbers do not touch.
-    let stride = ((last - first) / 6.0).ceil().max(1.0);
-    let count = ((last - first) / stride).clamp(0.0, 64.0) as usize;
-    let marks = (0..=count).map(|index| first + stride * index as f64);
-    marks
-        .map(|value| GridMark {
-            value,
-            step_size: stride,
-        })
-        .collect()
+    if !(low.is_finite() && high.is_finite()) {
+        return Vec::new();
+    }
+    let steps: &[f64] = if high - low < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    // So few decades that their numbers do not touch.
+    let stride = ((high - low) / 6.0).ceil().max(1.0);
+    let first = (low / stride).floor() * stride;
+    let count = ((high - first) / stride).clamp(0.0, 64.0) as usize;
+    let decades = (0..=count).map(|index| first + stride * index as f64);
+    let marks = decades.flat_map(|decade| steps.iter().map(move |step| decade + step.log10()));
+    let seen = marks.filter(|mark| (low..=high).contains(mark));
+    seen.map(|value| GridMark {
+        value,
+        step_size: stride,
+    })
+    .collect()
 }
 
 /// The number at a mark of [`decades`].
 pub fn decade_text(mark: GridMark) -> String {
-    format!("1e{}", mark.value.round())
+    let decade = (mark.value + 1e-9).floor();
+    format!("{}e{decade}", 10.0_f64.powf(mark.value - decade).round())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_of_a_log_axis_lie_in_sight_and_read_as_numbers() {
+        let marks = |low, high| -> Vec<String> {
+            let input = GridInput {
+                bounds: (low, high),
+                base_step_size: 0.1,
+            };
+            decades(input).into_iter().map(decade_text).collect()
+        };
+        assert_eq!(marks(-3.2, 0.1), ["1e-3", "1e-2", "1e-1", "1e0"]);
+        assert_eq!(marks(-1.1, -0.2), ["1e-1", "2e-1", "5e-1"]);
+        assert!(marks(-200.0, 10.0).len() <= 8);
+        assert_eq!(marks(f64::NAN, 1.0).len(), 0);
+    }
 
     #[test]
     fn thinning_keeps_both_ends() {

@@ -9,6 +9,7 @@ mod save_form;
 mod sensor_section;
 mod status_line;
 mod surfaces;
+mod table;
 mod top_bar;
 
 pub use configuration::configuration_ui;

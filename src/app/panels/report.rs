@@ -1,14 +1,14 @@
-use eframe::egui::{Align, Grid, Layout, RichText, ScrollArea, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Layout, RichText, ScrollArea, Ui, WidgetInfo, accesskit::Role};
 
-use super::fields::capitalised;
+use super::table::{Column, Row, table_ui};
 use crate::{
     app::{
         action::Action,
         export_kind::ExportKind,
         state::{RunResult, RunView, State},
-        theme::{Theme, ghost_button, note_ui, section_heading_ui, semibold, space, type_size},
+        theme::{Theme, ghost_button, note_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{Errors, error_rows},
+    evaluation::{ErrorRow, Errors, error_rows},
     export::{format_duration, format_number},
 };
 
@@ -35,63 +35,47 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     actions
 }
 
-/// Headings of the error columns with what they mean.
-const COLUMNS: [(&str, &str); 5] = [
-    (
-        "Z %",
-        "AveZerr of the paper: mean |error| of z in percent of the coordinate z",
-    ),
-    ("X %", "AveXerr: mean |error| of x in percent of the coordinate x"),
-    ("Y %", "AveYerr: mean |error| of y in percent of the coordinate y"),
-    ("mm", "Mean |error| of z in millimetres"),
-    (
-        "stroke %",
-        "Mean |error| of z in percent of the full scale, the distance a node can travel",
-    ),
+/// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
+const COLUMNS: [Column; 5] = [
+    Column {
+        heading: "Z %",
+        meaning: "AveZerr of the paper: mean |error| of z in percent of the coordinate z",
+    },
+    Column {
+        heading: "X %",
+        meaning: "AveXerr: mean |error| of x in percent of the coordinate x",
+    },
+    Column {
+        heading: "Y %",
+        meaning: "AveYerr: mean |error| of y in percent of the coordinate y",
+    },
+    Column {
+        heading: "mm",
+        meaning: "Mean |error| of z in millimetres",
+    },
+    Column {
+        heading: "stroke %",
+        meaning: "Mean |error| of z in percent of the full scale, the distance a node can travel",
+    },
 ];
 
 fn error_table_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let palette = Theme::of(ui).palette;
-    let grid = Grid::new("errors")
-        .num_columns(6)
-        .spacing([space(3), space(2)])
-        .min_col_width(0.0);
-    grid.show(ui, |ui| {
-        ui.label("");
-        for (heading, meaning) in COLUMNS {
-            let text = RichText::new(heading).size(type_size().small).color(palette.dim);
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.label(text).on_hover_text(meaning)
-            });
-        }
-        ui.end_row();
-        for row in error_rows(&result.errors, &run.baselines, run.published.as_ref()) {
-            let is_network = row.name == "network";
-            let colour = match row.name {
-                "network" => palette.accent,
-                "published" => palette.dim,
-                _ => palette.text,
-            };
-            let styled = |text: &str| {
-                let text = RichText::new(text).size(type_size().note).color(colour);
-                if is_network {
-                    text.font(semibold(type_size().note))
-                } else {
-                    text
-                }
-            };
-            ui.label(styled(&capitalised(row.name)));
-            for ((heading, _), value) in COLUMNS.iter().zip(row.values()) {
-                let cell = format_number(value);
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let response = ui.label(styled(&cell));
-                    let text = format!("{}, {heading}: {cell}", row.name);
-                    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &text));
-                });
-            }
-            ui.end_row();
-        }
-    });
+    let row = |row: ErrorRow| Row {
+        name: row.name,
+        cells: row.values()[..COLUMNS.len()]
+            .iter()
+            .map(|value| format_number(*value))
+            .collect(),
+        colour: match row.name {
+            "network" => palette.accent,
+            "published" => palette.dim,
+            _ => palette.text,
+        },
+        is_strong: row.name == "network",
+    };
+    let rows = error_rows(&result.errors, &run.baselines, run.published.as_ref());
+    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.into_iter().map(row).collect::<Vec<_>>()));
 }
 
 /// Says plainly where the network loses, and how.

@@ -22,12 +22,13 @@ pub fn workbench_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let charts_height = (0.32 * whole.height()).clamp(space(40), space(75));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - charts_height);
     let upper = upper.with_max_y(upper.max.y - gap);
-    // Each card with the colour bar of what it shows, so that both have the same width.
-    let width = 0.5 * (upper.width() - gap);
-    let left = Rect::from_min_size(upper.min, Vec2::new(width, upper.height()));
-    let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), upper.max);
+    let (cards, scales) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
+    let width = 0.5 * (cards.width() - gap);
+    let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
+    let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
     in_card(ui, left, |ui| actual_card_ui(ui, state, &mut actions));
     in_card(ui, right, |ui| right_card_ui(ui, state, &mut actions));
+    colour_scales_ui(ui, scales, state);
     in_card(ui, lower, |ui| actions.extend(charts_card_ui(ui, state)));
     ui.allocate_rect(whole, eframe::egui::Sense::hover());
     actions
@@ -103,6 +104,35 @@ fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     card.show_ui(ui, state, test, actions);
 }
 
+/// The scale that both surfaces share; beside it that of the errors while they are shown.
+fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
+    let Some(test) = state.test() else { return };
+    let theme = Theme::of(ui);
+    let height = |range| ColourBar {
+        title: Colours::Height.title(),
+        range,
+        colours: Colours::Height,
+        theme,
+    };
+    let mut scales = vec![height(test.z_range_mm())];
+    if let (RightCard::Error, Some((_, error))) = (state.look.right, &state.frames.decoupled) {
+        let colours = Colours::Error;
+        scales.push(ColourBar {
+            title: colours.title(),
+            range: symmetric_range_mm(error),
+            colours,
+            theme,
+        });
+    }
+    let part = rect.height() / scales.len() as f32;
+    for (index, scale) in scales.into_iter().enumerate() {
+        let top = rect.top() + part * index as f32;
+        let slot = Rect::from_x_y_ranges(rect.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
+        let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+        scale.show(&mut slot_ui, slot.height());
+    }
+}
+
 /// ± the largest error of a node, so that zero keeps its colour.
 fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
     let largest = error
@@ -126,31 +156,18 @@ struct Card<'a> {
 impl Card<'_> {
     fn show_ui(self, ui: &mut Ui, state: &State, test: &TestView, actions: &mut Vec<Action>) {
         let theme = Theme::of(ui);
-        let space_left = ui.available_rect_before_wrap();
-        let bar_width = ColourBar::WIDTH;
-        let (plot, bar) = space_left.split_left_right_at_x(space_left.right() - bar_width);
         let view = SurfaceView {
             label: self.label,
             grid: test.surface.grid(),
             values_mm: &self.frame.grid_mm,
             nodes_mm: &self.frame.nodes_mm,
-            range_mm: self.range_mm.clone(),
+            range_mm: self.range_mm,
             colours: self.colours,
             mode: state.look.mode,
             highlight: state.look.node,
             theme,
         };
-        let mut plot_ui = ui.new_child(UiBuilder::new().max_rect(plot));
-        let shown = view.show(&mut plot_ui, state.look.camera);
-        let mut bar_ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(Vec2::new(0.0, space(4)))));
-        let bar_height = bar_ui.available_height();
-        ColourBar {
-            title: self.colours.title(),
-            range: self.range_mm,
-            colours: self.colours,
-            theme,
-        }
-        .show(&mut bar_ui, bar_height);
+        let shown = view.show(ui, state.look.camera);
         answer(&shown, state, actions);
         shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
     }

@@ -1,0 +1,113 @@
+//! A small table of numbers: names on the left, columns as wide as their widest cell, digits aligned on the right.
+
+use eframe::egui::{
+    Align, Color32, Label, Layout, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role,
+    pos2,
+};
+
+use super::fields::capitalised;
+use crate::app::theme::{Theme, semibold, space, type_size};
+
+/// A heading and what it means.
+pub struct Column {
+    pub heading: &'static str,
+    pub meaning: &'static str,
+}
+
+/// A named row with one cell for each column.
+pub struct Row {
+    pub name: &'static str,
+    pub cells: Vec<String>,
+    pub colour: Color32,
+    pub is_strong: bool,
+}
+
+/// Lays out the table over the available width.
+pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
+    let palette = Theme::of(ui).palette;
+    let whole = ui.available_width();
+    let row_height = space(6);
+    let measure = |text: &str, is_strong: bool| styled(text, Color32::WHITE, is_strong, ui).size().x;
+    let widths: Vec<f32> = (0..columns.len())
+        .map(|at| {
+            let cells = rows.iter().map(|row| measure(&row.cells[at], row.is_strong));
+            cells.fold(measure(columns[at].heading, false), f32::max)
+        })
+        .collect();
+    let names = rows
+        .iter()
+        .map(|row| measure(row.name, row.is_strong))
+        .fold(0.0, f32::max);
+    // What is left over is shared among the gaps before the columns.
+    let gap = ((whole - names - widths.iter().sum::<f32>()) / columns.len() as f32).max(space(1));
+    let line = |ui: &mut Ui, cells_ui: &mut dyn FnMut(&mut Ui, usize, Rect), is_last: bool| {
+        let (rect, _) = ui.allocate_exact_size(Vec2::new(whole, row_height), Sense::hover());
+        cells_ui(ui, 0, rect.with_max_x(rect.left() + names + gap));
+        let mut right = rect.left() + names;
+        for (at, width) in widths.iter().enumerate() {
+            right += gap + width;
+            let cell = Rect::from_min_max(pos2(right - width - gap, rect.top()), pos2(right, rect.bottom()));
+            cells_ui(ui, at + 1, cell);
+        }
+        if !is_last {
+            ui.painter()
+                .hline(rect.x_range(), rect.bottom(), Stroke::new(1.0, palette.line));
+        }
+    };
+    ui.spacing_mut().item_spacing.y = 0.0;
+    line(
+        ui,
+        &mut |ui, at, rect| {
+            if let Some(column) = at.checked_sub(1).map(|at| &columns[at]) {
+                let text = RichText::new(column.heading).size(type_size().small).color(palette.dim);
+                cell_ui(ui, rect, Align::Max, text).on_hover_text(column.meaning);
+            }
+        },
+        false,
+    );
+    for (index, row) in rows.iter().enumerate() {
+        let text = |text: &str| rich(text, row.colour, row.is_strong);
+        line(
+            ui,
+            &mut |ui, at, rect| match at.checked_sub(1) {
+                None => {
+                    cell_ui(ui, rect, Align::Min, text(&capitalised(row.name)));
+                }
+                Some(at) => {
+                    let (heading, cell) = (columns[at].heading, &row.cells[at]);
+                    let response = cell_ui(ui, rect, Align::Max, text(cell));
+                    let label = format!("{}, {heading}: {cell}", row.name);
+                    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+                }
+            },
+            index + 1 == rows.len(),
+        );
+    }
+}
+
+fn rich(text: &str, colour: Color32, is_strong: bool) -> RichText {
+    let text = RichText::new(text).size(type_size().note).color(colour);
+    if is_strong {
+        text.font(semibold(type_size().note))
+    } else {
+        text
+    }
+}
+
+fn styled(text: &str, colour: Color32, is_strong: bool, ui: &Ui) -> std::sync::Arc<eframe::egui::Galley> {
+    let font = if is_strong {
+        semibold(type_size().note)
+    } else {
+        eframe::egui::FontId::proportional(type_size().note)
+    };
+    ui.painter().layout_no_wrap(text.to_owned(), font, colour)
+}
+
+fn cell_ui(ui: &mut Ui, rect: Rect, align: Align, text: RichText) -> eframe::egui::Response {
+    let layout = match align {
+        Align::Max => Layout::right_to_left(Align::Center),
+        _ => Layout::left_to_right(Align::Center),
+    };
+    let mut cell = ui.new_child(UiBuilder::new().max_rect(rect).layout(layout));
+    cell.add(Label::new(text).extend())
+}
