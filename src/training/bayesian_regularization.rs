@@ -132,12 +132,18 @@ impl BayesianRegularization {
         self
     }
 
-    /// α and β from γ; each 1 where it would not be a positive number.
+    /// α and β from γ; each 1 where it would not be a positive number, and neither so extreme that their ratio overflows.
     fn weigh(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
-        let or_one = |value: f64| if value > 0.0 && value.is_finite() { value } else { 1.0 };
-        self.state.alpha = or_one(gamma / (2.0 * squares(mlp)));
-        self.state.beta = or_one((self.errors - gamma) / (2.0 * self.mse * self.errors));
+        let bounded = |value: f64| {
+            if value > 0.0 && value.is_finite() {
+                value.clamp(1e-150, 1e150)
+            } else {
+                1.0
+            }
+        };
+        self.state.alpha = bounded(gamma / (2.0 * squares(mlp)));
+        self.state.beta = bounded((self.errors - gamma) / (2.0 * self.mse * self.errors));
     }
 
     /// β Σe² + α Σw².

@@ -217,6 +217,11 @@ impl Trainer {
         &self.settings
     }
 
+    /// The present weights, which another method would go on from.
+    pub fn present(&self) -> &Mlp {
+        &self.mlp
+    }
+
     /// The best weights so far: of the lowest validation error, or training error where nothing is held out.
     pub fn best(&self) -> &Mlp {
         &self.best.mlp

@@ -69,15 +69,17 @@ impl NormalEquations {
     /// Length of Jᵀe + decay·w from what was last gathered.
     pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: f64) -> f64 {
         let (w, v) = mlp.layers();
-        let squares = |gradient: MatRef<'_, f64>, weights: &[f64]| -> f64 {
+        // By `hypot`, since the squares overflow where the error weighs next to nothing against the weights.
+        let length = |gradient: MatRef<'_, f64>, weights: &[f64]| -> f64 {
             let weights = MatRef::from_row_major_slice(weights, gradient.nrows(), gradient.ncols());
             let columns = gradient.col_iter().zip(weights.col_iter());
             columns
                 .flat_map(|(gradient, weights)| gradient.iter().zip(weights.iter()))
-                .map(|(gradient, weight)| (gradient + decay * weight).powi(2))
-                .sum()
+                .map(|(gradient, weight)| gradient + decay * weight)
+                .fold(0.0, f64::hypot)
         };
-        (squares(self.products.gradient_w.as_ref(), w) + squares(self.products.gradient_v.as_ref(), v)).sqrt()
+        let w = length(self.products.gradient_w.as_ref(), w);
+        w.hypot(length(self.products.gradient_v.as_ref(), v))
     }
 
     /// tr (JᵀJ + damping·I)⁻¹ from what was last gathered; `None` if the matrix is not positive definite in the
