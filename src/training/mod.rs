@@ -18,6 +18,7 @@ mod levenberg_marquardt;
 mod method;
 mod momentum;
 mod normal_equations;
+mod parallel;
 mod resilient;
 mod scaled_conjugate_gradient;
 mod setting;

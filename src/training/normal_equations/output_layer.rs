@@ -1,10 +1,6 @@
-use faer::{
-    Accum, Mat, Par,
-    dyn_stack::{MemBuffer, MemStack},
-    linalg::{cholesky::llt, matmul::matmul},
-};
+use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 
-use super::schur::{cholesky, substitute};
+use super::cholesky::{Cholesky, substitute};
 use crate::{
     network::{Mlp, Shape},
     training::{Examples, activations::KeptActivations},
@@ -17,17 +13,16 @@ use crate::{
 pub(super) struct OutputLayer {
     g: Mat<f64>,
     right: Mat<f64>,
-    memory: MemBuffer,
+    cholesky: Cholesky,
 }
 
 impl OutputLayer {
     pub(super) fn new(shape: Shape) -> Self {
         let h1 = shape.hidden + 1;
-        let memory = llt::factor::cholesky_in_place_scratch::<f64>(h1, Par::Seq, Default::default());
         Self {
             g: Mat::zeros(h1, h1),
             right: Mat::zeros(h1, shape.outputs),
-            memory: MemBuffer::new(memory),
+            cholesky: Cholesky::new(h1),
         }
     }
 
@@ -53,10 +48,10 @@ impl OutputLayer {
         for node in 0..self.g.nrows() {
             self.g[(node, node)] += ridge;
         }
-        if !cholesky(self.g.as_mut(), MemStack::new(&mut self.memory)) {
+        if !self.cholesky.factor(self.g.as_mut()) {
             return false;
         }
-        substitute(&self.g, self.right.as_mut());
+        substitute(self.g.as_ref(), self.right.as_mut());
         let Shape { outputs, .. } = mlp.shape();
         let hidden_weights = mlp.shape().hidden_weights();
         let (_, v) = mlp.weights_mut().split_at_mut(hidden_weights);
