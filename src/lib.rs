@@ -18,11 +18,15 @@
 //! | [`cli`] | the work without a window |
 //! | `app` | the window (feature `gui`) |
 
+#[cfg(feature = "gui")]
+pub mod app;
+pub mod cli;
 pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
+pub mod export;
 pub mod network;
-
 pub mod scene;
 pub mod sensor;
+pub mod surface;
 pub mod training;

@@ -5,8 +5,10 @@ mod errors;
 mod published;
 mod run;
 mod settings;
+mod table;
 
 pub use errors::{Errors, NodeAddress};
 pub use published::{PublishedErrors, published_errors};
 pub use run::{Baselines, Run, RunError};
 pub use settings::{CountError, RunSettings};
+pub use table::{ErrorRow, error_rows};

@@ -19,7 +19,7 @@ pub struct Setting<'a> {
 
 /// A setting out of its range.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("{name} is {value}: it must be from {} to {}", .range.start(), .range.end())]
+#[error("{name} is {value:?}: it must be from {:?} to {:?}", .range.start(), .range.end())]
 pub struct SettingError {
     /// Which setting.
     pub name: &'static str,

@@ -1,0 +1,75 @@
+//! What a frame with two surfaces costs: the interpolation, the window's pass, and the tessellation.
+
+use decoupler::app::surface_view::{Colours, OrbitCamera, SurfaceView, ViewMode};
+use decoupler::app::theme::{self, Theme};
+use decoupler::surface::SurfaceMap;
+use divan::{Bencher, black_box};
+use eframe::egui::{Context, RawInput, Rect, Vec2, pos2, vec2};
+use glam::DVec3;
+
+fn main() {
+    divan::main();
+}
+
+fn map(side: usize) -> (SurfaceMap, Vec<DVec3>) {
+    let x: Vec<f64> = (0..side).map(|row| 8.0 + row as f64).collect();
+    let y: Vec<f64> = (0..side).map(|node| 6.5 + 2.0 * node as f64).collect();
+    let height = |n: usize| 4.5 + 0.5 * (1.7 * n as f64).sin();
+    let nodes = (0..side * side)
+        .map(|n| DVec3::new(x[n / side], y[n % side], height(n)))
+        .collect();
+    (SurfaceMap::new(&x, &y).expect("a lattice"), nodes)
+}
+
+#[divan::bench(args = [10, 20, 30, 40])]
+fn factorise(side: usize) -> usize {
+    map(side).0.node_count()
+}
+
+#[divan::bench(args = [10, 20, 30, 40])]
+fn interpolate(bencher: Bencher<'_, '_>, side: usize) {
+    let (map, nodes) = map(side);
+    let values: Vec<f64> = nodes.iter().map(|node| node.z).collect();
+    let mut out = vec![0.0; map.grid().len()];
+    bencher.bench_local(|| map.evaluate_into(black_box(&values), &mut out));
+}
+
+#[divan::bench(args = [ViewMode::ThreeD, ViewMode::Top])]
+fn two_views(bencher: Bencher<'_, '_>, mode: ViewMode) {
+    let (map, nodes) = map(10);
+    let surface = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+    let ctx = Context::default();
+    theme::install(&ctx, true);
+    let size = vec2(700.0, 540.0);
+    let input = RawInput {
+        screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
+        ..RawInput::default()
+    };
+    bencher.bench_local(|| {
+        let mut output = ctx.run_ui(input.clone(), |ui| {
+            ui.spacing_mut().item_spacing = Vec2::ZERO;
+            ui.horizontal_top(|ui| {
+                for label in ["Actual", "Decoupled"] {
+                    ui.allocate_ui(vec2(340.0, 500.0), |ui| {
+                        let view = SurfaceView {
+                            label,
+                            grid: map.grid(),
+                            values_mm: &surface,
+                            nodes_mm: &nodes,
+                            range_mm: 4.0..=5.0,
+                            colours: Colours::Height,
+                            mode,
+                            highlight: None,
+                            theme: Theme::dark(),
+                        };
+                        view.show(ui, OrbitCamera::default());
+                    });
+                }
+            });
+        });
+        let shapes = std::mem::take(&mut output.shapes);
+        let primitives = ctx.tessellate(shapes, output.pixels_per_point);
+        output.drop_without_applying_deltas();
+        primitives.len()
+    });
+}

@@ -1,0 +1,94 @@
+use std::path::Path;
+
+use crate::{
+    evaluation::{PublishedErrors, Run, RunSettings, error_rows},
+    export::{NetworkFile, NetworkFileError, atomic_write, write_errors, write_loss_curves},
+};
+
+/// What can be written about a training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ExportKind {
+    /// The network with everything needed to use and reproduce it, as JSON.
+    Network,
+    /// The error table, as CSV.
+    Errors,
+    /// The loss curves, as CSV.
+    LossCurves,
+}
+
+impl ExportKind {
+    /// In the order offered.
+    pub const ALL: [Self; 3] = [Self::Network, Self::Errors, Self::LossCurves];
+
+    /// The word on its button.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Network => "Network…",
+            Self::Errors => "Error table…",
+            Self::LossCurves => "Loss curves…",
+        }
+    }
+
+    /// What the file holds, in a word or two.
+    pub fn file_kind(self) -> &'static str {
+        match self {
+            Self::Network => "network",
+            Self::Errors => "error table",
+            Self::LossCurves => "loss curves",
+        }
+    }
+
+    /// What the file is, in a sentence.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Network => {
+                "Layers, scaling, array, geometry, training record and errors, as JSON; `decoupler decode` reads it."
+            }
+            Self::Errors => "The table of errors, as CSV.",
+            Self::LossCurves => "Training, validation and test error of every epoch, as CSV.",
+        }
+    }
+
+    /// File name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Network => "json",
+            Self::Errors | Self::LossCurves => "csv",
+        }
+    }
+
+    /// A name that tells the files of different runs apart.
+    pub fn file_name(self, settings: &RunSettings) -> String {
+        let what = match self {
+            Self::Network => "network",
+            Self::Errors => "errors",
+            Self::LossCurves => "loss",
+        };
+        let array = settings.sensor.scale.to_string().replace('×', "x");
+        let (hidden, method) = (settings.hidden, settings.training.method.short_name());
+        format!(
+            "{what}-{array}-h{hidden}-{method}-seed{}.{}",
+            settings.seed,
+            self.extension()
+        )
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// The file cannot be written; nothing is left half-written.
+    pub fn write(self, run: &Run, path: &Path) -> Result<(), NetworkFileError> {
+        match self {
+            Self::Network => NetworkFile::from_run(run).save(path)?,
+            Self::Errors => {
+                let settings = run.settings();
+                let (_, errors) = run.decouple_test();
+                let published = PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples);
+                let rows = error_rows(&errors, run.baselines(), published.as_ref());
+                atomic_write(path, |writer| write_errors(&rows, writer))?;
+            }
+            Self::LossCurves => atomic_write(path, |writer| write_loss_curves(run.trainer().history(), writer))?,
+        }
+        Ok(())
+    }
+}

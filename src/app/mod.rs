@@ -1,0 +1,26 @@
+//! The window: state, actions, a worker thread, panels and theme.
+//!
+//! Panels read [`State`] and return [`Action`]s; [`DecouplerWindow`] applies them. The [`Worker`](worker::Worker)
+//! draws samples, trains and writes files on a thread of its own and wakes the window with events, so the window
+//! never blocks and asks for no repaint while nothing changes.
+
+mod action;
+mod charts;
+mod dialogs;
+mod export_kind;
+mod open;
+mod panels;
+mod state;
+pub mod surface_view;
+mod test_view;
+pub mod theme;
+mod window;
+mod worker;
+
+pub use action::Action;
+pub use dialogs::DialogKind;
+pub use export_kind::ExportKind;
+pub use open::{OpenError, open};
+pub use state::{BottomTab, Frames, Look, Notice, Phase, RightCard, RunResult, RunView, Saving, State};
+pub use test_view::{Frame, TestView};
+pub use window::DecouplerWindow;

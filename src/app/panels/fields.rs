@@ -1,0 +1,83 @@
+//! One row of the configuration: a name on the left, a value on the right.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{Align, DragValue, Layout, Response, RichText, Ui, emath::Numeric};
+
+use crate::app::theme::{Theme, space};
+
+/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests.
+pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
+    ui.horizontal(|ui| {
+        let label = ui.label(name).on_hover_text(hint);
+        let value = ui.with_layout(Layout::right_to_left(Align::Center), value_ui).inner;
+        value.labelled_by(label.id).on_hover_text(hint)
+    })
+    .inner
+}
+
+/// A whole number.
+pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, range: RangeInclusive<usize>) -> Response {
+    field_ui(ui, name, hint, |ui| number_ui(ui, value, range, ""))
+}
+
+/// A number with its unit; typing takes any notation, also 1e-3.
+pub fn quantity_ui(
+    ui: &mut Ui,
+    name: &str,
+    hint: &str,
+    value: &mut f64,
+    range: RangeInclusive<f64>,
+    unit: &str,
+) -> Response {
+    field_ui(ui, name, hint, |ui| number_ui(ui, value, range, unit))
+}
+
+fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, unit: &str) -> Response {
+    // Right to left: the unit stands behind the number.
+    if !unit.is_empty() {
+        ui.label(RichText::new(unit).color(Theme::of(ui).palette.dim));
+    }
+    // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
+    let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
+    let mut drag = DragValue::new(value)
+        .range(range)
+        .speed(speed)
+        .update_while_editing(false);
+    if !N::INTEGRAL {
+        drag = drag
+            .custom_formatter(|value, _| input_text(value))
+            .custom_parser(|text| text.trim().parse().ok());
+    }
+    ui.add_sized([space(18), space(6)], drag)
+}
+
+/// The name with its first letter large.
+pub fn capitalised(name: &str) -> String {
+    let mut letters = name.chars();
+    letters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A number as one would type it: all its digits, and no more.
+pub fn input_text(value: f64) -> String {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inputs_show_what_was_typed() {
+        for text in ["0", "0.001", "20", "1e10", "1e-7", "-3.25", "123456"] {
+            assert_eq!(input_text(text.parse().unwrap()), text);
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! The parts of the window. Each reads the state and returns what the user meant.
+
+mod charts_card;
+mod configuration;
+mod fields;
+mod notice;
+mod report;
+mod save_form;
+mod sensor_section;
+mod status_line;
+mod surfaces;
+mod top_bar;
+
+pub use configuration::configuration_ui;
+pub use notice::notice_ui;
+pub use report::report_ui;
+pub use save_form::save_form_ui;
+pub use status_line::status_line_ui;
+pub use surfaces::workbench_ui;
+pub use top_bar::top_bar_ui;

@@ -1,0 +1,192 @@
+use std::ops::RangeInclusive;
+
+use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
+
+use super::charts_card::charts_card_ui;
+use crate::{
+    app::{
+        action::Action,
+        state::{RightCard, State},
+        surface_view::{ColourBar, Colours, SurfaceView, SurfaceViewResponse, ViewMode},
+        test_view::{Frame, TestView},
+        theme::{Theme, card_frame, placeholder_ui, segmented_ui, semibold, space, type_size},
+    },
+    export::format_number,
+};
+
+/// The middle of the window: both surfaces above, the charts below.
+pub fn workbench_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
+    let mut actions = Vec::new();
+    let whole = ui.available_rect_before_wrap();
+    let gap = space(2);
+    let charts_height = (0.32 * whole.height()).clamp(space(40), space(75));
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - charts_height);
+    let upper = upper.with_max_y(upper.max.y - gap);
+    // Each card with the colour bar of what it shows, so that both have the same width.
+    let width = 0.5 * (upper.width() - gap);
+    let left = Rect::from_min_size(upper.min, Vec2::new(width, upper.height()));
+    let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), upper.max);
+    in_card(ui, left, |ui| actual_card_ui(ui, state, &mut actions));
+    in_card(ui, right, |ui| right_card_ui(ui, state, &mut actions));
+    in_card(ui, lower, |ui| actions.extend(charts_card_ui(ui, state)));
+    ui.allocate_rect(whole, eframe::egui::Sense::hover());
+    actions
+}
+
+fn in_card(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
+    let theme = Theme::of(ui);
+    let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
+    card.set_clip_rect(rect.intersect(ui.clip_rect()));
+    card_frame(theme).show(&mut card, |ui| {
+        ui.set_min_size(ui.available_size());
+        contents(ui);
+    });
+}
+
+fn title_ui(ui: &mut Ui, title: &str) {
+    ui.label(RichText::new(title).font(semibold(type_size().title)));
+}
+
+fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        title_ui(ui, "Actual");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+            if let Some(mode) = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false) {
+                actions.push(Action::SetViewMode(mode));
+            }
+        });
+    });
+    let Some(test) = state.test() else { return };
+    let card = Card {
+        label: "Actual surface",
+        frame: &state.frames.actual,
+        colours: Colours::Height,
+        range_mm: test.z_range_mm(),
+    };
+    card.show_ui(ui, state, test, actions);
+}
+
+fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        title_ui(ui, "By the network");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
+            if let Some(right) = segmented_ui(ui, "What the network's card shows", &options, state.look.right, false) {
+                actions.push(Action::SetRightCard(right));
+            }
+        });
+    });
+    let (Some(test), Some((decoupled, error))) = (state.test(), &state.frames.decoupled) else {
+        placeholder_ui(
+            ui,
+            "Press Train: the surface that the network decouples takes shape here while it learns.",
+        );
+        return;
+    };
+    let card = match state.look.right {
+        RightCard::Decoupled => Card {
+            label: "Decoupled surface",
+            frame: decoupled,
+            colours: Colours::Height,
+            range_mm: test.z_range_mm(),
+        },
+        RightCard::Error => Card {
+            label: "Error surface",
+            frame: error,
+            colours: Colours::Error,
+            range_mm: symmetric_range_mm(error),
+        },
+    };
+    card.show_ui(ui, state, test, actions);
+}
+
+/// ± the largest error of a node, so that zero keeps its colour.
+fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
+    let largest = error
+        .nodes_mm
+        .iter()
+        .map(|node| node.z.abs())
+        .filter(|z| z.is_finite())
+        .fold(0.0, f64::max);
+    // Nothing finer than a nanometre is told apart.
+    let largest = largest.max(1e-6);
+    -largest..=largest
+}
+
+struct Card<'a> {
+    label: &'static str,
+    frame: &'a Frame,
+    colours: Colours,
+    range_mm: RangeInclusive<f64>,
+}
+
+impl Card<'_> {
+    fn show_ui(self, ui: &mut Ui, state: &State, test: &TestView, actions: &mut Vec<Action>) {
+        let theme = Theme::of(ui);
+        let space_left = ui.available_rect_before_wrap();
+        let bar_width = ColourBar::WIDTH;
+        let (plot, bar) = space_left.split_left_right_at_x(space_left.right() - bar_width);
+        let view = SurfaceView {
+            label: self.label,
+            grid: test.surface.grid(),
+            values_mm: &self.frame.grid_mm,
+            nodes_mm: &self.frame.nodes_mm,
+            range_mm: self.range_mm.clone(),
+            colours: self.colours,
+            mode: state.look.mode,
+            highlight: state.look.node,
+            theme,
+        };
+        let mut plot_ui = ui.new_child(UiBuilder::new().max_rect(plot));
+        let shown = view.show(&mut plot_ui, state.look.camera);
+        let mut bar_ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(Vec2::new(0.0, space(4)))));
+        let bar_height = bar_ui.available_height();
+        ColourBar {
+            title: self.colours.title(),
+            range: self.range_mm,
+            colours: self.colours,
+            theme,
+        }
+        .show(&mut bar_ui, bar_height);
+        answer(&shown, state, actions);
+        shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
+    }
+}
+
+fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>) {
+    if shown.camera != state.look.camera {
+        actions.push(Action::MoveCamera(shown.camera));
+    }
+    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
+    if shown.response.contains_pointer() && shown.hovered_node != state.look.node {
+        actions.push(Action::HoverNode(shown.hovered_node));
+    }
+}
+
+/// The node under the pointer and its values.
+fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
+    let Some(actual) = state.frames.actual.nodes_mm.get(node) else {
+        return;
+    };
+    let per_row = test.sensor.scale.nodes_per_row();
+    ui.label(
+        RichText::new(format!("Row {}, node {}", node / per_row + 1, node % per_row + 1))
+            .font(semibold(type_size().body)),
+    );
+    let line = |ui: &mut Ui, name: &str, value: f64| ui.label(format!("{name} {} mm", format_number(value)));
+    ui.label(format!(
+        "x {} mm, y {} mm",
+        format_number(actual.x),
+        format_number(actual.y)
+    ));
+    line(ui, "actual z", actual.z);
+    if let Some((decoupled, error)) = &state.frames.decoupled
+        && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
+    {
+        line(ui, "decoupled z", decoupled.z);
+        line(ui, "error", error.z);
+    }
+}

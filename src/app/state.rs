@@ -1,0 +1,288 @@
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use ndarray::Array2;
+
+use super::{
+    export_kind::ExportKind,
+    surface_view::{OrbitCamera, ViewMode},
+    test_view::{Frame, TestView},
+    worker::{Began, Progress},
+};
+use crate::{
+    evaluation::{Baselines, Errors, PublishedErrors, RunSettings},
+    training::{EpochRecord, StopReason},
+};
+
+/// Everything the panels read.
+#[derive(Debug)]
+pub struct State {
+    /// Settings of the next training.
+    pub draft: RunSettings,
+    /// What the worker is doing.
+    pub phase: Phase,
+    /// The draft's test set, before it is trained on.
+    pub preview: Option<TestView>,
+    /// The present or last training.
+    pub run: Option<RunView>,
+    /// How it is looked at.
+    pub look: Look,
+    /// The snapshot being drawn.
+    pub frames: Frames,
+    /// Something to tell the user, once.
+    pub notice: Option<Notice>,
+    /// A file waiting for its path.
+    pub saving: Option<Saving>,
+}
+
+/// What the worker is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Waiting for the user.
+    Idle,
+    /// Drawing samples and starting the network.
+    Preparing,
+    /// Stepping.
+    Training,
+    /// Held.
+    Paused,
+    /// Ended, and why.
+    Ended(StopReason),
+    /// The worker is gone.
+    Died,
+}
+
+impl Phase {
+    /// Whether a training is under way, held or not; its settings cannot change then.
+    pub fn is_busy(self) -> bool {
+        matches!(self, Self::Preparing | Self::Training | Self::Paused)
+    }
+}
+
+/// A training as far as the window knows it.
+#[derive(Debug)]
+pub struct RunView {
+    /// What was asked for.
+    pub settings: RunSettings,
+    /// Its test set.
+    pub test: TestView,
+    /// What stands beside the network.
+    pub baselines: Baselines,
+    /// What the paper reports for this configuration.
+    pub published: Option<PublishedErrors>,
+    /// Every epoch so far.
+    pub history: Vec<EpochRecord>,
+    /// What the best network makes of the test set, and what that is worth.
+    pub result: Option<RunResult>,
+}
+
+/// What the best network so far makes of the test set.
+#[derive(Clone, Debug)]
+pub struct RunResult {
+    /// Coordinates: samples × 3·M2.
+    pub decoupled_mm: Arc<Array2<f64>>,
+    /// Their errors.
+    pub errors: Errors,
+    /// The epoch of the network.
+    pub best_epoch: usize,
+    /// Time spent in training.
+    pub elapsed: Duration,
+    /// Time to decouple one snapshot.
+    pub frame_time: Duration,
+}
+
+impl RunView {
+    /// A training that has just begun.
+    pub fn new(began: Began) -> Self {
+        let Began {
+            settings,
+            test,
+            baselines,
+        } = began;
+        Self {
+            published: PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples),
+            settings,
+            test,
+            baselines,
+            history: Vec::new(),
+            result: None,
+        }
+    }
+
+    /// Takes the worker's news.
+    pub fn progress(&mut self, progress: Progress) {
+        let Progress {
+            epochs,
+            decoupled_mm,
+            errors,
+            best_epoch,
+            elapsed,
+            frame_time,
+            stop_reason: _,
+        } = progress;
+        self.history.extend(epochs);
+        self.result = Some(RunResult {
+            decoupled_mm,
+            errors,
+            best_epoch,
+            elapsed,
+            frame_time,
+        });
+    }
+
+    /// The latest epoch.
+    pub fn latest(&self) -> Option<&EpochRecord> {
+        self.history.last()
+    }
+}
+
+/// How the results are looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Snapshot of the test set.
+    pub snapshot: usize,
+    /// Shared by both surfaces.
+    pub camera: OrbitCamera,
+    /// In space or from above.
+    pub mode: ViewMode,
+    /// What the right-hand card shows.
+    pub right: RightCard,
+    /// The chart below.
+    pub tab: BottomTab,
+    /// The node under the pointer.
+    pub node: Option<usize>,
+    /// Dark or light.
+    pub is_dark: bool,
+}
+
+/// What stands beside the actual surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RightCard {
+    /// The surface that the network found.
+    #[default]
+    Decoupled,
+    /// Its difference from the actual one.
+    Error,
+}
+
+/// The charts below the surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BottomTab {
+    /// Error against epoch.
+    #[default]
+    Loss,
+    /// Gradient, damping or rate, and validation failures against epoch.
+    TrainingState,
+    /// How the errors of z are distributed.
+    ErrorHistogram,
+    /// Decoupled against actual z.
+    Regression,
+    /// The nodes of the snapshot: the paper's Fig. 6.
+    Nodes,
+}
+
+/// The snapshot being drawn, made anew only when it changes.
+#[derive(Debug, Default)]
+pub struct Frames {
+    /// As it is.
+    pub actual: Frame,
+    /// As the network finds it, and the difference (decoupled − actual).
+    pub decoupled: Option<(Frame, Frame)>,
+}
+
+/// Something to tell the user, once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// It worked.
+    Done(String),
+    /// It did not, and what to do.
+    Failed(String),
+}
+
+/// A file waiting for its path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Saving {
+    /// What to write.
+    pub kind: ExportKind,
+    /// The path typed so far.
+    pub path: String,
+}
+
+impl State {
+    /// The state in which the window opens.
+    pub fn new(is_dark: bool) -> Self {
+        Self {
+            draft: RunSettings::default(),
+            phase: Phase::Idle,
+            preview: None,
+            run: None,
+            look: Look {
+                snapshot: 0,
+                camera: OrbitCamera::default(),
+                mode: ViewMode::ThreeD,
+                right: RightCard::default(),
+                tab: BottomTab::default(),
+                node: None,
+                is_dark,
+            },
+            frames: Frames::default(),
+            notice: None,
+            saving: None,
+        }
+    }
+
+    /// The test set on show: the training's, or the draft's if that has moved on.
+    pub fn test(&self) -> Option<&TestView> {
+        self.preview.as_ref().or(self.run.as_ref().map(|run| &run.test))
+    }
+
+    /// The training on show: none if the draft has moved on to another test set.
+    pub fn shown_run(&self) -> Option<&RunView> {
+        if self.preview.is_some() {
+            None
+        } else {
+            self.run.as_ref()
+        }
+    }
+
+    /// The result on show.
+    pub fn result(&self) -> Option<&RunResult> {
+        self.shown_run().and_then(|run| run.result.as_ref())
+    }
+
+    /// Makes the frames of the snapshot on show.
+    pub fn refresh_frames(&mut self) {
+        let Some(test) = self.test().cloned() else { return };
+        let snapshot = self.look.snapshot.min(test.set.snapshots().saturating_sub(1));
+        let actual = test.frame(&test.set.coordinates_mm, snapshot);
+        let decoupled = self.result().map(|result| test.frame(&result.decoupled_mm, snapshot));
+        self.frames = Frames {
+            decoupled: decoupled.map(|decoupled| {
+                let error = error_frame(&actual, &decoupled);
+                (decoupled, error)
+            }),
+            actual,
+        };
+        self.look.snapshot = snapshot;
+        self.look.node = self.look.node.filter(|&node| node < self.frames.actual.nodes_mm.len());
+    }
+
+    /// Where a file goes unless the user says otherwise.
+    pub fn suggested_path(&self, kind: ExportKind) -> PathBuf {
+        let settings = self.run.as_ref().map_or(&self.draft, |run| &run.settings);
+        std::env::current_dir()
+            .unwrap_or_default()
+            .join(kind.file_name(settings))
+    }
+}
+
+/// Decoupled − actual: z of the nodes and of the grid.
+fn error_frame(actual: &Frame, decoupled: &Frame) -> Frame {
+    let nodes = actual.nodes_mm.iter().zip(&decoupled.nodes_mm);
+    let grid = actual.grid_mm.iter().zip(&decoupled.grid_mm);
+    Frame {
+        nodes_mm: nodes
+            .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
+            .collect(),
+        grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
+    }
+}

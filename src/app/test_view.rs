@@ -1,0 +1,90 @@
+use std::sync::Arc;
+
+use glam::DVec3;
+use ndarray::Array2;
+use thiserror::Error;
+
+use crate::{
+    dataset::Dataset,
+    evaluation::{Run, RunError, RunSettings},
+    sensor::SensorModel,
+    surface::{SurfaceError, SurfaceMap},
+};
+
+/// A test set ready to be drawn: its samples, and the surface through the array's nodes.
+#[derive(Clone, Debug)]
+pub struct TestView {
+    /// The samples.
+    pub set: Arc<Dataset>,
+    /// Heights of nodes to heights of the drawn grid.
+    pub surface: Arc<SurfaceMap>,
+    /// The sensor they were drawn for.
+    pub sensor: SensorModel,
+    /// The distance a node can travel.
+    pub stroke_mm: f64,
+}
+
+impl TestView {
+    /// Draws the test set of `settings`.
+    ///
+    /// # Errors
+    /// An impossible sensor, scene, or number of samples.
+    pub fn draw(settings: &RunSettings) -> Result<Self, TestViewError> {
+        Ok(Self::of(settings, Arc::new(Run::test_set(settings)?))?)
+    }
+
+    /// Prepares the surface for a test set already drawn.
+    ///
+    /// # Errors
+    /// Nodes through which no surface can be laid.
+    pub fn of(settings: &RunSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
+        let sensor = settings.sensor;
+        let x_mm: Vec<f64> = (0..sensor.scale.rows())
+            .map(|row| sensor.geometry.row_x_mm(row))
+            .collect();
+        let nodes = 0..sensor.scale.nodes_per_row();
+        let y_mm: Vec<f64> = nodes
+            .map(|node| sensor.geometry.node_y_mm(sensor.scale, node))
+            .collect();
+        Ok(Self {
+            set,
+            surface: Arc::new(SurfaceMap::new(&x_mm, &y_mm)?),
+            sensor,
+            stroke_mm: settings.stroke_mm(),
+        })
+    }
+
+    /// z from full compression to rest, in millimetres: what the height scale spans.
+    pub fn z_range_mm(&self) -> std::ops::RangeInclusive<f64> {
+        let height_mm = self.sensor.geometry.height_mm;
+        height_mm - self.stroke_mm..=height_mm
+    }
+
+    /// Nodes of one snapshot and the surface through them, from coordinates of the shape of the set's.
+    pub fn frame(&self, coordinates_mm: &Array2<f64>, snapshot: usize) -> Frame {
+        let nodes_mm = self.set.snapshot_nodes_mm(coordinates_mm, snapshot);
+        let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
+        let grid_mm = self.surface.evaluate(&z_mm);
+        Frame { nodes_mm, grid_mm }
+    }
+}
+
+/// Why there is nothing to draw.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum TestViewError {
+    /// The samples cannot be drawn or trained on.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// No surface can be laid through the nodes.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+}
+
+/// One snapshot to be drawn.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// Position of each node, row by row.
+    pub nodes_mm: Vec<DVec3>,
+    /// Value at each grid point of the surface.
+    pub grid_mm: Vec<f64>,
+}

@@ -1,0 +1,66 @@
+//! The look of the window: tokens, colour maps, fonts, egui's visuals, and the few components egui lacks.
+//!
+//! Panels take colours, sizes and distances from here and write none of their own.
+
+mod colour_map;
+mod components;
+mod fonts;
+mod style;
+mod tokens;
+
+pub use colour_map::ColourMap;
+pub use components::{
+    card_frame, ghost_button, note_ui, placeholder_ui, primary_button, section_heading_ui, segmented_ui, slider_style,
+    tabs_ui,
+};
+pub use fonts::{font_definitions, semibold};
+pub use style::{apply, install};
+pub use tokens::{Palette, SPACE, TypeSizes, radius, space, type_size};
+
+use std::sync::OnceLock;
+
+/// Everything that depends on dark or light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Theme {
+    /// Light text on dark panels.
+    pub is_dark: bool,
+    /// Named colours.
+    pub palette: Palette,
+    /// Colours of heights: viridis.
+    pub heights: ColourMap,
+    /// Colours of errors: diverging, zero in the colour of the panel.
+    pub errors: ColourMap,
+}
+
+impl Theme {
+    /// The dark theme.
+    pub fn dark() -> &'static Self {
+        static DARK: OnceLock<Theme> = OnceLock::new();
+        DARK.get_or_init(|| Self::new(true))
+    }
+
+    /// The light theme.
+    pub fn light() -> &'static Self {
+        static LIGHT: OnceLock<Theme> = OnceLock::new();
+        LIGHT.get_or_init(|| Self::new(false))
+    }
+
+    /// The theme that `ui` is drawn in.
+    pub fn of(ui: &eframe::egui::Ui) -> &'static Self {
+        if ui.visuals().dark_mode {
+            Self::dark()
+        } else {
+            Self::light()
+        }
+    }
+
+    fn new(is_dark: bool) -> Self {
+        let palette = if is_dark { Palette::DARK } else { Palette::LIGHT };
+        Self {
+            is_dark,
+            palette,
+            heights: ColourMap::viridis(),
+            errors: ColourMap::diverging(&palette),
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! The one file with raw colours, sizes and distances.
+
+use eframe::egui::Color32;
+
+/// The named colours of a theme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Palette {
+    /// Behind the cards.
+    pub background: Color32,
+    /// Panels and cards.
+    pub panel: Color32,
+    /// Controls on a panel.
+    pub raised: Color32,
+    /// Controls under the pointer.
+    pub hovered: Color32,
+    /// Hairlines, axes, outlines.
+    pub line: Color32,
+    /// Text.
+    pub text: Color32,
+    /// Text of second rank: units, ticks, hints.
+    pub dim: Color32,
+    /// What is selected, the network's own result, the one primary button.
+    pub accent: Color32,
+    /// Text on the accent.
+    pub on_accent: Color32,
+    /// Behind a selected option: the accent, mixed into the raised colour.
+    pub selected: Color32,
+    /// Success.
+    pub good: Color32,
+    /// Something to weigh.
+    pub warning: Color32,
+    /// Behind a warning.
+    pub warning_tint: Color32,
+    /// Something failed.
+    pub bad: Color32,
+    /// Curve of the training set.
+    pub training_series: Color32,
+    /// Curve of the validation set.
+    pub validation_series: Color32,
+    /// Curve of the test set.
+    pub test_series: Color32,
+    /// The diverging map from most negative to most positive; its middle is the panel.
+    pub error_stops: [Color32; 5],
+}
+
+impl Palette {
+    /// Dark.
+    pub const DARK: Self = Self {
+        background: Color32::from_rgb(0x12, 0x14, 0x19),
+        panel: Color32::from_rgb(0x1b, 0x1e, 0x24),
+        raised: Color32::from_rgb(0x24, 0x29, 0x32),
+        hovered: Color32::from_rgb(0x2e, 0x35, 0x41),
+        line: Color32::from_rgb(0x2c, 0x32, 0x3c),
+        text: Color32::from_rgb(0xe7, 0xea, 0xf0),
+        dim: Color32::from_rgb(0x98, 0xa2, 0xb3),
+        accent: Color32::from_rgb(0x5b, 0x9d, 0xff),
+        on_accent: Color32::from_rgb(0x0b, 0x12, 0x20),
+        selected: Color32::from_rgb(0x2a, 0x3d, 0x5b),
+        good: Color32::from_rgb(0x4c, 0xc3, 0x8a),
+        warning: Color32::from_rgb(0xf0, 0xa8, 0x3c),
+        warning_tint: Color32::from_rgb(0x33, 0x2b, 0x22),
+        bad: Color32::from_rgb(0xf2, 0x6d, 0x6d),
+        training_series: Color32::from_rgb(0x5b, 0x9d, 0xff),
+        validation_series: Color32::from_rgb(0x4c, 0xc3, 0x8a),
+        test_series: Color32::from_rgb(0xf0, 0xa8, 0x3c),
+        error_stops: [
+            Color32::from_rgb(0x9a, 0xd8, 0xff),
+            Color32::from_rgb(0x2f, 0x7f, 0xd0),
+            Color32::from_rgb(0x1b, 0x1e, 0x24),
+            Color32::from_rgb(0xd0, 0x58, 0x2a),
+            Color32::from_rgb(0xff, 0xc0, 0x94),
+        ],
+    };
+
+    /// Light.
+    pub const LIGHT: Self = Self {
+        background: Color32::from_rgb(0xee, 0xf1, 0xf5),
+        panel: Color32::from_rgb(0xff, 0xff, 0xff),
+        raised: Color32::from_rgb(0xf3, 0xf5, 0xf8),
+        hovered: Color32::from_rgb(0xe6, 0xea, 0xf0),
+        line: Color32::from_rgb(0xdd, 0xe2, 0xea),
+        text: Color32::from_rgb(0x1b, 0x24, 0x30),
+        dim: Color32::from_rgb(0x5b, 0x64, 0x72),
+        accent: Color32::from_rgb(0x1f, 0x6f, 0xeb),
+        on_accent: Color32::from_rgb(0xff, 0xff, 0xff),
+        selected: Color32::from_rgb(0xd6, 0xe4, 0xfa),
+        good: Color32::from_rgb(0x1a, 0x7f, 0x4b),
+        warning: Color32::from_rgb(0xa8, 0x64, 0x00),
+        warning_tint: Color32::from_rgb(0xf7, 0xef, 0xe2),
+        bad: Color32::from_rgb(0xc6, 0x2f, 0x2f),
+        training_series: Color32::from_rgb(0x1f, 0x6f, 0xeb),
+        validation_series: Color32::from_rgb(0x1a, 0x7f, 0x4b),
+        test_series: Color32::from_rgb(0xa8, 0x64, 0x00),
+        error_stops: [
+            Color32::from_rgb(0x0b, 0x3d, 0x91),
+            Color32::from_rgb(0x5b, 0x9b, 0xe6),
+            Color32::from_rgb(0xff, 0xff, 0xff),
+            Color32::from_rgb(0xf0, 0x87, 0x5a),
+            Color32::from_rgb(0x9a, 0x2c, 0x06),
+        ],
+    };
+}
+
+/// Type sizes in points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TypeSizes {
+    /// Section heads in capitals, ticks.
+    pub small: f32,
+    /// Hints, table heads.
+    pub note: f32,
+    /// Everything else.
+    pub body: f32,
+    /// Titles of cards and windows.
+    pub title: f32,
+}
+
+/// The four type sizes of the window.
+pub const fn type_size() -> TypeSizes {
+    TypeSizes {
+        small: 11.0,
+        note: 12.0,
+        body: 13.0,
+        title: 14.0,
+    }
+}
+
+/// The unit of all distances, in points.
+pub const SPACE: f32 = 4.0;
+
+/// `steps` units of distance, in points.
+pub const fn space(steps: u8) -> f32 {
+    SPACE * steps as f32
+}
+
+/// Corner radius of cards and controls, in points.
+pub const fn radius() -> u8 {
+    6
+}

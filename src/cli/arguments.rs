@@ -1,0 +1,123 @@
+use std::{
+    error::Error,
+    ffi::OsString,
+    io::{Write, stderr},
+    ops::RangeInclusive,
+    process::ExitCode,
+};
+
+use clap::{Parser, Subcommand, error::ErrorKind};
+
+use super::{decode::Decode, failure::Failure, simulate::Simulate, train::Train};
+
+/// Opens the window and returns when it is closed.
+pub type Window = fn() -> Result<(), Box<dyn Error>>;
+
+/// Decouples flexible tactile sensor arrays with back-propagation networks.
+///
+/// Without a command it opens the window.
+#[derive(Parser)]
+#[command(name = "decoupler", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Train(Train),
+    Decode(Decode),
+    Simulate(Simulate),
+}
+
+/// Does what `arguments` (the program's name first) ask for. `window` is what a call without a command opens, in
+/// builds that have one.
+pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Option<Window>) -> ExitCode {
+    let done = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments.run(window),
+        // Help and version are no errors; a reader that has gone away needs neither.
+        Err(told) if matches!(told.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            told.print().map_err(Failure::Output)
+        }
+        Err(error) => Err(Failure::Arguments(one_line(&error))),
+    };
+    match done {
+        Err(failure) if !failure.is_broken_pipe() => {
+            // Nobody is left to tell if this fails.
+            let _ = writeln!(stderr(), "error: {failure}");
+            ExitCode::from(failure.status())
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+impl Arguments {
+    fn run(self, window: Option<Window>) -> Result<(), Failure> {
+        match self.command {
+            Some(Command::Train(train)) => train.run(),
+            Some(Command::Decode(decode)) => decode.run(),
+            Some(Command::Simulate(simulate)) => simulate.run(),
+            None => window.ok_or(Failure::NoWindow)?().map_err(Failure::Window),
+        }
+    }
+}
+
+/// What the parser says, without its usage text.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let paragraphs = text.split("\n\n").map(|paragraph| {
+        let lines: Vec<_> = paragraph.lines().map(str::trim).collect();
+        lines.join(" ")
+    });
+    let said = paragraphs.filter(|paragraph| {
+        let aside = ["Usage:", "For more information"];
+        !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
+    });
+    let line = said.collect::<Vec<_>>().join("; ");
+    line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+}
+
+/// A parser of counts in `allowed`.
+pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| {
+        let count = text.parse().ok().filter(|count| allowed.contains(count));
+        count.ok_or_else(|| format!("give a whole number from {} to {}", allowed.start(), allowed.end()))
+    }
+}
+
+/// A parser of seeds.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_commands_are_declared_without_contradiction() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn whatever_is_wrong_takes_one_line() {
+        let cases = [
+            ("train --hiden 3", "unexpected argument '--hiden' found"),
+            ("train --hidden 0", "'0' for '--hidden"),
+            ("train --array 10x6", "10x10_5x30"),
+            ("train --method sgd", "lm, gdm"),
+            ("train extra", "unexpected argument 'extra'"),
+            ("decode --network n", "--input <FILE> --output <FILE>"),
+            ("trian", "unrecognized subcommand 'trian'"),
+            ("train --seed", "a value is required"),
+        ];
+        for (arguments, expected) in cases {
+            let arguments = std::iter::once("decoupler").chain(arguments.split(' '));
+            let line = one_line(&Arguments::try_parse_from(arguments).err().unwrap());
+            assert!(line.contains(expected), "{line}");
+            assert!(!line.contains('\n') && !line.contains("Usage"), "{line}");
+        }
+    }
+}

@@ -1,0 +1,269 @@
+use std::io::{self, BufRead};
+
+use csv::{ByteRecord, ReaderBuilder};
+use ndarray::Array2;
+use thiserror::Error;
+
+/// Reads resistances from CSV, block by block, so that large files need little memory.
+///
+/// The file has columns named `r_1` to `r_M4`, in any order and among others, or M4 columns without names.
+pub struct ResistanceReader<R> {
+    rows: Rows<R>,
+    /// Position in the file of each resistance, in the order r_1 to r_M4.
+    columns: Vec<usize>,
+    /// Columns of the file.
+    width: usize,
+    /// Whether the row at hand was read while looking for names.
+    waiting: bool,
+}
+
+/// The rows of a CSV file with their lines. The reader of `csv` would miscount where lines are empty, so it is given
+/// one line at a time.
+struct Rows<R> {
+    source: R,
+    text: Vec<u8>,
+    /// Line of the row at hand, from 1.
+    line: u64,
+    /// The row at hand.
+    record: ByteRecord,
+}
+
+/// Some rows of resistances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Resistances in ohm: rows × M4.
+    pub resistances_ohm: Array2<f64>,
+    /// Line of the file of each row, from 1.
+    pub lines: Vec<u64>,
+}
+
+/// What is wrong with a file of resistances. Lines and columns are counted from 1.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// Nothing to read.
+    #[error("there are no rows of resistances in it")]
+    Empty,
+    /// A column is missing.
+    #[error("there is no column r_{0}; name the columns r_1 to r_{1}, or give {1} columns without names")]
+    Missing(usize, usize),
+    /// A name occurs twice.
+    #[error("there are two columns r_{0}; keep one")]
+    Twice(usize),
+    /// A row is too short or too long.
+    #[error("line {line}: {found} columns where {expected} are needed, separated by commas")]
+    Width {
+        /// Line.
+        line: u64,
+        /// Columns found.
+        found: usize,
+        /// Columns needed.
+        expected: usize,
+    },
+    /// A field is not a resistance.
+    #[error("line {line}, column {column}: '{text}' is not a resistance; give a finite number of ohm above 0")]
+    Value {
+        /// Line.
+        line: u64,
+        /// Column.
+        column: usize,
+        /// What stands there.
+        text: String,
+    },
+    /// A line break that ends no row: within quotes, or a carriage return alone.
+    #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
+    LineBreak(u64),
+    /// The file cannot be read on.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+impl<R: BufRead> Rows<R> {
+    /// Goes to the next row that is not blank; false at the end.
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        loop {
+            self.text.clear();
+            if self.source.read_until(b'\n', &mut self.text)? == 0 {
+                return Ok(false);
+            }
+            self.line += 1;
+            let byte_order_mark: &[u8] = if self.line == 1 { b"\xef\xbb\xbf" } else { b"" };
+            let text = self
+                .text
+                .strip_prefix(byte_order_mark)
+                .unwrap_or(&self.text)
+                .trim_ascii();
+            if text.is_empty() {
+                continue;
+            }
+            if text.contains(&b'\r') {
+                return Err(ReadError::LineBreak(self.line));
+            }
+            let mut row = ReaderBuilder::new();
+            let mut row = row.has_headers(false).buffer_capacity(text.len()).from_reader(text);
+            row.read_byte_record(&mut self.record).map_err(io::Error::from)?;
+            self.record.trim();
+            return Ok(true);
+        }
+    }
+}
+
+impl<R: BufRead> ResistanceReader<R> {
+    /// Begins reading; `channels` is M4.
+    ///
+    /// # Errors
+    /// The columns are not as they must be.
+    pub fn new(source: R, channels: usize) -> Result<Self, ReadError> {
+        let mut rows = Rows {
+            source,
+            text: Vec::new(),
+            line: 0,
+            record: ByteRecord::new(),
+        };
+        if !rows.advance()? {
+            return Err(ReadError::Empty);
+        }
+        let record = &rows.record;
+        let names: Vec<Option<usize>> = record.iter().map(|name| channel_of(name, channels)).collect();
+        let has_names = names.iter().any(Option::is_some) || record.iter().all(|field| number(field).is_none());
+        let width = record.len();
+        let columns = if has_names {
+            named_columns(&names, channels)?
+        } else {
+            (0..channels).collect()
+        };
+        Ok(Self {
+            rows,
+            columns,
+            width: if has_names { width } else { channels },
+            waiting: !has_names,
+        })
+    }
+
+    /// The next rows, at most `most` of them; `None` at the end.
+    ///
+    /// # Errors
+    /// A row that is not as it must be.
+    pub fn read(&mut self, most: usize) -> Result<Option<Reading>, ReadError> {
+        let mut resistances_ohm = Vec::with_capacity(most * self.columns.len());
+        let mut lines = Vec::new();
+        while lines.len() < most && (self.waiting || self.rows.advance()?) {
+            self.waiting = false;
+            lines.push(self.parse(&mut resistances_ohm)?);
+        }
+        if lines.is_empty() {
+            return Ok(None);
+        }
+        let shape = (lines.len(), self.columns.len());
+        let resistances_ohm = Array2::from_shape_vec(shape, resistances_ohm).expect("every row has M4 values");
+        Ok(Some(Reading { resistances_ohm, lines }))
+    }
+
+    /// Appends the resistances of the row at hand; returns its line.
+    fn parse(&self, resistances_ohm: &mut Vec<f64>) -> Result<u64, ReadError> {
+        let Rows { line, ref record, .. } = self.rows;
+        let (found, expected) = (record.len(), self.width);
+        if found != expected {
+            return Err(ReadError::Width { line, found, expected });
+        }
+        for &column in &self.columns {
+            let field = &record[column];
+            let value = number(field).filter(|ohm| *ohm > 0.0 && ohm.is_finite());
+            resistances_ohm.push(value.ok_or_else(|| ReadError::Value {
+                line,
+                column: column + 1,
+                text: String::from_utf8_lossy(field).chars().take(40).collect(),
+            })?);
+        }
+        Ok(line)
+    }
+}
+
+fn number(field: &[u8]) -> Option<f64> {
+    std::str::from_utf8(field).ok()?.trim().parse().ok()
+}
+
+/// k of a column named `r_k`, k from 1 to `channels`.
+fn channel_of(name: &[u8], channels: usize) -> Option<usize> {
+    let number = std::str::from_utf8(name).ok()?.strip_prefix("r_")?;
+    number.parse().ok().filter(|channel| (1..=channels).contains(channel))
+}
+
+fn named_columns(names: &[Option<usize>], channels: usize) -> Result<Vec<usize>, ReadError> {
+    let column = |channel| {
+        let mut places = (0..names.len()).filter(|&place| names[place] == Some(channel));
+        let place = places.next().ok_or(ReadError::Missing(channel, channels))?;
+        match places.next() {
+            Some(_) => Err(ReadError::Twice(channel)),
+            None => Ok(place),
+        }
+    };
+    (1..=channels).map(column).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    fn read(text: &str) -> Result<Reading, ReadError> {
+        ResistanceReader::new(text.as_bytes(), 2)?
+            .read(100)?
+            .ok_or(ReadError::Empty)
+    }
+
+    #[test]
+    fn columns_are_found_by_name_or_by_order() {
+        for text in [
+            "1.5,2\n3,4e0\n",
+            " 1.5 , 2\r\n3,4",
+            "r_2,note,r_1\n2,\"a, b\",1.5\n4,,3\n",
+            "\u{feff}r_1,r_2\n1.5,2\n\n3,4\n",
+            "\u{feff}1.5,2\n3,4\n",
+        ] {
+            assert_eq!(
+                read(text).unwrap().resistances_ohm,
+                array![[1.5, 2.0], [3.0, 4.0]],
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn blocks_follow_each_other_without_gaps() {
+        let text: String = (1..=7).map(|k| format!("{k},{k}.5\n")).collect();
+        let mut reader = ResistanceReader::new(text.as_bytes(), 2).unwrap();
+        let mut read = Vec::new();
+        while let Some(block) = reader.read(3).unwrap() {
+            read.extend(block.lines);
+        }
+        assert_eq!(read, [1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_found_at_its_place() {
+        let cases = [
+            ("nothing", "", "no rows"),
+            ("names only", "r_1,r_2\n", "no rows"),
+            ("a channel too few", "r_1,b\n1,2\n", "no column r_2"),
+            ("other names", "a,b\n1,2\n", "no column r_1"),
+            ("a channel twice", "r_1,r_2,r_2\n", "two columns r_2"),
+            ("a short row", "r_1,r_2\n1,2\n3\n", "line 3: 1 columns where 2"),
+            ("too many columns", "1,2,3\n", "line 1: 3 columns where 2"),
+            ("semicolons", "r_1;r_2\n1;2\n", "no column r_1"),
+            ("a word", "1,2\n3,many\n", "line 2, column 2: 'many'"),
+            ("a word in the first row", "1,many\n", "line 1, column 2: 'many'"),
+            ("NaN", "r_1,r_2\nNaN,1\n", "line 2, column 1: 'NaN'"),
+            ("infinity", "1,inf\n", "column 2: 'inf'"),
+            ("overflow", "1,1e999\n", "column 2: '1e999'"),
+            ("negative", "1,-2\n", "column 2: '-2'"),
+            ("zero", "0,2\n", "column 1: '0'"),
+            ("empty", "r_1,r_2\n\n\n1,\n", "line 4, column 2: ''"),
+            ("old line ends", "1,2\r3,4\r", "line 1: there is a line break"),
+            ("not text", "1,\u{0}\n", "column 2"),
+        ];
+        for (sentence, text, expected) in cases {
+            let message = read(text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{sentence}: {message}");
+        }
+    }
+}

@@ -1,0 +1,287 @@
+use std::{
+    fs::{self, File, Permissions},
+    io::{self, BufWriter, ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+use tempfile::NamedTempFile;
+use thiserror::Error;
+
+/// Why a file cannot be written.
+#[derive(Debug, Error)]
+pub enum WriteError {
+    /// Its folder is missing.
+    #[error("cannot write '{}': the folder '{}' does not exist; make it first", .path.display(), .folder.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// A folder stands in its place.
+    #[error("cannot write '{}': it is a folder; give the name of a file", .0.display())]
+    Folder(PathBuf),
+    /// The file there is write-protected.
+    #[error("cannot write '{}': it is read-only; give another name", .0.display())]
+    ReadOnly(PathBuf),
+    /// The system refuses.
+    #[error("cannot write '{}': {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl WriteError {
+    /// The system's refusal to write `path`.
+    pub fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// A file in the making: it is written beside its target and takes the target's place in one step, so that nobody
+/// ever sees half of it. Dropped before [`Self::commit`], it leaves nothing.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    writer: BufWriter<Sink>,
+}
+
+#[derive(Debug)]
+enum Sink {
+    /// Becomes the file at this target.
+    Beside(NamedTempFile, PathBuf),
+    /// A pipe or device, which nothing can replace.
+    Through(File),
+}
+
+/// Where a path leads.
+enum Place {
+    /// A file, new or old, in an existing folder.
+    File {
+        target: PathBuf,
+        folder: PathBuf,
+        permissions: Option<Permissions>,
+    },
+    /// A pipe or device.
+    Special,
+}
+
+impl Place {
+    fn of(path: &Path) -> Result<Self, WriteError> {
+        let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
+        if is_folder || path.is_dir() {
+            return Err(WriteError::Folder(path.to_owned()));
+        }
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let folder = parent.unwrap_or(Path::new(".")).to_owned();
+        if !folder.is_dir() {
+            let path = path.to_owned();
+            return Err(WriteError::NoFolder { path, folder });
+        }
+        let error = |source| WriteError::io(path, source);
+        match fs::metadata(path) {
+            Ok(old) if !old.is_file() => Ok(Self::Special),
+            Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
+            Ok(old) => {
+                // What a link points to is replaced, not the link.
+                let target = fs::canonicalize(path).map_err(error)?;
+                let folder = target.parent().unwrap_or(&folder).to_owned();
+                let permissions = Some(old.permissions());
+                Ok(Self::File {
+                    target,
+                    folder,
+                    permissions,
+                })
+            }
+            Err(missing) if missing.kind() == ErrorKind::NotFound => Ok(Self::File {
+                target: path.to_owned(),
+                folder,
+                permissions: None,
+            }),
+            Err(source) => Err(error(source)),
+        }
+    }
+}
+
+impl AtomicFile {
+    /// Begins the file at `path`, whose folder must exist.
+    ///
+    /// # Errors
+    /// The path is not one that can be written.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        let error = |source| WriteError::io(path, source);
+        let sink = match Place::of(path)? {
+            Place::Special => Sink::Through(File::options().write(true).open(path).map_err(error)?),
+            Place::File {
+                target,
+                folder,
+                permissions,
+            } => {
+                let file = open_beside(&folder).map_err(error)?;
+                if let Some(permissions) = permissions {
+                    file.as_file().set_permissions(permissions).map_err(error)?;
+                }
+                Sink::Beside(file, target)
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            writer: BufWriter::new(sink),
+        })
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// What the system said; the old file, if there was one, is untouched then.
+    pub fn commit(self) -> Result<(), WriteError> {
+        let error = |source| WriteError::io(&self.path, source);
+        match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
+            Sink::Through(_) => Ok(()),
+            Sink::Beside(file, target) => {
+                file.as_file().sync_all().map_err(error)?;
+                file.persist(target).map_err(|e| error(e.error))?;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// A nameless-looking file in `folder` with the permissions of any new file: what the umask leaves of 0666.
+fn open_beside(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".decoupler-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(Permissions::from_mode(0o666));
+    }
+    // The default error repeats the temporary name, which means nothing to the user.
+    let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+    builder.tempfile_in(folder).map_err(plain)
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Beside(file, _) => file.write(bytes),
+            Self::Through(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Beside(file, _) => file.flush(),
+            Self::Through(file) => file.flush(),
+        }
+    }
+}
+
+/// Writes the file at `path` whole or not at all.
+///
+/// # Errors
+/// The path is not one that can be written, or `write` failed.
+pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+    let mut file = AtomicFile::create(path)?;
+    write(&mut file).map_err(|source| WriteError::io(path, source))?;
+    file.commit()
+}
+
+/// Finds out whether `path` can be written, before the work whose result goes there. Leaves no trace.
+///
+/// # Errors
+/// It cannot.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    match Place::of(path)? {
+        // Opening and closing a pipe would tell its reader that nothing comes.
+        Place::Special => Ok(()),
+        Place::File { .. } => AtomicFile::create(path).map(drop),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.csv");
+        atomic_write(&path, |writer| writer.write_all(b"old")).unwrap();
+        let failed = atomic_write(&path, |writer| {
+            writer.write_all(b"new")?;
+            Err(io::Error::other("the disk is full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("kept.csv': the disk is full"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["kept.csv"]);
+        check_writable(&folder.path().join("other.csv")).unwrap();
+        assert_eq!(names(folder.path()), ["kept.csv"]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_before_any_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let read_only = folder.path().join("fixed.csv");
+        fs::write(&read_only, "old").unwrap();
+        let mut permissions = fs::metadata(&read_only).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&read_only, permissions).unwrap();
+        let cases = [
+            ("a missing folder", folder.path().join("none/file"), "does not exist"),
+            ("a folder", folder.path().to_owned(), "it is a folder"),
+            ("a folder to be", folder.path().join("new/"), "it is a folder"),
+            ("a read-only file", read_only.clone(), "read-only"),
+            ("a file as folder", read_only.join("file"), "does not exist"),
+            ("too long a name", folder.path().join("x".repeat(300)), "too long"),
+        ];
+        for (sentence, path, expected) in cases {
+            let message = check_writable(&path).unwrap_err().to_string();
+            assert!(message.contains(expected), "{sentence}: {message}");
+            assert!(atomic_write(&path, |_| Ok(())).is_err(), "{sentence}");
+        }
+        assert_eq!(names(folder.path()), ["fixed.csv"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_it_and_links_and_permissions_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [path, ordinary, link] = ["file", "ordinary", "link"].map(|name| folder.path().join(name));
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        fs::write(&ordinary, "").unwrap();
+        atomic_write(&path, |_| Ok(())).unwrap();
+        assert_eq!(mode(&path), mode(&ordinary));
+        fs::set_permissions(&path, Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        atomic_write(&link, |writer| writer.write_all(b"through")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"through");
+        assert_eq!(mode(&path), 0o640);
+        atomic_write(Path::new("/dev/null"), |writer| writer.write_all(b"gone")).unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+}

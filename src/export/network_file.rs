@@ -1,0 +1,294 @@
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::error::Category;
+use thiserror::Error;
+
+use super::{WriteError, atomic_write, epoch_columns::History, soundness::flaw};
+use crate::{
+    evaluation::{Baselines, Errors, Run, RunSettings},
+    network::DecouplingNetwork,
+    training::{EpochRecord, StopReason},
+};
+
+const FORMAT: &str = "decoupler network";
+const VERSION: u64 = 1;
+const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+
+/// A network with all that is known of it: what was asked for, how the training went, and what the network is worth.
+/// Its file is JSON; reading it gives a network that answers with the same bits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetworkFile {
+    /// Program and version that wrote it.
+    pub program: String,
+    /// What was asked for: sensor, scene, samples, method, stopping, seed.
+    pub settings: RunSettings,
+    /// The best network of the training.
+    pub network: DecouplingNetwork,
+    /// How the training went.
+    pub training: TrainingRecord,
+    /// What the network is worth on the test set.
+    pub errors: Errors,
+    /// What stands beside it.
+    pub baselines: Baselines,
+}
+
+/// How a training went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainingRecord {
+    /// Why it ended; `None` while it runs.
+    pub stop_reason: Option<StopReason>,
+    /// The epoch of the best network.
+    pub best_epoch: usize,
+    /// Seconds spent in training.
+    pub seconds: f64,
+    /// Every epoch, the start first.
+    pub history: Vec<EpochRecord>,
+}
+
+/// Why a network file cannot be read or written.
+#[derive(Debug, Error)]
+pub enum NetworkFileError {
+    /// The system refuses to read it.
+    #[error("cannot read '{}': {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Not JSON.
+    #[error("'{}' is not a network file: {reason}; choose one that Decoupler saved", .path.display())]
+    NotJson {
+        /// The file.
+        path: PathBuf,
+        /// What JSON cannot be, with line and column.
+        reason: String,
+    },
+    /// JSON that ends too early.
+    #[error("'{}' is cut off at line {line}, column {column}; copy or save it again", .path.display())]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+        /// Line of the end, from 1.
+        line: usize,
+        /// Column of the end, from 1.
+        column: usize,
+    },
+    /// JSON of another kind.
+    #[error("'{}' is not a network file: it has no field \"format\": \"{FORMAT}\"; choose one that Decoupler saved", .path.display())]
+    NotOurs {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Written in a format unknown to this version.
+    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads version {VERSION}: install a newer one", .path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: String,
+        /// What wrote it.
+        program: String,
+    },
+    /// A field that is missing, of the wrong kind, or does not fit the others.
+    #[error("'{}' is damaged: {flaw}; copy or save it again", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the field or with line and column.
+        flaw: String,
+    },
+    /// A network that could not be read back.
+    #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
+    Unsound {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the field.
+        flaw: String,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What tells whether a file is ours, read before the rest, which other versions may write otherwise.
+#[derive(Deserialize)]
+struct Heading {
+    format: serde_json::Value,
+    #[serde(default)]
+    version: serde_json::Value,
+    #[serde(default)]
+    program: serde_json::Value,
+}
+
+/// The file as it stands.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    format: String,
+    version: u64,
+    program: String,
+    settings: RunSettings,
+    network: DecouplingNetwork,
+    training: TrainingDocument,
+    errors: Errors,
+    baselines: Baselines,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TrainingDocument {
+    stop_reason: Option<StopReason>,
+    best_epoch: usize,
+    epochs: usize,
+    seconds: f64,
+    history: History,
+}
+
+impl NetworkFile {
+    /// The best network of `run` so far, and what is known of it.
+    pub fn from_run(run: &Run) -> Self {
+        let trainer = run.trainer();
+        Self {
+            program: PROGRAM.to_owned(),
+            settings: *run.settings(),
+            network: run.network(),
+            training: TrainingRecord {
+                stop_reason: trainer.stop_reason(),
+                best_epoch: trainer.best_epoch(),
+                seconds: trainer.elapsed().as_secs_f64(),
+                history: trainer.history().to_vec(),
+            },
+            errors: run.decouple_test().1,
+            baselines: *run.baselines(),
+        }
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// A network that is not sound, or a path that cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), NetworkFileError> {
+        if let Some(flaw) = flaw(self) {
+            let path = path.to_owned();
+            return Err(NetworkFileError::Unsound { path, flaw });
+        }
+        let document = self.document();
+        atomic_write(path, |writer| {
+            serde_json::to_writer(&mut *writer, &document)?;
+            writeln!(writer)
+        })?;
+        Ok(())
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// What is wrong with it, and where.
+    pub fn load(path: &Path) -> Result<Self, NetworkFileError> {
+        let bytes = fs::read(path).map_err(|source| NetworkFileError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(path, &bytes)
+    }
+
+    fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
+        let path = || path.to_owned();
+        let heading: Heading = serde_json::from_slice(bytes).map_err(|error| not_ours(path(), bytes, &error))?;
+        if heading.format != FORMAT {
+            return Err(NetworkFileError::NotOurs { path: path() });
+        }
+        if heading.version.as_u64().is_some_and(|version| version > VERSION) {
+            return Err(NetworkFileError::Version {
+                path: path(),
+                version: heading.version.to_string(),
+                program: heading.program.as_str().unwrap_or("another program").to_owned(),
+            });
+        }
+        let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
+        let document: Document = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
+        if document.version != VERSION {
+            return Err(damaged(format!("version: there is no version {}", document.version)));
+        }
+        let epochs = document.training.epochs;
+        let file = Self::of(document);
+        let last = file.training.history.last().map_or(0, |record| record.epoch);
+        if epochs != last {
+            let flaw = format!("training.epochs: it is {epochs}, but the history ends with epoch {last}");
+            return Err(damaged(flaw));
+        }
+        match flaw(&file) {
+            Some(flaw) => Err(damaged(flaw)),
+            None => Ok(file),
+        }
+    }
+
+    fn document(&self) -> Document {
+        let Self {
+            program,
+            settings,
+            network,
+            training,
+            errors,
+            baselines,
+        } = self.clone();
+        Document {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            program,
+            settings,
+            network,
+            training: TrainingDocument {
+                stop_reason: training.stop_reason,
+                best_epoch: training.best_epoch,
+                epochs: training.history.last().map_or(0, |record| record.epoch),
+                seconds: training.seconds,
+                history: History(training.history),
+            },
+            errors,
+            baselines,
+        }
+    }
+
+    fn of(document: Document) -> Self {
+        let training = document.training;
+        Self {
+            program: document.program,
+            settings: document.settings,
+            network: document.network,
+            training: TrainingRecord {
+                stop_reason: training.stop_reason,
+                best_epoch: training.best_epoch,
+                seconds: training.seconds,
+                history: training.history.0,
+            },
+            errors: document.errors,
+            baselines: document.baselines,
+        }
+    }
+}
+
+/// Why a file has no heading of ours.
+fn not_ours(path: PathBuf, bytes: &[u8], error: &serde_json::Error) -> NetworkFileError {
+    match error.classify() {
+        _ if bytes.trim_ascii().is_empty() => NetworkFileError::NotJson {
+            path,
+            reason: "it is empty".to_owned(),
+        },
+        Category::Eof => NetworkFileError::CutOff {
+            path,
+            line: error.line(),
+            column: error.column(),
+        },
+        Category::Data => NetworkFileError::NotOurs { path },
+        Category::Syntax | Category::Io => NetworkFileError::NotJson {
+            path,
+            reason: format!("{error}"),
+        },
+    }
+}

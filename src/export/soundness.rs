@@ -1,0 +1,92 @@
+use super::NetworkFile;
+use crate::{
+    evaluation::{Baselines, Errors},
+    network::DecouplingNetwork,
+    sensor::ArrayScale,
+};
+
+/// What is wrong with the parts of a network file, and where. The same is asked before writing and after reading, so
+/// that what was written can be read.
+pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
+    let NetworkFile {
+        program: _,
+        settings,
+        network,
+        training,
+        errors,
+        baselines: Baselines { mean, linear },
+    } = file;
+    let at = |field: &str, flaw: String| format!("{field}: {flaw}");
+    let checks = [
+        settings.check_counts().map_err(|flaw| at("settings", flaw.to_string())),
+        settings
+            .sensor
+            .check()
+            .map_err(|flaw| at("settings.sensor", flaw.to_string())),
+        settings
+            .scene
+            .check()
+            .map_err(|flaw| at("settings.scene", flaw.to_string())),
+        settings
+            .training
+            .check()
+            .map_err(|flaw| at("settings.training", flaw.to_string())),
+    ];
+    let weight = network.mlp().weights().iter().position(|weight| !weight.is_finite());
+    let last_epoch = training.history.last().map(|record| record.epoch);
+    let flaws = [
+        weight.map(|index| format!("network: weight {index} is not a finite number")),
+        mismatch(network, settings.sensor.scale, settings.hidden),
+        last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
+        last_epoch
+            .filter(|&last| training.best_epoch > last)
+            .map(|last| format!("training.best_epoch: {} is after the last, {last}", training.best_epoch)),
+        (!(training.seconds >= 0.0 && training.seconds.is_finite()))
+            .then(|| format!("training.seconds: {} is not a time", training.seconds)),
+        unmeasured("errors", errors),
+        unmeasured("baselines.mean", mean),
+        unmeasured("baselines.linear", linear),
+    ];
+    let unchecked = checks.into_iter().find_map(Result::err);
+    unchecked.or_else(|| flaws.into_iter().flatten().next())
+}
+
+fn mismatch(network: &DecouplingNetwork, scale: ArrayScale, hidden: usize) -> Option<String> {
+    let sizes = [
+        ("reads", network.inputs().channels(), scale.columns(), "resistances"),
+        (
+            "gives",
+            network.outputs().channels(),
+            scale.coordinates_per_row(),
+            "coordinates",
+        ),
+        ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
+    ];
+    let (verb, found, expected, what) = sizes.into_iter().find(|(_, found, expected, _)| found != expected)?;
+    Some(format!(
+        "network: it {verb} {found} {what}, but array {scale} with {hidden} hidden nodes needs {expected}"
+    ))
+}
+
+fn unmeasured(place: &str, errors: &Errors) -> Option<String> {
+    let Errors {
+        z_percent,
+        x_percent,
+        y_percent,
+        z_mm,
+        z_full_scale_percent,
+        worst_mm,
+        worst_node: _,
+    } = *errors;
+    let figures = [
+        ("z_percent", z_percent),
+        ("x_percent", x_percent),
+        ("y_percent", y_percent),
+        ("z_mm", Some(z_mm)),
+        ("z_full_scale_percent", Some(z_full_scale_percent)),
+        ("worst_mm", Some(worst_mm)),
+    ];
+    let infinite = |(_, figure): &(_, Option<f64>)| figure.is_some_and(|figure| !figure.is_finite());
+    let (name, _) = figures.into_iter().find(infinite)?;
+    Some(format!("{place}.{name}: it is not a finite number"))
+}

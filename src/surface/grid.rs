@@ -1,0 +1,160 @@
+//! The points at which a surface is evaluated.
+
+use std::ops::RangeInclusive;
+
+use super::error::{Axis, SurfaceError};
+
+/// A rectangular grid that passes through the nodes and reaches half a pitch beyond them.
+///
+/// Values on it are `x points × y points`, x-major: point `(ix, iy)` has the index `ix · y_mm().len() + iy`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    x: GridAxis,
+    y: GridAxis,
+}
+
+impl Grid {
+    pub(super) fn new(x: GridAxis, y: GridAxis) -> Self {
+        Self { x, y }
+    }
+
+    /// Coordinates along x in millimetres, ascending.
+    pub fn x_mm(&self) -> &[f64] {
+        &self.x.points_mm
+    }
+
+    /// Coordinates along y in millimetres, ascending.
+    pub fn y_mm(&self) -> &[f64] {
+        &self.y.points_mm
+    }
+
+    /// How many points there are in all.
+    pub fn len(&self) -> usize {
+        self.x.points_mm.len() * self.y.points_mm.len()
+    }
+
+    /// Never true: a grid has at least three points a side.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Position of point `(ix, iy)` in an array of values on the grid.
+    pub fn index(&self, ix: usize, iy: usize) -> usize {
+        ix * self.y.points_mm.len() + iy
+    }
+
+    /// Indices along x which lie within the nodes' bounding rectangle.
+    pub fn inside_x(&self) -> RangeInclusive<usize> {
+        self.x.first_inside..=self.x.last_inside
+    }
+
+    /// Indices along y which lie within the nodes' bounding rectangle.
+    pub fn inside_y(&self) -> RangeInclusive<usize> {
+        self.y.first_inside..=self.y.last_inside
+    }
+
+    /// Whether a point lies within the nodes' bounding rectangle. Outside, the surface is extrapolated. A single row
+    /// or column has no extent; the strip that stands for it counts as inside.
+    pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
+        self.inside_x().contains(&ix) && self.inside_y().contains(&iy)
+    }
+}
+
+/// One axis of a [`Grid`].
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct GridAxis {
+    pub(super) points_mm: Vec<f64>,
+    first_inside: usize,
+    last_inside: usize,
+}
+
+impl GridAxis {
+    /// Divides every interval of the ascending `nodes_mm` into about as many steps as make `target` points in all.
+    ///
+    /// `lone_margin_mm` is how far the grid reaches around a single coordinate, which has no pitch of its own.
+    pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
+        // Very long axes are thinned: more lines than pixels show nothing.
+        let stride = nodes_mm.len().div_ceil(target.max(2));
+        let last = nodes_mm.len() - 1;
+        let mut kept_mm: Vec<f64> = nodes_mm.iter().copied().step_by(stride).collect();
+        if !last.is_multiple_of(stride) {
+            kept_mm.push(nodes_mm[last]);
+        }
+        let intervals = kept_mm.len() - 1;
+        let steps = (target.saturating_sub(1) / (intervals + 1)).max(1);
+        let margin_steps = if intervals == 0 { 8 } else { steps.div_ceil(2) };
+
+        let (before_mm, after_mm) = match kept_mm[..] {
+            [first, second, ..] if stride == 1 => (0.5 * (second - first), 0.5 * (nodes_mm[last] - nodes_mm[last - 1])),
+            [_, _, ..] => (
+                0.5 * (nodes_mm[1] - nodes_mm[0]),
+                0.5 * (nodes_mm[last] - nodes_mm[last - 1]),
+            ),
+            _ => (lone_margin_mm, lone_margin_mm),
+        };
+        let along = |from: f64, to: f64, step: usize, steps: usize| from + (to - from) * step as f64 / steps as f64;
+        let (first_mm, last_mm) = (nodes_mm[0], nodes_mm[last]);
+        let mut points_mm: Vec<f64> = (0..margin_steps)
+            .map(|step| along(first_mm - before_mm, first_mm, step, margin_steps))
+            .collect();
+        for pair in kept_mm.windows(2) {
+            points_mm.extend((0..steps).map(|step| along(pair[0], pair[1], step, steps)));
+        }
+        let last_inside = points_mm.len();
+        points_mm.push(last_mm);
+        points_mm.extend((1..=margin_steps).map(|step| along(last_mm, last_mm + after_mm, step, margin_steps)));
+        if intervals == 0 {
+            return Self {
+                first_inside: 0,
+                last_inside: points_mm.len() - 1,
+                points_mm,
+            };
+        }
+        Self {
+            points_mm,
+            first_inside: margin_steps,
+            last_inside,
+        }
+    }
+}
+
+/// Coordinates in ascending order, and the place each had in the order given.
+#[derive(Clone, Debug)]
+pub(super) struct SortedAxis {
+    pub(super) nodes_mm: Vec<f64>,
+    pub(super) order: Vec<usize>,
+}
+
+impl SortedAxis {
+    pub(super) fn new(axis: Axis, given_mm: &[f64]) -> Result<Self, SurfaceError> {
+        if given_mm.is_empty() {
+            return Err(SurfaceError::NoNodes { axis });
+        }
+        if let Some(index) = given_mm.iter().position(|value| !value.is_finite()) {
+            return Err(SurfaceError::NotFinite {
+                axis,
+                index,
+                value_mm: given_mm[index],
+            });
+        }
+        let mut order: Vec<usize> = (0..given_mm.len()).collect();
+        order.sort_by(|&a, &b| given_mm[a].total_cmp(&given_mm[b]));
+        let nodes_mm: Vec<f64> = order.iter().map(|&index| given_mm[index]).collect();
+        // Closer than this, the two heights could not be told apart in double precision.
+        let closest_mm = 1e-9 * nodes_mm.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        if let Some(at) = nodes_mm.windows(2).position(|pair| pair[1] - pair[0] <= closest_mm) {
+            return Err(SurfaceError::Duplicate {
+                axis,
+                first: order[at].min(order[at + 1]),
+                second: order[at].max(order[at + 1]),
+                value_mm: nodes_mm[at],
+            });
+        }
+        Ok(Self { nodes_mm, order })
+    }
+
+    /// The smallest distance between neighbours, if there are two.
+    pub(super) fn pitch_mm(&self) -> Option<f64> {
+        self.nodes_mm.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)
+    }
+}
