@@ -66,6 +66,8 @@ impl Activations {
 #[derive(Debug)]
 pub(super) struct KeptActivations {
     blocks: Vec<Activations>,
+    /// Whether there is room for one block only, of several.
+    made_anew: bool,
     /// The weights evaluated last; empty before the first.
     weights: Vec<f64>,
     squares: f64,
@@ -74,13 +76,11 @@ pub(super) struct KeptActivations {
 impl KeptActivations {
     pub(super) fn new(shape: Shape, examples: &Examples) -> Self {
         let bytes = examples.samples() * (shape.hidden + 1 + shape.outputs) * size_of::<f64>();
-        let blocks = if bytes > LARGEST_KEPT_BYTES {
-            1
-        } else {
-            examples.blocks().len()
-        };
+        let made_anew = bytes > LARGEST_KEPT_BYTES;
+        let blocks = if made_anew { 1 } else { examples.blocks().len() };
         Self {
             blocks: vec![Activations::new(shape); blocks],
+            made_anew,
             weights: Vec::new(),
             squares: 0.0,
         }
@@ -90,7 +90,7 @@ impl KeptActivations {
     pub(super) fn evaluate(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         if self.weights != mlp.weights() {
             self.squares = 0.0;
-            let last = self.blocks.len() - 1;
+            let last = self.blocks.len().saturating_sub(1);
             for (index, block) in examples.blocks().iter().enumerate() {
                 self.squares += self.blocks[index.min(last)].forward(mlp, block);
             }
@@ -102,7 +102,7 @@ impl KeptActivations {
 
     /// The activations of block number `index` at the weights last evaluated, which are those of `mlp`.
     pub(super) fn of(&mut self, index: usize, mlp: &Mlp, block: &Block) -> &Activations {
-        if index >= self.blocks.len() || self.blocks.len() == 1 {
+        if self.made_anew {
             self.blocks[0].forward(mlp, block);
             return &self.blocks[0];
         }

@@ -12,10 +12,13 @@ pub struct EpochRecord {
     pub validation_mse: Option<f64>,
     /// Error on the test set, if it is watched. It decides nothing.
     pub test_mse: Option<f64>,
-    /// Length of the gradient of the training error.
+    /// Length of the gradient of the training error, the weights' share included where the method regularises.
     pub gradient_norm: f64,
-    /// The damping mu, or the learning rate, after this epoch.
+    /// The damping mu, or the learning rate, after this epoch: [`super::Method::parameter_name`].
     pub parameter: f64,
+    /// How many weights the data determine, where the method estimates it.
+    #[serde(default)]
+    pub effective_parameters: Option<f64>,
     /// How often the validation error has risen since it last fell.
     pub validation_failures: usize,
 }

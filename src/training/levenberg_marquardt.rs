@@ -1,6 +1,9 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluation, Examples, NormalEquations, Setting, StopReason};
+use super::{
+    Evaluation, Examples, NormalEquations, Setting, StopReason,
+    algorithm::{Algorithm, MethodState, place},
+};
 use crate::network::Mlp;
 
 /// Settings of Levenberg-Marquardt (Hagan and Menhaj 1994), with the field's usual defaults.
@@ -65,10 +68,10 @@ impl LevenbergMarquardtSettings {
 }
 
 /// Below this, mu is lost in the rounding of any sum of squares worth damping.
-const SMALLEST_MU: f64 = 1e-20;
+pub(super) const SMALLEST_MU: f64 = 1e-20;
 
 /// Levenberg-Marquardt at work. A rejected step only factors the gathered products again, with a larger mu.
-pub struct LevenbergMarquardt {
+pub(super) struct LevenbergMarquardt {
     settings: LevenbergMarquardtSettings,
     mu: f64,
     mse: f64,
@@ -79,7 +82,7 @@ pub struct LevenbergMarquardt {
 
 impl LevenbergMarquardt {
     /// Gathers the normal equations at the start.
-    pub fn new(settings: LevenbergMarquardtSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    pub(super) fn new(settings: LevenbergMarquardtSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut equations = NormalEquations::new(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let method = Self {
@@ -93,24 +96,18 @@ impl LevenbergMarquardt {
         (method, evaluation)
     }
 
-    /// The present damping.
-    pub fn mu(&self) -> f64 {
-        self.mu
+    /// Goes on with the damping of an interrupted training.
+    pub(super) fn resume(mut self, mu: f64) -> Self {
+        self.mu = mu;
+        self
     }
+}
 
-    /// Moves `mlp` to weights of lower error and gathers the equations there.
-    ///
-    /// # Errors
-    /// [`StopReason::MuLarge`] if no damping up to the largest gives such weights.
-    pub fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+impl Algorithm for LevenbergMarquardt {
+    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         while self.mu <= self.settings.mu_max {
             if self.equations.solve(mlp, self.mu, &mut self.step) {
-                let moved = mlp.weights().iter().zip(&self.step).map(|(weight, step)| weight + step);
-                self.candidate
-                    .weights_mut()
-                    .iter_mut()
-                    .zip(moved)
-                    .for_each(|(weight, moved)| *weight = moved);
+                place(&mut self.candidate, mlp, &self.step);
                 let mse = self.equations.mse(&self.candidate, examples);
                 // Written so that NaN is rejected.
                 if mse < self.mse {
@@ -123,5 +120,13 @@ impl LevenbergMarquardt {
             self.mu *= self.settings.mu_increase;
         }
         Err(StopReason::MuLarge)
+    }
+
+    fn parameter(&self) -> f64 {
+        self.mu
+    }
+
+    fn state(&self) -> MethodState {
+        MethodState::LevenbergMarquardt { mu: self.mu }
     }
 }

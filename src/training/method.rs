@@ -3,8 +3,13 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, LevenbergMarquardt, LevenbergMarquardtSettings, Momentum, MomentumSettings, Setting,
-    SettingError, StopReason,
+    AdaptiveDescentSettings, BayesianRegularizationSettings, Evaluation, Examples, GradientDescentSettings,
+    LevenbergMarquardtSettings, MethodState, MomentumSettings, ResilientSettings, ScaledConjugateGradientSettings,
+    Setting, SettingError, StepMomentumSettings, VariableProjectionSettings, adaptive_descent::AdaptiveDescent,
+    algorithm::Algorithm, bayesian_regularization::BayesianRegularization, gradient_descent::GradientDescent,
+    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, resilient::Resilient,
+    scaled_conjugate_gradient::ScaledConjugateGradient, step_momentum::StepMomentum,
+    variable_projection::VariableProjection,
 };
 use crate::network::Mlp;
 
@@ -12,10 +17,24 @@ use crate::network::Mlp;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Damped Gauss-Newton steps.
+    /// Damped Gauss-Newton steps (`trainlm`).
     LevenbergMarquardt(LevenbergMarquardtSettings),
-    /// Gradient descent with momentum, Eq. (11).
+    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`).
+    BayesianRegularization(BayesianRegularizationSettings),
+    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer.
+    VariableProjection(VariableProjectionSettings),
+    /// Møller's scaled conjugate gradient (`trainscg`).
+    ScaledConjugateGradient(ScaledConjugateGradientSettings),
+    /// Resilient back-propagation (`trainrp`).
+    Resilient(ResilientSettings),
+    /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
+    AdaptiveDescent(AdaptiveDescentSettings),
+    /// Gradient descent with momentum of steps (`traingdm`).
+    StepMomentum(StepMomentumSettings),
+    /// Gradient descent with momentum of gradients, Eq. (11).
     Momentum(MomentumSettings),
+    /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
+    GradientDescent(GradientDescentSettings),
 }
 
 impl Default for Method {
@@ -26,23 +45,98 @@ impl Default for Method {
 
 impl Method {
     /// Every method with its defaults, in the order offered.
-    pub fn all() -> [Self; 2] {
-        [Self::default(), Self::Momentum(MomentumSettings::default())]
+    pub fn all() -> [Self; 9] {
+        [
+            Self::default(),
+            Self::BayesianRegularization(BayesianRegularizationSettings::default()),
+            Self::VariableProjection(VariableProjectionSettings::default()),
+            Self::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
+            Self::Resilient(ResilientSettings::default()),
+            Self::AdaptiveDescent(AdaptiveDescentSettings::default()),
+            Self::StepMomentum(StepMomentumSettings::default()),
+            Self::Momentum(MomentumSettings::default()),
+            Self::GradientDescent(GradientDescentSettings::default()),
+        ]
     }
 
     /// The word for it in the terminal and in tables.
     pub fn short_name(&self) -> &'static str {
-        match self {
-            Self::LevenbergMarquardt(_) => "lm",
-            Self::Momentum(_) => "gdm",
-        }
+        self.words().0
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        self.words().1
+    }
+
+    /// What it does, in a sentence.
+    pub fn description(&self) -> &'static str {
+        self.words().2
     }
 
     /// What [`super::EpochRecord::parameter`] is.
     pub fn parameter_name(&self) -> &'static str {
+        self.words().3
+    }
+
+    /// Short name, name, description, and what its parameter is.
+    fn words(&self) -> (&'static str, &'static str, &'static str, &'static str) {
         match self {
-            Self::LevenbergMarquardt(_) => "mu",
-            Self::Momentum(_) => "learning rate",
+            Self::LevenbergMarquardt(_) => (
+                "lm",
+                "Levenberg-Marquardt",
+                "Damped Gauss-Newton steps: the fewest epochs, and here also the least time.",
+                "mu",
+            ),
+            Self::BayesianRegularization(_) => (
+                "br",
+                "Bayesian regularisation",
+                "Levenberg-Marquardt that keeps weights small, weighing them against the error by what the data can \
+                 determine: for few or noisy samples.",
+                "mu",
+            ),
+            Self::VariableProjection(_) => (
+                "varpro",
+                "Variable projection",
+                "Solves the linear output layer exactly and takes Levenberg-Marquardt steps on the hidden layer only.",
+                "mu",
+            ),
+            Self::ScaledConjugateGradient(_) => (
+                "scg",
+                "Scaled conjugate gradient",
+                "Conjugate directions with the step length from the curvature: little memory, for very large networks.",
+                "lambda",
+            ),
+            Self::Resilient(_) => (
+                "rp",
+                "Resilient back-propagation",
+                "Each weight keeps a step length of its own and follows only the sign of its slope.",
+                "mean step length",
+            ),
+            Self::AdaptiveDescent(_) => (
+                "gdx",
+                "Adaptive rate with momentum",
+                "Gradient descent with momentum whose learning rate grows while the error falls.",
+                "learning rate",
+            ),
+            Self::StepMomentum(_) => (
+                "gdms",
+                "Momentum of steps",
+                "Gradient descent that mixes the previous step into each step, as traingdm does.",
+                "learning rate",
+            ),
+            Self::Momentum(_) => (
+                "gdm",
+                "Momentum, Eq. (11)",
+                "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
+                "learning rate",
+            ),
+            Self::GradientDescent(_) => (
+                "gd",
+                "Gradient descent",
+                "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
+                "learning rate",
+            ),
         }
     }
 
@@ -50,7 +144,14 @@ impl Method {
     pub fn settings(&mut self) -> Vec<Setting<'_>> {
         match self {
             Self::LevenbergMarquardt(settings) => settings.list(),
+            Self::BayesianRegularization(settings) => settings.list(),
+            Self::VariableProjection(settings) => settings.list(),
+            Self::ScaledConjugateGradient(settings) => settings.list(),
+            Self::Resilient(settings) => settings.list(),
+            Self::AdaptiveDescent(settings) => settings.list(),
+            Self::StepMomentum(settings) => settings.list(),
             Self::Momentum(settings) => settings.list(),
+            Self::GradientDescent(settings) => settings.list(),
         }
     }
 
@@ -62,50 +163,70 @@ impl Method {
         let mut copy = *self;
         copy.settings().iter().try_for_each(Setting::check)
     }
-}
 
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::LevenbergMarquardt(_) => "Levenberg-Marquardt",
-            Self::Momentum(_) => "Momentum, Eq. (11)",
+    /// Puts the method to work from the weights of `mlp`.
+    pub(super) fn start(&self, mlp: &Mlp, examples: &Examples) -> (Box<dyn Algorithm>, Evaluation) {
+        fn boxed<A: Algorithm + 'static>((method, now): (A, Evaluation)) -> (Box<dyn Algorithm>, Evaluation) {
+            (Box::new(method), now)
+        }
+        match *self {
+            Self::LevenbergMarquardt(settings) => boxed(LevenbergMarquardt::new(settings, mlp, examples)),
+            Self::BayesianRegularization(settings) => boxed(BayesianRegularization::new(settings, mlp, examples)),
+            Self::VariableProjection(settings) => boxed(VariableProjection::new(settings, mlp, examples)),
+            Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
+            Self::Resilient(settings) => boxed(Resilient::new(settings, mlp, examples)),
+            Self::AdaptiveDescent(settings) => boxed(AdaptiveDescent::new(settings, mlp, examples)),
+            Self::StepMomentum(settings) => boxed(StepMomentum::new(settings, mlp, examples)),
+            Self::Momentum(settings) => boxed(Momentum::new(settings, mlp, examples)),
+            Self::GradientDescent(settings) => boxed(GradientDescent::new(settings, mlp, examples)),
+        }
+    }
+
+    /// Puts the method to work where an interrupted training left it; `None` if `state` is another method's.
+    pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Box<dyn Algorithm>> {
+        Some(match (*self, state) {
+            (Self::LevenbergMarquardt(settings), MethodState::LevenbergMarquardt { mu }) => {
+                Box::new(LevenbergMarquardt::new(settings, mlp, examples).0.resume(mu))
+            }
+            (Self::BayesianRegularization(settings), MethodState::BayesianRegularization(state)) => {
+                Box::new(BayesianRegularization::new(settings, mlp, examples).0.resume(state))
+            }
+            (Self::VariableProjection(settings), MethodState::VariableProjection(state)) => {
+                Box::new(VariableProjection::new(settings, mlp, examples).0.resume(state))
+            }
+            (Self::ScaledConjugateGradient(settings), MethodState::ScaledConjugateGradient(state)) => {
+                Box::new(ScaledConjugateGradient::new(settings, mlp, examples).0.resume(state))
+            }
+            (
+                Self::Resilient(settings),
+                MethodState::Resilient {
+                    previous_gradient,
+                    lengths,
+                },
+            ) => Box::new(
+                Resilient::new(settings, mlp, examples)
+                    .0
+                    .resume(previous_gradient, lengths),
+            ),
+            (Self::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
+                Box::new(AdaptiveDescent::new(settings, mlp, examples).0.resume(state))
+            }
+            (Self::StepMomentum(settings), MethodState::StepMomentum(step)) => {
+                Box::new(StepMomentum::new(settings, mlp, examples).0.resume(step))
+            }
+            (Self::Momentum(settings), MethodState::Momentum(gradient)) => {
+                Box::new(Momentum::new(settings, mlp, examples).0.resume(gradient))
+            }
+            (Self::GradientDescent(settings), MethodState::GradientDescent) => {
+                Box::new(GradientDescent::new(settings, mlp, examples).0)
+            }
+            _ => return None,
         })
     }
 }
 
-/// A method at work.
-pub(super) enum Algorithm {
-    LevenbergMarquardt(Box<LevenbergMarquardt>),
-    Momentum(Box<Momentum>),
-}
-
-impl Algorithm {
-    /// Prepares `method` at the start of training.
-    pub(super) fn new(method: &Method, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        match method {
-            Method::LevenbergMarquardt(settings) => {
-                let (method, evaluation) = LevenbergMarquardt::new(*settings, mlp, examples);
-                (Self::LevenbergMarquardt(Box::new(method)), evaluation)
-            }
-            Method::Momentum(settings) => {
-                let (method, evaluation) = Momentum::new(*settings, mlp, examples);
-                (Self::Momentum(Box::new(method)), evaluation)
-            }
-        }
-    }
-
-    /// Moves `mlp` by one epoch.
-    pub(super) fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        match self {
-            Self::LevenbergMarquardt(method) => method.step(mlp, examples),
-            Self::Momentum(method) => method.step(mlp, examples),
-        }
-    }
-
-    pub(super) fn parameter(&self) -> f64 {
-        match self {
-            Self::LevenbergMarquardt(method) => method.mu(),
-            Self::Momentum(method) => method.learning_rate(),
-        }
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }

@@ -3,34 +3,46 @@
 //! Everything here works on scaled values and knows nothing of sensors.
 
 mod activations;
+mod adaptive_descent;
+mod algorithm;
 mod backpropagation;
+mod bayesian_regularization;
+mod checkpoint;
 mod elementwise;
+mod evaluation;
 mod examples;
+mod gradient_descent;
 mod history;
 mod input_pairs;
 mod levenberg_marquardt;
 mod method;
 mod momentum;
 mod normal_equations;
+mod parallel;
+mod resilient;
+mod scaled_conjugate_gradient;
 mod setting;
+mod step_momentum;
 mod stopping;
 mod trainer;
+mod variable_projection;
 
+pub use adaptive_descent::{AdaptiveDescentSettings, AdaptiveState};
+pub use algorithm::MethodState;
+pub use bayesian_regularization::{BayesianRegularizationSettings, BayesianState};
+pub use checkpoint::{ResumeError, TrainerState};
+pub use evaluation::Evaluation;
 pub use examples::Examples;
+pub use gradient_descent::GradientDescentSettings;
 pub use history::EpochRecord;
-pub use levenberg_marquardt::{LevenbergMarquardt, LevenbergMarquardtSettings};
+pub use levenberg_marquardt::LevenbergMarquardtSettings;
 pub use method::Method;
-pub use momentum::{Momentum, MomentumSettings};
+pub use momentum::MomentumSettings;
 pub use normal_equations::NormalEquations;
+pub use resilient::ResilientSettings;
+pub use scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradientSettings};
 pub use setting::{Setting, SettingError};
+pub use step_momentum::StepMomentumSettings;
 pub use stopping::{StopReason, StoppingRules};
 pub use trainer::{Problem, Trainer, TrainingError, TrainingSettings};
-
-/// Where a method stands: at the weights it has just reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Evaluation {
-    /// Mean squared error over samples and outputs, in scaled units.
-    pub mse: f64,
-    /// Euclidean length of the gradient of [`Self::mse`].
-    pub gradient_norm: f64,
-}
+pub use variable_projection::{ProjectionState, VariableProjectionSettings};

@@ -1,6 +1,10 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Evaluation, Examples, Setting, StopReason, backpropagation::Backpropagation};
+use super::{
+    Evaluation, Examples, Setting, StopReason,
+    algorithm::{Algorithm, MethodState},
+    backpropagation::Backpropagation,
+};
 use crate::network::Mlp;
 
 /// Settings of gradient descent with momentum, with the field's usual defaults.
@@ -48,7 +52,7 @@ impl MomentumSettings {
 /// `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`, g the negative gradient. (The field's `traingdm` mixes in the previous
 /// step instead.) Before the first step g(N−1) is taken as g(N).
 #[derive(Debug)]
-pub struct Momentum {
+pub(super) struct Momentum {
     settings: MomentumSettings,
     backpropagation: Backpropagation,
     previous_gradient: Vec<f64>,
@@ -56,7 +60,7 @@ pub struct Momentum {
 
 impl Momentum {
     /// Takes the gradient at the start.
-    pub fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    pub(super) fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let previous_gradient = backpropagation.gradient.clone();
@@ -68,16 +72,15 @@ impl Momentum {
         (method, evaluation)
     }
 
-    /// The learning rate.
-    pub fn learning_rate(&self) -> f64 {
-        self.settings.learning_rate
+    /// Goes on with the gradient before the present one of an interrupted training.
+    pub(super) fn resume(mut self, previous_gradient: Vec<f64>) -> Self {
+        self.previous_gradient = previous_gradient;
+        self
     }
+}
 
-    /// Moves `mlp` by one step.
-    ///
-    /// # Errors
-    /// [`StopReason::Diverged`] if the error there is not finite.
-    pub fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+impl Algorithm for Momentum {
+    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let MomentumSettings {
             learning_rate,
             momentum,
@@ -87,13 +90,15 @@ impl Momentum {
             *weight -= learning_rate * ((1.0 - momentum) * now + momentum * before);
         }
         self.previous_gradient.copy_from_slice(&self.backpropagation.gradient);
-        let evaluation = self.backpropagation.evaluate(mlp, examples);
-        let finite = evaluation.mse.is_finite() && evaluation.gradient_norm.is_finite();
-        if finite {
-            Ok(evaluation)
-        } else {
-            Err(StopReason::Diverged)
-        }
+        self.backpropagation.evaluate(mlp, examples).if_finite()
+    }
+
+    fn parameter(&self) -> f64 {
+        self.settings.learning_rate
+    }
+
+    fn state(&self) -> MethodState {
+        MethodState::Momentum(self.previous_gradient.clone())
     }
 }
 

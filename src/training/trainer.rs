@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::{
     EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations,
-    method::Algorithm,
+    algorithm::Algorithm,
 };
 use crate::network::Mlp;
 
@@ -57,23 +57,25 @@ pub enum TrainingError {
 
 /// A training in progress: a value that is stepped one epoch at a time, so that pausing is not stepping.
 pub struct Trainer {
-    settings: TrainingSettings,
-    problem: Problem,
-    algorithm: Algorithm,
-    mlp: Mlp,
-    best: Best,
-    history: Vec<EpochRecord>,
-    stop_reason: Option<StopReason>,
-    elapsed: Duration,
-    activations: Activations,
+    pub(super) settings: TrainingSettings,
+    pub(super) problem: Problem,
+    pub(super) algorithm: Box<dyn Algorithm>,
+    pub(super) mlp: Mlp,
+    pub(super) best: Best,
+    pub(super) history: Vec<EpochRecord>,
+    /// How often the validation error has risen since it last fell, under the present method.
+    pub(super) validation_failures: usize,
+    pub(super) stop_reason: Option<StopReason>,
+    pub(super) elapsed: Duration,
+    pub(super) activations: Activations,
 }
 
 /// The weights of the lowest validation error, or training error where nothing is held out.
 #[derive(Debug)]
-struct Best {
-    mlp: Mlp,
-    epoch: usize,
-    mse: f64,
+pub(super) struct Best {
+    pub(super) mlp: Mlp,
+    pub(super) epoch: usize,
+    pub(super) mse: f64,
 }
 
 impl Trainer {
@@ -90,7 +92,7 @@ impl Trainer {
             return Err(TrainingError::NoHiddenNodes);
         }
         let begun = Instant::now();
-        let (algorithm, evaluation) = Algorithm::new(&settings.method, &start, &problem.training);
+        let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {
             settings,
             algorithm,
@@ -100,6 +102,7 @@ impl Trainer {
                 mse: f64::INFINITY,
             },
             history: Vec::new(),
+            validation_failures: 0,
             stop_reason: None,
             elapsed: Duration::ZERO,
             activations: Activations::new(start.shape()),
@@ -117,7 +120,12 @@ impl Trainer {
             let begun = Instant::now();
             match self.algorithm.step(&mut self.mlp, &self.problem.training) {
                 Ok(evaluation) => self.record(evaluation),
-                Err(reason) => self.stop_reason = Some(reason),
+                Err(reason) => {
+                    if reason == StopReason::Diverged {
+                        self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
+                    }
+                    self.stop_reason = Some(reason);
+                }
             }
             self.elapsed += begun.elapsed();
         }
@@ -127,6 +135,36 @@ impl Trainer {
     /// Ends the training by the user's wish.
     pub fn stop(&mut self) {
         self.stop_reason.get_or_insert(StopReason::Stopped);
+    }
+
+    /// Goes on from the present weights with another method (momentum first, Levenberg-Marquardt to finish), also after
+    /// the training has ended, unless it ended because all epochs were run. Epochs go on counting.
+    ///
+    /// # Errors
+    /// A setting out of range; then nothing has changed.
+    pub fn continue_with(&mut self, method: Method) -> Result<(), SettingError> {
+        method.check()?;
+        let begun = Instant::now();
+        self.settings.method = method;
+        (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);
+        self.validation_failures = 0;
+        let all_run = self.latest().epoch >= self.settings.stopping.epochs;
+        self.stop_reason = all_run.then_some(StopReason::EpochsReached);
+        self.elapsed += begun.elapsed();
+        Ok(())
+    }
+
+    /// Changes when to stop; more epochs let a training go on that had run all of its own.
+    ///
+    /// # Errors
+    /// A setting out of range; then nothing has changed.
+    pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
+        stopping.check()?;
+        self.settings.stopping = stopping;
+        if self.stop_reason == Some(StopReason::EpochsReached) && self.latest().epoch < stopping.epochs {
+            self.stop_reason = None;
+        }
+        Ok(())
     }
 
     fn record(&mut self, evaluation: Evaluation) {
@@ -144,11 +182,11 @@ impl Trainer {
             self.best.epoch = epoch;
             self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
         }
-        let validation_failures = match before {
-            Some(last) if validation_mse > last.validation_mse => last.validation_failures + 1,
-            Some(last) if validation_mse == last.validation_mse => last.validation_failures,
-            _ => 0,
-        };
+        match before {
+            Some(last) if validation_mse > last.validation_mse => self.validation_failures += 1,
+            Some(last) if validation_mse == last.validation_mse => {}
+            _ => self.validation_failures = 0,
+        }
         self.history.push(EpochRecord {
             epoch,
             training_mse: mse,
@@ -156,18 +194,19 @@ impl Trainer {
             test_mse,
             gradient_norm,
             parameter: self.algorithm.parameter(),
-            validation_failures,
+            effective_parameters: self.algorithm.effective_parameters(),
+            validation_failures: self.validation_failures,
         });
-        self.stop_reason = self.reason_to_stop(epoch, evaluation, validation_failures);
+        self.stop_reason = self.reason_to_stop(epoch, evaluation);
     }
 
-    fn reason_to_stop(&self, epoch: usize, now: Evaluation, validation_failures: usize) -> Option<StopReason> {
+    fn reason_to_stop(&self, epoch: usize, now: Evaluation) -> Option<StopReason> {
         let rules = self.settings.stopping;
         let reasons = [
             (!now.mse.is_finite(), StopReason::Diverged),
             (now.mse <= rules.goal_mse, StopReason::GoalReached),
             (now.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
-            (validation_failures >= rules.max_fail, StopReason::ValidationRose),
+            (self.validation_failures >= rules.max_fail, StopReason::ValidationRose),
             (epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
@@ -176,6 +215,11 @@ impl Trainer {
     /// How it is trained.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
+    }
+
+    /// The present weights, which another method would go on from.
+    pub fn present(&self) -> &Mlp {
+        &self.mlp
     }
 
     /// The best weights so far: of the lowest validation error, or training error where nothing is held out.

@@ -1,6 +1,10 @@
 use faer::MatRef;
 
-use super::{products::Products, schur::SchurComplement};
+use super::{
+    output_layer::{OutputLayer, ridge},
+    products::Products,
+    schur::{Damping, SchurComplement},
+};
 use crate::{
     network::{Mlp, Shape},
     training::{Evaluation, Examples, activations::KeptActivations},
@@ -12,6 +16,7 @@ pub struct NormalEquations {
     activations: KeptActivations,
     products: Products,
     schur: SchurComplement,
+    projection: OutputLayer,
 }
 
 impl NormalEquations {
@@ -22,6 +27,7 @@ impl NormalEquations {
             activations: KeptActivations::new(shape, examples),
             products: Products::new(shape, examples),
             schur: SchurComplement::new(shape),
+            projection: OutputLayer::new(shape),
         }
     }
 
@@ -40,12 +46,75 @@ impl NormalEquations {
     /// [`Mlp::weights`]. Returns false, with `step` unspecified, if the damped matrix is not positive definite in
     /// the arithmetic: a larger `mu` is needed.
     pub fn solve(&mut self, mlp: &Mlp, mu: f64, step: &mut [f64]) -> bool {
-        let v = output_weights(self.shape, mlp);
-        if !self.schur.factor(&self.products, v, mu) {
+        self.solve_with_decay(mlp, mu, 0.0, step)
+    }
+
+    /// As [`Self::solve`] for errors to whose sum of squares `decay`·Σw² is added: solves
+    /// `(JᵀJ + damping·I) δ = −(Jᵀe + decay·w)`. The `damping` includes the `decay`.
+    pub fn solve_with_decay(&mut self, mlp: &Mlp, damping: f64, decay: f64, step: &mut [f64]) -> bool {
+        let damping = Damping {
+            hidden: damping,
+            output: damping,
+        };
+        if !self
+            .schur
+            .factor(&self.products, output_weights(self.shape, mlp), damping)
+        {
             return false;
         }
-        self.schur.solve(&self.products, v, step);
+        self.schur.solve(&self.products, mlp, decay, step);
         step.iter().all(|value| value.is_finite())
+    }
+
+    /// Length of Jᵀe + decay·w from what was last gathered.
+    pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: f64) -> f64 {
+        let (w, v) = mlp.layers();
+        // By `hypot`, since the squares overflow where the error weighs next to nothing against the weights.
+        let length = |gradient: MatRef<'_, f64>, weights: &[f64]| -> f64 {
+            let weights = MatRef::from_row_major_slice(weights, gradient.nrows(), gradient.ncols());
+            let columns = gradient.col_iter().zip(weights.col_iter());
+            columns
+                .flat_map(|(gradient, weights)| gradient.iter().zip(weights.iter()))
+                .map(|(gradient, weight)| gradient + decay * weight)
+                .fold(0.0, f64::hypot)
+        };
+        let w = length(self.products.gradient_w.as_ref(), w);
+        w.hypot(length(self.products.gradient_v.as_ref(), v))
+    }
+
+    /// tr (JᵀJ + damping·I)⁻¹ from what was last gathered; `None` if the matrix is not positive definite in the
+    /// arithmetic.
+    pub(in crate::training) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
+        let v = output_weights(self.shape, mlp);
+        let damping = Damping {
+            hidden: damping,
+            output: damping,
+        };
+        let factored = self.schur.factor(&self.products, v, damping);
+        let trace = factored.then(|| self.schur.trace_of_inverse(v))?;
+        trace.is_finite().then_some(trace)
+    }
+
+    /// Solves for the step of the hidden layer alone, the output layer being the best one for it at every point.
+    pub(in crate::training) fn solve_hidden(&mut self, mlp: &Mlp, mu: f64, step: &mut [f64]) -> bool {
+        let damping = Damping {
+            hidden: mu,
+            output: ridge(&self.products.g),
+        };
+        if !self
+            .schur
+            .factor(&self.products, output_weights(self.shape, mlp), damping)
+        {
+            return false;
+        }
+        self.schur.solve_hidden(&self.products, step);
+        step.iter().all(|value| value.is_finite())
+    }
+
+    /// Gives `mlp` the output layer of least squared error for its hidden layer; false if there is none in the
+    /// arithmetic.
+    pub(in crate::training) fn solve_outputs(&mut self, mlp: &mut Mlp, examples: &Examples) -> bool {
+        self.projection.solve(mlp, examples, &mut self.activations)
     }
 }
 

@@ -10,7 +10,9 @@
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
+mod cholesky;
 mod equations;
+mod output_layer;
 mod products;
 mod schur;
 

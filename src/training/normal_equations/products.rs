@@ -8,6 +8,7 @@ use crate::{
         elementwise::{multiply, multiply_into, tanh_slopes_into},
         examples::{BLOCK, Block, column, column_mut},
         input_pairs::InputPairs,
+        parallel::add_product,
     },
 };
 
@@ -97,10 +98,10 @@ impl Products {
         let mut slope_pairs = self.room.slope_pairs.as_mut().subrows_mut(0, samples);
         fill_slope_pairs(slope_hidden.subcols(h * h, h), slope_pairs.as_mut());
         let input_pairs = self.input_pairs.of(index, block);
-        add_product(self.gram.as_mut(), input_pairs, slope_pairs.as_ref());
+        add_product(self.gram.as_mut(), input_pairs, slope_pairs.as_ref(), 1.0);
         let c = MatMut::from_column_major_slice_mut(&mut self.c, n1, h * h1);
-        add_product(c, block.inputs.transpose(), slope_hidden);
-        add_product(self.g.as_mut(), hidden.transpose(), hidden);
+        add_product(c, block.inputs.transpose(), slope_hidden, 1.0);
+        add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
     }
 
     /// Adds one block to Jwᵀe and Jvᵀe; the slopes are still in their room.
@@ -110,7 +111,7 @@ impl Products {
         let v = MatRef::from_row_major_slice(mlp.layers().1, h + 1, outputs);
         let hidden = activations.hidden.as_ref().subrows(0, samples);
         let errors = activations.errors.as_ref().subrows(0, samples);
-        add_product(self.gradient_v.as_mut(), hidden.transpose(), errors);
+        add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
         let mut delta = self.room.delta.as_mut().subrows_mut(0, samples);
         let v_without_bias = v.subrows(0, h).transpose();
         matmul(delta.as_mut(), Accum::Replace, errors, v_without_bias, 1.0, Par::Seq);
@@ -118,12 +119,8 @@ impl Products {
         for node in 0..h {
             multiply(column_mut(delta.as_mut(), node), column(slopes, node));
         }
-        add_product(self.gradient_w.as_mut(), block.inputs.transpose(), delta.as_ref());
+        add_product(self.gradient_w.as_mut(), block.inputs.transpose(), delta.as_ref(), 1.0);
     }
-}
-
-fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>) {
-    matmul(sum, Accum::Add, left, right, 1.0, Par::Seq);
 }
 
 /// Fills Dᵢ∘H̃_q = (1 − Hᵢ²)∘H̃_q, column q·h + i, from H̃.

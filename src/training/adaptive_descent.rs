@@ -1,0 +1,189 @@
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Evaluation, Examples, Setting, StopReason,
+    algorithm::{Algorithm, MethodState},
+    backpropagation::Backpropagation,
+};
+use crate::network::Mlp;
+
+/// Settings of gradient descent with momentum and an adaptive learning rate, with the field's usual defaults
+/// (`traingdx`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveDescentSettings {
+    /// First learning rate.
+    pub learning_rate: f64,
+    /// The momentum constant mc.
+    pub momentum: f64,
+    /// Factor on the learning rate after a step that lowers the error.
+    pub rate_increase: f64,
+    /// Factor on the learning rate after a step that is taken back.
+    pub rate_decrease: f64,
+    /// A step that raises the error by more than this factor is taken back.
+    pub largest_error_increase: f64,
+}
+
+impl Default for AdaptiveDescentSettings {
+    fn default() -> Self {
+        Self {
+            learning_rate: 0.01,
+            momentum: 0.9,
+            rate_increase: 1.05,
+            rate_decrease: 0.7,
+            largest_error_increase: 1.04,
+        }
+    }
+}
+
+impl AdaptiveDescentSettings {
+    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+        let default = Self::default();
+        vec![
+            Setting {
+                name: "learning rate",
+                meaning: "First length of a step per length of the gradient; it adapts from there.",
+                default: default.learning_rate,
+                range: f64::MIN_POSITIVE..=1e300,
+                value: &mut self.learning_rate,
+            },
+            Setting {
+                name: "momentum",
+                meaning: "Share of the previous step in each step, from 0 to 1.",
+                default: default.momentum,
+                range: 0.0..=1.0,
+                value: &mut self.momentum,
+            },
+            Setting {
+                name: "rate increase",
+                meaning: "Factor on the learning rate after a step that lowers the error.",
+                default: default.rate_increase,
+                range: 1.0..=1e3,
+                value: &mut self.rate_increase,
+            },
+            Setting {
+                name: "rate decrease",
+                meaning: "Factor on the learning rate after a step that is taken back.",
+                default: default.rate_decrease,
+                range: 1e-6..=0.999,
+                value: &mut self.rate_decrease,
+            },
+            Setting {
+                name: "largest error increase",
+                meaning: "A step that raises the error by more than this factor is taken back.",
+                default: default.largest_error_increase,
+                range: 1.0..=1e6,
+                value: &mut self.largest_error_increase,
+            },
+        ]
+    }
+}
+
+/// Above this a learning rate says nothing; it keeps a long run of successes from overflowing.
+const LARGEST_RATE: f64 = 1e300;
+
+/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). The step is
+/// `dX = mc·dXprev + lr·(1 − mc)·g`, g the negative gradient. If it lowers the error, lr grows by `rate_increase`; if it
+/// raises the error by more than the factor `largest_error_increase`, it is taken back, lr shrinks by `rate_decrease`
+/// and the momentum is forgotten. (The reference manual prints `lr·mc·g`; we use 1 − mc, as in `traingdm`.)
+pub(super) struct AdaptiveDescent {
+    settings: AdaptiveDescentSettings,
+    state: AdaptiveState,
+    now: Evaluation,
+    /// At the present weights.
+    gradient: Vec<f64>,
+    /// At the candidate.
+    backpropagation: Backpropagation,
+    candidate: Mlp,
+}
+
+/// What [`AdaptiveDescent`] remembers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveState {
+    pub(super) learning_rate: f64,
+    pub(super) step: Vec<f64>,
+}
+
+impl AdaptiveDescent {
+    /// Takes the gradient at the start.
+    pub(super) fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut backpropagation = Backpropagation::new(mlp);
+        let now = backpropagation.evaluate(mlp, examples);
+        let method = Self {
+            settings,
+            state: AdaptiveState {
+                learning_rate: settings.learning_rate,
+                step: vec![0.0; mlp.weights().len()],
+            },
+            now,
+            gradient: backpropagation.gradient.clone(),
+            backpropagation,
+            candidate: mlp.clone(),
+        };
+        (method, now)
+    }
+
+    /// Goes on with the rate and step of an interrupted training.
+    pub(super) fn resume(mut self, state: AdaptiveState) -> Self {
+        self.state = state;
+        self
+    }
+}
+
+impl Algorithm for AdaptiveDescent {
+    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+        let AdaptiveState { learning_rate, step } = &mut self.state;
+        let momentum = self.settings.momentum;
+        for (index, step) in step.iter_mut().enumerate() {
+            *step = momentum * *step - *learning_rate * (1.0 - momentum) * self.gradient[index];
+            self.candidate.weights_mut()[index] = mlp.weights()[index] + *step;
+        }
+        let then = self.backpropagation.evaluate(&self.candidate, examples);
+        let bearable = then.mse <= self.settings.largest_error_increase * self.now.mse;
+        if bearable && then.if_finite().is_ok() {
+            if then.mse < self.now.mse {
+                *learning_rate = (*learning_rate * self.settings.rate_increase).min(LARGEST_RATE);
+            }
+            std::mem::swap(mlp, &mut self.candidate);
+            std::mem::swap(&mut self.gradient, &mut self.backpropagation.gradient);
+            self.now = then;
+        } else {
+            *learning_rate *= self.settings.rate_decrease;
+            step.fill(0.0);
+        }
+        Ok(self.now)
+    }
+
+    fn parameter(&self) -> f64 {
+        self.state.learning_rate
+    }
+
+    fn state(&self) -> MethodState {
+        MethodState::AdaptiveDescent(self.state.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::examples::tests::{random_examples, random_mlp};
+
+    #[test]
+    fn a_rate_far_too_large_shrinks_until_steps_are_bearable_and_then_adapts() {
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = AdaptiveDescentSettings {
+            learning_rate: 1e12,
+            ..AdaptiveDescentSettings::default()
+        };
+        let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
+        let before = mlp.clone();
+        assert_eq!(method.step(&mut mlp, &examples), Ok(start));
+        assert_eq!((&mlp, method.parameter()), (&before, 0.7e12));
+        let last = (0..500)
+            .map(|_| method.step(&mut mlp, &examples).unwrap())
+            .last()
+            .unwrap();
+        assert!(last.mse < start.mse, "{last:?}");
+    }
+}

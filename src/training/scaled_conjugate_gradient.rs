@@ -1,0 +1,215 @@
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Evaluation, Examples, Setting, StopReason,
+    algorithm::{Algorithm, MethodState},
+    backpropagation::Backpropagation,
+};
+use crate::network::Mlp;
+
+/// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScaledConjugateGradientSettings {
+    /// Length of the difference from which the curvature is estimated.
+    pub sigma: f64,
+    /// First scale of the curvature, which shortens the steps where the surface is not convex.
+    pub lambda: f64,
+}
+
+impl Default for ScaledConjugateGradientSettings {
+    fn default() -> Self {
+        Self {
+            sigma: 5e-5,
+            lambda: 5e-7,
+        }
+    }
+}
+
+impl ScaledConjugateGradientSettings {
+    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+        let default = Self::default();
+        vec![
+            Setting {
+                name: "sigma",
+                meaning: "Length of the difference from which the curvature is estimated.",
+                default: default.sigma,
+                range: 1e-12..=1.0,
+                value: &mut self.sigma,
+            },
+            Setting {
+                name: "lambda",
+                meaning: "First scale of the curvature: it shortens steps where the surface is not convex.",
+                default: default.lambda,
+                range: f64::MIN_POSITIVE..=1e300,
+                value: &mut self.lambda,
+            },
+        ]
+    }
+}
+
+/// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p the
+/// curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until it is
+/// positive; the step is pᵀr/δ, r the negative gradient. λ falls or grows with how well the parabola foretold the error.
+/// An epoch is one iteration, also one whose step is refused.
+pub(super) struct ScaledConjugateGradient {
+    settings: ScaledConjugateGradientSettings,
+    state: ConjugateState,
+    now: Evaluation,
+    backpropagation: Backpropagation,
+    moved: Mlp,
+}
+
+/// What [`ScaledConjugateGradient`] remembers, in Møller's letters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConjugateState {
+    /// Direction p.
+    pub(super) p: Vec<f64>,
+    /// Residual r: the negative gradient.
+    pub(super) r: Vec<f64>,
+    /// Curvature δ along p, unscaled until used.
+    delta: f64,
+    lambda: f64,
+    lambda_bar: f64,
+    /// Whether the last step was made.
+    success: bool,
+    /// Steps made since p was last the gradient.
+    since_restart: usize,
+}
+
+impl ScaledConjugateGradient {
+    /// Takes the gradient at the start as the first direction.
+    pub(super) fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut backpropagation = Backpropagation::new(mlp);
+        let now = backpropagation.evaluate(mlp, examples);
+        let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
+        let method = Self {
+            settings,
+            state: ConjugateState {
+                p: r.clone(),
+                r,
+                delta: 0.0,
+                lambda: settings.lambda,
+                lambda_bar: 0.0,
+                success: true,
+                since_restart: 0,
+            },
+            now,
+            backpropagation,
+            moved: mlp.clone(),
+        };
+        (method, now)
+    }
+
+    /// Goes on with the direction and scale of an interrupted training.
+    pub(super) fn resume(mut self, state: ConjugateState) -> Self {
+        self.state = state;
+        self
+    }
+
+    /// Evaluates at `length` along p from `mlp`.
+    fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> Evaluation {
+        let moved = mlp.weights().iter().zip(&self.state.p);
+        for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
+            *target = weight + length * p;
+        }
+        self.backpropagation.evaluate(&self.moved, examples)
+    }
+
+    /// Takes the new residual and turns the direction (Møller's step 7), after a step of μ = pᵀr.
+    fn turn(&mut self, mu: f64) {
+        let state = &mut self.state;
+        state.since_restart += 1;
+        let (mut square, mut mixed) = (0.0, 0.0);
+        for (r, slope) in state.r.iter().zip(&self.backpropagation.gradient) {
+            square += slope * slope;
+            mixed -= slope * r;
+        }
+        let beta = if state.since_restart >= state.r.len() {
+            state.since_restart = 0;
+            0.0
+        } else {
+            (square - mixed) / mu
+        };
+        let beta = if beta.is_finite() { beta } else { 0.0 };
+        for ((p, r), slope) in state.p.iter_mut().zip(&mut state.r).zip(&self.backpropagation.gradient) {
+            *r = -slope;
+            *p = *r + beta * *p;
+        }
+        // A direction that does not descend is no direction.
+        if dot(&state.p, &state.r) <= 0.0 {
+            state.p.copy_from_slice(&state.r);
+            state.since_restart = 0;
+        }
+    }
+}
+
+impl Algorithm for ScaledConjugateGradient {
+    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+        let square = dot(&self.state.p, &self.state.p);
+        if !(square > 0.0 && square.is_finite()) {
+            return Err(StopReason::GradientSmall);
+        }
+        if self.state.success {
+            let sigma = self.settings.sigma / square.sqrt();
+            self.evaluate_along(mlp, sigma, examples);
+            let differences = self.backpropagation.gradient.iter().zip(&self.state.r);
+            let along = differences.zip(&self.state.p).map(|((slope, r), p)| p * (slope + r));
+            self.state.delta = along.sum::<f64>() / sigma;
+        }
+        let state = &mut self.state;
+        state.delta += (state.lambda - state.lambda_bar) * square;
+        if state.delta <= 0.0 || state.delta.is_nan() {
+            let delta = if state.delta.is_finite() { state.delta } else { 0.0 };
+            state.lambda_bar = 2.0 * (state.lambda - delta / square);
+            state.delta = -delta + state.lambda * square;
+            state.lambda = state.lambda_bar;
+        }
+        let mu = dot(&state.p, &state.r);
+        let (delta, length) = (state.delta, mu / state.delta);
+        let then = self.evaluate_along(mlp, length, examples);
+        let foretold = 2.0 * delta * (self.now.mse - then.mse) / (mu * mu);
+        // An error that is not finite counts as much worse than foretold.
+        let comparison = if then.if_finite().is_ok() {
+            foretold.max(WORST)
+        } else {
+            WORST
+        };
+        self.state.success = comparison >= 0.0;
+        if self.state.success {
+            std::mem::swap(mlp, &mut self.moved);
+            self.now = then;
+            self.turn(mu);
+            self.state.lambda_bar = 0.0;
+            if comparison >= 0.75 {
+                self.state.lambda = (0.25 * self.state.lambda).max(f64::MIN_POSITIVE);
+            }
+        } else {
+            self.state.lambda_bar = self.state.lambda;
+        }
+        if comparison < 0.25 {
+            self.state.lambda += delta * (1.0 - comparison) / square;
+        }
+        if self.state.lambda.is_finite() {
+            Ok(self.now)
+        } else {
+            Err(StopReason::GradientSmall)
+        }
+    }
+
+    fn parameter(&self) -> f64 {
+        self.state.lambda
+    }
+
+    fn state(&self) -> MethodState {
+        MethodState::ScaledConjugateGradient(self.state.clone())
+    }
+}
+
+/// The worst comparison between the error found and the one foretold that is believed.
+const WORST: f64 = -1e3;
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
