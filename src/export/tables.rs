@@ -26,7 +26,7 @@ pub fn write_errors(rows: &[ErrorRow], writer: &mut dyn Write) -> io::Result<()>
 pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,
-        "epoch,training_mse,validation_mse,test_mse,gradient_norm,parameter"
+        "epoch,training_mse,validation_mse,test_mse,gradient_norm,parameter,effective_parameters"
     )?;
     for record in history {
         write!(writer, "{}", record.epoch)?;
@@ -36,6 +36,7 @@ pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io:
             record.test_mse,
             Some(record.gradient_norm),
             Some(record.parameter),
+            record.effective_parameters,
         ];
         for value in values {
             write_optional(value, writer)?;
@@ -85,11 +86,12 @@ mod tests {
             test_mse: Some(1e-300),
             gradient_norm: f64::INFINITY,
             parameter: 1e-3,
+            effective_parameters: None,
             validation_failures: 0,
         };
         let mut table = Vec::new();
         write_loss_curves(&[record], &mut table).unwrap();
         let text = String::from_utf8(table).unwrap();
-        assert_eq!(text.lines().nth(1), Some("3,0.30000000000000004,,1e-300,inf,0.001"));
+        assert_eq!(text.lines().nth(1), Some("3,0.30000000000000004,,1e-300,inf,0.001,"));
     }
 }

@@ -119,18 +119,23 @@ fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     let method = &mut draft.training.method;
     field_ui(ui, "Method", "How the weights are improved.", |ui| {
         let combo = ComboBox::from_id_salt("method")
-            .selected_text(method.to_string())
+            .selected_text(method.name())
             .width(space(38));
         let shown = combo.show_ui(ui, |ui| {
             for option in Method::all() {
                 let is_selected = option.short_name() == method.short_name();
-                if ui.selectable_label(is_selected, option.to_string()).clicked() && !is_selected {
+                let choice = ui
+                    .selectable_label(is_selected, option.name())
+                    .on_hover_text(option.description());
+                if choice.clicked() && !is_selected {
                     *method = option;
                 }
             }
         });
         shown.response
     });
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
     for setting in method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
