@@ -72,13 +72,15 @@ impl DecouplerWindow {
     fn take_event(&mut self, event: Event) {
         let state = &mut self.state;
         match event {
-            Event::Previewed(Ok(test)) => {
+            // Settings that have moved on meanwhile have asked for another test set, or need none.
+            Event::Previewed(settings, _) if !have_same_test_set(&settings, &state.draft) => {}
+            Event::Previewed(_, Ok(test)) => {
                 if !state.phase.is_busy() {
                     state.preview = Some(test);
                     state.refresh_frames();
                 }
             }
-            Event::Previewed(Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
+            Event::Previewed(_, Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
             Event::Began(Ok(began)) => {
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
@@ -177,15 +179,14 @@ impl DecouplerWindow {
     fn configure(&mut self, draft: RunSettings) {
         let before = self.state.draft;
         self.state.draft = draft;
-        let test_set = |settings: &RunSettings| (settings.sensor, settings.scene, settings.test_samples, settings.seed);
-        if test_set(&before) == test_set(&draft) {
+        if have_same_test_set(&before, &draft) {
             return;
         }
         let ran = self
             .state
             .run
             .as_ref()
-            .filter(|run| test_set(&run.settings) == test_set(&draft));
+            .filter(|run| have_same_test_set(&run.settings, &draft));
         if ran.is_some() {
             self.state.preview = None;
             self.state.refresh_frames();
@@ -265,6 +266,12 @@ impl DecouplerWindow {
         }
         actions
     }
+}
+
+/// Whether both draw the same test set.
+fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
+    let test_set = |settings: &RunSettings| (settings.sensor, settings.scene, settings.test_samples, settings.seed);
+    test_set(a) == test_set(b)
 }
 
 fn start_worker(ctx: &Context) -> std::io::Result<Worker> {

@@ -45,8 +45,8 @@ pub enum Request {
 /// What the worker tells the window.
 #[derive(Debug)]
 pub enum Event {
-    /// The test set asked for.
-    Previewed(Result<TestView, TestViewError>),
+    /// The test set of these settings.
+    Previewed(Box<RunSettings>, Result<TestView, TestViewError>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
     /// News of the training.
@@ -216,7 +216,8 @@ impl Labour {
                         }
                     }
                 }
-                self.report.send(Event::Previewed(TestView::draw(&settings)));
+                let drawn = TestView::draw(&settings);
+                self.report.send(Event::Previewed(settings, drawn));
                 if let Some(next) = other {
                     self.answer(next, requests);
                 }

@@ -85,8 +85,10 @@ fn is_hidden(node: &DVec3, surface: &Surface<'_>, stage: &Stage<'_>) -> bool {
     let start = DVec3::new(node.x, node.y, node.z.clamp(low, high));
     let sight = plot_box.place_mm(projection.eye) - start;
     let (x_mm, y_mm) = (surface.grid.x_mm(), surface.grid.y_mm());
-    let step_mm = 0.5 * (x_mm[1] - x_mm[0]).min(y_mm[1] - y_mm[0]);
-    let step = step_mm / sight.truncate().length().max(step_mm);
+    // Half a cell of the axis along which cells are crossed faster: however stretched the array, so many steps lead
+    // off the grid as it has points.
+    let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
+    let step = 0.5 / cells(sight.x, x_mm).max(cells(sight.y, y_mm)).max(0.5);
     // A tolerance keeps nodes on a crest visible although the grid is coarser than the surface.
     let tolerance = 0.01 * (high - low);
     (3..)

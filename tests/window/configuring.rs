@@ -1,0 +1,244 @@
+//! Choosing what to train.
+
+use decoupler::{
+    app::{Action, Phase},
+    evaluation::RunSettings,
+    sensor::{ArrayScale, Geometry},
+    training::Method,
+};
+use eframe::egui::{Key, Modifiers, accesskit::Role};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+
+use crate::driver::{Driver, small};
+
+#[test]
+fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
+    let mut driver = Driver::open();
+    driver.settle();
+    assert_eq!(driver.state().draft, RunSettings::default());
+    assert!(driver.has("Ready: press Train"));
+    assert!(driver.is_enabled("▶ Train"));
+    assert!(!driver.is_enabled("■ Stop") && !driver.is_enabled("⏸ Pause"));
+    let surface = driver.get("Actual surface").accesskit_node();
+    assert_eq!(surface.role(), Role::Image);
+    let value = surface.value().unwrap();
+    // Nodes rest at 5 mm and are pressed by up to a fifth of that.
+    let numbers: Vec<f64> = value.split(' ').filter_map(|word| word.parse().ok()).collect();
+    assert!(
+        matches!(numbers[..], [low, high] if (4.0..4.2).contains(&low) && (4.8..=5.0).contains(&high)),
+        "{value}"
+    );
+    assert!(driver.has("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
+    assert!(!driver.has("Decoupled surface"));
+}
+
+#[test]
+fn presets_set_the_array_and_its_surface_follows() {
+    let mut driver = Driver::open();
+    for scale in ArrayScale::PRESETS {
+        driver.click(&format!("{}×{}", scale.rows(), scale.nodes_per_row()));
+        assert_eq!(driver.state().draft.sensor.scale, scale);
+        assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
+        driver.wait("its surface", |driver| {
+            let frame = &driver.state().frames.actual;
+            frame.nodes_mm.len() == scale.rows() * scale.nodes_per_row()
+        });
+    }
+    driver.settle();
+}
+
+#[test]
+fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
+    let mut driver = Driver::open();
+    driver.enter("Array scale", "4x5_2x16");
+    let scale = driver.state().draft.sensor.scale;
+    assert_eq!(scale.to_string(), "4×5_2×16");
+    assert!(driver.says("4 row-wires of 5 nodes over 16 column-wires of 2 nodes"));
+    assert!(
+        driver.says("more than the 3·M2 = 15"),
+        "departing from the paper's rule is noted"
+    );
+    for (wrong, reason) in [
+        ("10x6", "'10x6' is not an array scale: write M1xM2_M3xM4"),
+        (
+            "0x6_3x18",
+            "the number of row-wires (M1) is 0: it must be from 1 to 512",
+        ),
+        ("4x5_2x9999", "column-wires (M4) is 9999"),
+    ] {
+        driver.type_into("Array scale", wrong);
+        assert_eq!(driver.state().draft.sensor.scale, scale, "{wrong}");
+        driver.harness().run_steps(2);
+        assert!(driver.says(reason), "{wrong}: {:#?}", driver.texts());
+    }
+    driver.enter("Array scale", "4x5_2x15");
+    assert_eq!(driver.get("Array scale").value().as_deref(), Some("4×5_2×15"));
+    assert!(!driver.says("is not an array scale") && !driver.says("3·M2 = 15"));
+    driver.settle();
+}
+
+#[test]
+fn numbers_are_typed_and_kept_within_what_is_possible() {
+    let mut driver = Driver::open();
+    for (label, text) in [
+        ("Hidden nodes", "17"),
+        ("Training samples", "330"),
+        ("Validation samples", "0"),
+        ("Test samples", "40"),
+        ("Epochs", "77"),
+        ("Seed", "18446744073709551615"),
+        ("Largest compression", "12.5"),
+        ("Mu", "1e-4"),
+    ] {
+        driver.enter(label, text);
+    }
+    let draft = driver.state().draft;
+    assert_eq!(
+        (draft.hidden, draft.samples, draft.validation_samples),
+        (17, 330, 0),
+        "{draft:?}"
+    );
+    assert_eq!(
+        (draft.test_samples, draft.training.stopping.epochs, draft.seed.0),
+        (40, 77, u64::MAX)
+    );
+    assert_eq!(draft.scene.largest_compression, 0.125);
+    let Method::LevenbergMarquardt(settings) = draft.training.method else {
+        panic!("{draft:?}")
+    };
+    assert_eq!(settings.mu, 1e-4);
+    driver.wait("the new test set", |driver| driver.has("1 of 4"));
+
+    for (label, text) in [("Hidden nodes", "0"), ("Training samples", "-5"), ("Epochs", "0")] {
+        driver.enter(label, text);
+    }
+    let draft = driver.state().draft;
+    assert_eq!((draft.hidden, draft.samples, draft.training.stopping.epochs), (1, 1, 1));
+    driver.enter("Hidden nodes", "a dozen");
+    assert_eq!(driver.state().draft.hidden, 1, "words are not taken");
+    driver.settle();
+}
+
+#[test]
+fn a_method_shows_its_own_settings_and_no_others() {
+    let mut driver = Driver::open();
+    let damping = ["Mu", "Mu decrease", "Mu increase", "Largest mu"];
+    let descent = ["Learning rate", "Momentum"];
+    assert!(damping.iter().all(|name| driver.has(name)));
+    assert!(!descent.iter().any(|name| driver.has(name)));
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    assert!(descent.iter().all(|name| driver.has(name)));
+    assert!(!damping.iter().any(|name| driver.has(name)));
+    assert_eq!(driver.state().draft.training.method.short_name(), "gdm");
+    driver.enter("Learning rate", "0.25");
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    assert_eq!(driver.state().draft.training.method, Method::default());
+    driver.settle();
+}
+
+/// Picks a method from the list.
+pub(crate) fn choose_method(driver: &mut Driver, name: &str) {
+    driver.click("Method");
+    driver.click_button(name);
+}
+
+#[test]
+fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_back() {
+    let mut driver = Driver::open();
+    let reset = "Back to the paper's settings";
+    assert!(!driver.is_enabled(reset));
+    driver.click("Geometry");
+    driver.enter("Height", "8");
+    driver.enter("Row pitch", "2.5");
+    driver.enter("Resistivity", "1e3");
+    driver.wait("the new surface", |driver| {
+        driver
+            .state()
+            .test()
+            .is_some_and(|test| test.sensor == driver.state().draft.sensor)
+    });
+    let x_mm: Vec<f64> = driver
+        .state()
+        .frames
+        .actual
+        .nodes_mm
+        .iter()
+        .map(|node| node.x)
+        .collect();
+    assert!((x_mm[10] - x_mm[0] - 2.5).abs() < 1e-12, "rows are 2.5 mm apart");
+    assert_eq!(driver.state().draft.sensor.resistivity_ohm_per_mm, 1e3);
+    assert!(
+        driver.get("Actual surface").value().unwrap().contains("to 7.9")
+            || driver.get("Actual surface").value().unwrap().contains("to 8")
+    );
+    driver.click("Back to the assumed geometry");
+    assert_eq!(driver.state().draft.sensor.geometry, Geometry::default());
+    assert_eq!(driver.state().draft.sensor.resistivity_ohm_per_mm, 1e3);
+    driver.enter("Hidden nodes", "3");
+    driver.click(reset);
+    assert_eq!(driver.state().draft, RunSettings::default());
+    assert!(!driver.is_enabled(reset));
+    driver.settle();
+}
+
+#[test]
+fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them_again() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let table = driver.table();
+    assert!(!table.is_empty());
+    driver.click("10×8");
+    driver.wait("the other array's surface", |driver| driver.state().preview.is_some());
+    assert!(driver.table().is_empty() && !driver.has("Decoupled surface"));
+    driver.click("10×6");
+    assert_eq!(driver.table(), table);
+    assert!(driver.has("Decoupled surface"));
+
+    // Faster than the worker draws the other array.
+    let run = driver.state().run.as_ref().unwrap().settings;
+    let mut other = run;
+    other.sensor.scale = ArrayScale::PRESETS[1];
+    driver.window_mut().apply(Action::Configure(Box::new(other)));
+    driver.window_mut().apply(Action::Configure(Box::new(run)));
+    for _ in 0..40 {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        driver.harness().step();
+    }
+    assert_eq!(driver.state().draft, small());
+    assert_eq!(
+        driver.table(),
+        table,
+        "the other array's surface came too late to be shown"
+    );
+}
+
+#[test]
+fn keys_train_and_walk_the_snapshots() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.press(Key::PageDown);
+    driver.press(Key::PageDown);
+    driver.press(Key::PageUp);
+    assert_eq!(driver.state().look.snapshot, 1);
+    assert!(driver.has("2 of 10"));
+    driver.press_with(Modifiers::COMMAND, Key::Enter);
+    driver.wait("the end of the training", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_))
+    });
+    assert_eq!(driver.state().look.snapshot, 1, "training keeps the snapshot on show");
+    driver.settle();
+}
+
+#[test]
+fn the_hidden_nodes_slider_moves_with_the_keys() {
+    let mut driver = Driver::open();
+    let slider = "Hidden nodes slider";
+    driver
+        .harness()
+        .get_by_role_and_label(Role::Slider, slider)
+        .set_value_accesskit(20.0);
+    driver.harness().run_steps(2);
+    assert_eq!(driver.state().draft.hidden, 20);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("20"));
+}

@@ -1,0 +1,264 @@
+//! The window without a display, worked by what is written on it.
+
+use std::{cell::RefCell, rc::Rc, thread, time::Duration};
+
+use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
+use decoupler::evaluation::{Run, RunSettings, error_rows};
+use decoupler::export::format_number;
+use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
+use egui_kittest::{
+    Harness, Node,
+    kittest::{By, NodeT as _, Queryable as _},
+};
+
+use crate::support::rasterise::Rasteriser;
+
+/// Looks at the window before something awaited counts as never coming: at 5 ms each, two minutes.
+const MOST_LOOKS: usize = 24_000;
+
+/// The window and hands to work it.
+pub(crate) struct Driver {
+    harness: Harness<'static, Option<DecouplerWindow>>,
+}
+
+impl Driver {
+    /// The window at its usual size.
+    pub(crate) fn open() -> Self {
+        Self::open_sized(vec2(1440.0, 900.0))
+    }
+
+    /// The window of `size` points, with the first surface drawn.
+    pub(crate) fn open_sized(size: Vec2) -> Self {
+        let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
+        let place = Rc::clone(&made);
+        // Before the first frame, as the real window does, so that its fonts are there.
+        let set_up = move |ctx: &Context| {
+            *place.borrow_mut() = Some(DecouplerWindow::new(ctx, DialogKind::None).unwrap());
+        };
+        let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {
+            let window = window.get_or_insert_with(|| made.take().unwrap());
+            window.take_news();
+            // The harness leaves a margin, which a real window has not.
+            let whole = ui.content_rect();
+            let mut root = ui.new_child(UiBuilder::new().max_rect(whole));
+            root.set_clip_rect(whole);
+            window.show_ui(&mut root);
+        };
+        let builder = Harness::builder().with_size(size).with_context_setup(set_up);
+        let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
+        let harness = builder.build_ui_state(frame, None);
+        let mut driver = Self { harness };
+        driver.wait("the first surface", |driver| driver.state().test().is_some());
+        driver
+    }
+
+    /// What the window knows.
+    pub(crate) fn state(&self) -> &State {
+        self.window().state()
+    }
+
+    fn window(&self) -> &DecouplerWindow {
+        self.harness.state().as_ref().unwrap()
+    }
+
+    /// The window itself, for what no hand could do fast enough.
+    pub(crate) fn window_mut(&mut self) -> &mut DecouplerWindow {
+        self.harness.state_mut().as_mut().unwrap()
+    }
+
+    /// The harness, to see and do what has no word here.
+    pub(crate) fn harness(&mut self) -> &mut Harness<'static, Option<DecouplerWindow>> {
+        &mut self.harness
+    }
+
+    /// Looks at the window until `holds`.
+    #[track_caller]
+    pub(crate) fn wait(&mut self, what: &str, holds: impl Fn(&Self) -> bool) {
+        for _ in 0..MOST_LOOKS {
+            if holds(self) {
+                // What came with the last frame is drawn by the next.
+                self.harness.step();
+                return;
+            }
+            thread::sleep(Duration::from_millis(5));
+            self.harness.step();
+        }
+        panic!("{what} never came; the window shows {:#?}", self.texts());
+    }
+
+    /// Draws frames until the window asks for none. Panics if it asks for ever.
+    #[track_caller]
+    pub(crate) fn settle(&mut self) {
+        self.harness.run();
+    }
+
+    /// What is labelled so, label and labelled alike.
+    #[track_caller]
+    pub(crate) fn get<'a>(&'a self, label: &'a str) -> Node<'a> {
+        self.harness.get_by_label(label)
+    }
+
+    /// Whether something is labelled exactly so.
+    pub(crate) fn has(&self, label: &str) -> bool {
+        self.harness.query_all_by_label(label).next().is_some()
+    }
+
+    /// Whether any text contains this.
+    pub(crate) fn says(&self, text: &str) -> bool {
+        self.texts().iter().any(|shown| shown.contains(text))
+    }
+
+    /// Whether what is labelled so can be used.
+    #[track_caller]
+    pub(crate) fn is_enabled(&self, label: &str) -> bool {
+        !self.get(label).accesskit_node().is_disabled()
+    }
+
+    /// Every label and value, as assistive technology reads them.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        let nodes = self.harness.root().children_recursive();
+        let texts = nodes.flat_map(|node| {
+            let node = node.accesskit_node();
+            [node.label(), node.value()].into_iter().flatten().collect::<Vec<_>>()
+        });
+        texts.collect()
+    }
+
+    /// Label and place of everything that can be worked or read.
+    pub(crate) fn places(&self) -> Vec<(String, Rect)> {
+        let nodes = self.harness.root().children_recursive();
+        let named = nodes.filter_map(|node| {
+            let inner = node.accesskit_node();
+            inner.bounding_box()?;
+            let text = inner.label().or(inner.value())?;
+            Some((text, node.rect()))
+        });
+        named.collect()
+    }
+
+    /// Clicks what is labelled so, after scrolling to it.
+    #[track_caller]
+    pub(crate) fn click(&mut self, label: &str) {
+        self.click_by(&By::new().label(label));
+    }
+
+    /// Clicks the button that is labelled so, where a text says the same.
+    #[track_caller]
+    pub(crate) fn click_button(&mut self, label: &str) {
+        self.click_by(&By::new().role(Role::Button).label(label));
+    }
+
+    #[track_caller]
+    fn click_by(&mut self, by: &By<'_>) {
+        self.harness.get(by.clone()).scroll_to_me();
+        self.harness.run_steps(2);
+        self.harness.get(by.clone()).click();
+        self.harness.run_steps(2);
+        self.harness.remove_cursor();
+        self.harness.step();
+    }
+
+    /// Types `text` into the field labelled so, in place of what is there, and confirms with Enter.
+    #[track_caller]
+    pub(crate) fn enter(&mut self, label: &str, text: &str) {
+        self.type_into(label, text);
+        self.harness.key_press(Key::Enter);
+        self.harness.run_steps(3);
+    }
+
+    /// Types `text` into the field labelled so, in place of what is there.
+    #[track_caller]
+    pub(crate) fn type_into(&mut self, label: &str, text: &str) {
+        self.get(label).scroll_to_me();
+        self.harness.run_steps(2);
+        self.get(label).focus();
+        self.harness.run_steps(2);
+        self.press_with(Modifiers::COMMAND, Key::A);
+        self.harness.event(eframe::egui::Event::Text(text.to_owned()));
+        self.harness.run_steps(2);
+    }
+
+    /// Presses a key.
+    pub(crate) fn press(&mut self, key: Key) {
+        self.press_with(Modifiers::NONE, key);
+    }
+
+    /// Presses a key with others held.
+    pub(crate) fn press_with(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.run_steps(2);
+    }
+
+    /// A small network on the smallest array of the paper, trained in a moment.
+    pub(crate) fn configure_small(&mut self) {
+        self.click("10×6");
+        self.enter("Hidden nodes", "6");
+        self.enter("Training samples", "200");
+        self.enter("Epochs", "15");
+        let (small, wanted) = (self.state().draft, small());
+        assert_eq!(small, wanted, "typing the settings gives the settings");
+        self.wait("the small array's surface", |driver| {
+            driver.state().test().is_some_and(|test| test.sensor == wanted.sensor)
+        });
+    }
+
+    /// Presses Train and waits for the end.
+    #[track_caller]
+    pub(crate) fn train(&mut self) {
+        self.click("▶ Train");
+        self.wait("the end of the training", |driver| {
+            matches!(driver.state().phase, Phase::Ended(_))
+        });
+    }
+
+    /// Waits until this many more epochs are shown.
+    #[track_caller]
+    pub(crate) fn wait_for_epochs(&mut self, more: usize) {
+        let wanted = self.epochs() + more;
+        self.wait("more epochs", |driver| driver.epochs() >= wanted);
+    }
+
+    /// Epochs of the training on show.
+    pub(crate) fn epochs(&self) -> usize {
+        let latest = self.state().run.as_ref().and_then(|run| run.latest());
+        latest.map_or(0, |latest| latest.epoch)
+    }
+
+    /// The cells of the error table that is on show: `network, Z %: 2.28`.
+    pub(crate) fn table(&self) -> Vec<String> {
+        let is_cell = |text: &String| ROWS.iter().any(|row| text.starts_with(&format!("{row}, ")));
+        self.texts().into_iter().filter(is_cell).collect()
+    }
+}
+
+const ROWS: [&str; 4] = ["training mean", "linear map", "network", "published"];
+
+/// The settings of [`Driver::configure_small`].
+pub(crate) fn small() -> RunSettings {
+    let mut settings = RunSettings {
+        hidden: 6,
+        samples: 200,
+        ..RunSettings::default()
+    };
+    settings.sensor.scale = "10×6_3×18".parse().unwrap();
+    settings.training.stopping.epochs = 15;
+    settings
+}
+
+/// What the library makes of `settings` by itself, trained to the end.
+pub(crate) fn trained(settings: RunSettings) -> Run {
+    let mut run = Run::prepare(settings).unwrap();
+    while run.trainer_mut().step().is_none() {}
+    run
+}
+
+/// The error table that the library gives for `run`, in the window's words.
+pub(crate) fn table_of(run: &Run) -> Vec<String> {
+    let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
+    let rows = error_rows(&run.decouple_test().1, run.baselines(), None);
+    let cells = rows.iter().flat_map(|row| {
+        let named = columns.iter().zip(row.values());
+        named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(value)))
+    });
+    cells.collect()
+}

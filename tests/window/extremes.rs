@@ -1,0 +1,136 @@
+//! Settings at the edge of what is possible, and beyond.
+
+use decoupler::app::{Notice, Phase};
+
+use crate::driver::{Driver, table_of, trained};
+
+/// Presses Train and waits until it ends or says why it cannot begin.
+fn try_training(driver: &mut Driver) -> Option<String> {
+    driver.click("▶ Train");
+    driver.wait("an answer", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_) | Phase::Idle | Phase::Died)
+    });
+    driver.settle();
+    assert_ne!(driver.state().phase, Phase::Died);
+    match &driver.state().notice {
+        Some(Notice::Failed(reason)) => Some(reason.clone()),
+        _ => None,
+    }
+}
+
+fn drawn(driver: &mut Driver) {
+    driver.wait("its surface", |driver| {
+        driver
+            .state()
+            .test()
+            .is_some_and(|test| test.sensor == driver.state().draft.sensor)
+    });
+    driver.settle();
+}
+
+fn shows_no_infinities(driver: &Driver) {
+    for text in driver.texts() {
+        let words = text.split(|letter: char| !letter.is_alphanumeric());
+        assert!(
+            words.map(str::to_lowercase).all(|word| word != "nan" && word != "inf"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn the_smallest_array_trains() {
+    let mut driver = Driver::open();
+    driver.enter("Array scale", "1x1_1x3");
+    driver.enter("Epochs", "10");
+    drawn(&mut driver);
+    assert!(driver.has("Actual surface"));
+    assert_eq!(try_training(&mut driver), None);
+    assert_eq!(driver.table(), table_of(&trained(driver.state().draft)));
+    for label in ["Error", "Top view"] {
+        driver.click_button(label);
+        driver.settle();
+    }
+    shows_no_infinities(&driver);
+}
+
+#[test]
+fn a_large_array_trains() {
+    let mut driver = Driver::open();
+    driver.enter("Array scale", "40x40_8x120");
+    driver.enter("Training samples", "40");
+    driver.enter("Validation samples", "40");
+    driver.enter("Test samples", "40");
+    driver.enter("Hidden nodes", "4");
+    driver.enter("Epochs", "3");
+    drawn(&mut driver);
+    assert_eq!(driver.state().frames.actual.nodes_mm.len(), 1600);
+    assert_eq!(try_training(&mut driver), None);
+    assert!(driver.has("Decoupled surface"));
+    driver.click_button("Top view");
+    driver.settle();
+    shows_no_infinities(&driver);
+}
+
+#[test]
+fn one_sample_of_everything_trains_or_says_why_not() {
+    for array in ["10x6_3x18", "1x1_1x3"] {
+        for validation in ["0", "1"] {
+            let mut driver = Driver::open();
+            driver.enter("Array scale", array);
+            driver.enter("Training samples", "1");
+            driver.enter("Validation samples", validation);
+            driver.enter("Test samples", "1");
+            driver.enter("Epochs", "5");
+            drawn(&mut driver);
+            match try_training(&mut driver) {
+                None => assert!(driver.has("Decoupled surface"), "{array}"),
+                Some(reason) => {
+                    let expected = "every target is constant in the training set: there is nothing to learn";
+                    assert!(array == "1x1_1x3" && reason.starts_with(expected), "{array}: {reason}");
+                    assert!(driver.says(expected) && driver.has("Ready: press Train"));
+                }
+            }
+            shows_no_infinities(&driver);
+        }
+    }
+}
+
+#[test]
+fn extreme_resistivities_and_geometries_train_or_say_why_not() {
+    for changes in [
+        &[("Resistivity", "1e-12")][..],
+        &[("Resistivity", "1e12")],
+        &[("Height", "1e6")],
+        &[("Height", "1e-6")],
+        &[("Row pitch", "1e6"), ("Node pitch", "1e6")],
+        &[("Row pitch", "1e-6"), ("Node pitch", "1e-6")],
+        &[("Column pitch", "1e6"), ("Column node pitch", "1e-6")],
+        &[("First row at x", "-1e6"), ("First column at y", "1e6")],
+        // The first row lies at x = 0, where an error in percent has no meaning.
+        &[("First row at x", "0")],
+        &[("Largest compression", "0.001")],
+        &[("Largest compression", "99")],
+    ] {
+        let mut driver = Driver::open();
+        driver.configure_small();
+        driver.enter("Epochs", "3");
+        driver.click("Geometry");
+        for (label, text) in changes {
+            driver.enter(label, text);
+        }
+        driver.wait("an answer", |driver| {
+            let drawn = driver.state().test().map(|test| test.sensor);
+            drawn == Some(driver.state().draft.sensor) || driver.state().notice.is_some()
+        });
+        driver.settle();
+        if let Some(reason) = try_training(&mut driver) {
+            assert!(reason.contains(' ') && driver.says(&reason), "{changes:?}: {reason}");
+        } else {
+            assert!(driver.has("Decoupled surface"), "{changes:?}");
+            driver.click_button("Error");
+        }
+        println!("{changes:?}: {:?} {:?}", driver.state().phase, driver.state().notice);
+        shows_no_infinities(&driver);
+    }
+}

@@ -1,0 +1,68 @@
+//! What holds however the window looks: everything within reach, and stillness when nothing happens.
+
+use eframe::egui::{Rect, Vec2, vec2};
+
+use crate::driver::Driver;
+
+const SIZES: [Vec2; 3] = [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)];
+
+#[test]
+fn nothing_reaches_out_of_the_window() {
+    for size in SIZES {
+        let mut driver = Driver::open_sized(size);
+        let window = Rect::from_min_size(eframe::egui::Pos2::ZERO, size).expand(0.5);
+        for is_trained in [false, true] {
+            if is_trained {
+                driver.configure_small();
+                driver.train();
+                driver.settle();
+            }
+            for (text, place) in driver.places() {
+                let is_scrolled = place.left() < 0.25 * size.x;
+                let is_within = window.x_range().contains(place.left()) && window.x_range().contains(place.right());
+                assert!(is_within, "at {size}, {text} is at {place:?}");
+                assert!(
+                    is_scrolled || place.left() > 0.6 * size.x || window.y_range().contains(place.bottom()),
+                    "at {size}, {text} is at {place:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_buttons_that_run_the_training_stand_apart() {
+    for size in SIZES {
+        let driver = Driver::open_sized(size);
+        let labels = ["Test snapshot", "Previous snapshot", "1 of 10", "Next snapshot"];
+        let buttons = ["▶ Train", "⏸ Pause", "■ Stop"];
+        let places: Vec<(&str, Rect)> = labels
+            .into_iter()
+            .chain(buttons)
+            .map(|label| (label, driver.get(label).rect()))
+            .collect();
+        for pair in places.windows(2) {
+            assert!(
+                pair[0].1.right() <= pair[1].1.left(),
+                "at {size}: {:?} and {:?}",
+                pair[0],
+                pair[1]
+            );
+        }
+    }
+}
+
+#[test]
+fn an_idle_window_draws_nothing() {
+    let mut driver = Driver::open();
+    driver.settle();
+    assert!(driver.harness().run() <= 2, "before a training");
+    driver.configure_small();
+    driver.train();
+    driver.settle();
+    assert!(driver.harness().run() <= 2, "after a training");
+    driver.click_button("Error");
+    driver.click("Regression");
+    driver.settle();
+    assert!(driver.harness().run() <= 2, "with another picture");
+}

@@ -1,0 +1,14 @@
+//! The window, worked by its labels as a user works it, and compared with the library.
+#![cfg(feature = "gui")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod configuring;
+mod driver;
+mod exporting;
+mod extremes;
+mod looking;
+mod pictures;
+mod training;
+
+#[path = "../support/mod.rs"]
+mod support;

@@ -1,0 +1,90 @@
+//! Pictures to look at: `cargo test --test window pictures -- --ignored`, then open `target/pictures`.
+
+use std::fs;
+
+use eframe::egui::{Vec2, vec2};
+
+use crate::{configuring::choose_method, driver::Driver};
+
+struct Album {
+    driver: Driver,
+    prefix: String,
+}
+
+impl Album {
+    fn take(&mut self, name: &str) {
+        self.driver.settle();
+        self.snap(name);
+    }
+
+    fn snap(&mut self, name: &str) {
+        let picture = self.driver.harness().render().unwrap();
+        let path = format!("target/pictures/{}-{name}.png", self.prefix);
+        picture.save(path).unwrap();
+    }
+}
+
+#[test]
+#[ignore = "writes pictures"]
+fn pictures_of_the_window() {
+    fs::create_dir_all("target/pictures").unwrap();
+    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0)] {
+        for is_dark in [true, false] {
+            album(size, is_dark);
+        }
+    }
+}
+
+fn album(size: Vec2, is_dark: bool) {
+    let theme = if is_dark { "dark" } else { "light" };
+    let mut driver = Driver::open_sized(size);
+    if !is_dark {
+        driver.click_button("Light");
+    }
+    let prefix = format!("{}x{}-{theme}", size.x, size.y);
+    let mut album = Album { driver, prefix };
+    album.take("1-opened");
+    album.driver.click("▶ Train");
+    album.driver.wait_for_epochs(3);
+    album.snap("2-training");
+    album.driver.wait_for_epochs(20);
+    album.driver.click("■ Stop");
+    album.driver.wait("the end", |driver| driver.says("stopped by you"));
+    album.take("3-stopped");
+    album.driver.enter("Epochs", "60");
+    album.driver.train();
+    album.take("4-trained");
+    album.driver.click_button("Error");
+    album.take("5-error");
+    album.driver.click_button("Top view");
+    album.take("6-error-top");
+    album.driver.click_button("Decoupled");
+    album.take("7-top");
+    album.driver.click_button("3-D");
+    for tab in ["Training state", "Error histogram", "Regression", "Nodes", "Loss"] {
+        album.driver.click(tab);
+        album.take(&format!("8-{}", tab.replace(' ', "-").to_lowercase()));
+    }
+    let surface = album.driver.get("Decoupled surface").rect().center();
+    album.driver.harness().hover_at(surface);
+    album.driver.harness().run_steps(6);
+    album.take("9-hover");
+    album.driver.harness().remove_cursor();
+    album.driver.click("Type a path for the network");
+    album.take("10-save");
+    album.driver.type_into("File", "/nowhere/network.json");
+    album.driver.click_button("Save");
+    album
+        .driver
+        .wait("the refusal", |driver| driver.state().notice.is_some());
+    album.take("11-refused");
+    album.driver.click("Dismiss");
+    choose_method(&mut album.driver, "Momentum, Eq. (11)");
+    album.driver.enter("Learning rate", "1e6");
+    album.driver.train();
+    album.take("12-diverged");
+    album.driver.click("Geometry");
+    album.driver.type_into("Array scale", "10x6");
+    album.driver.harness().run_steps(2);
+    album.take("13-geometry-and-bad-array");
+}

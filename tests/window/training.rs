@@ -1,0 +1,227 @@
+//! Training, watched, held, ended and gone wrong.
+
+use std::{thread, time::Duration};
+
+use decoupler::{
+    app::{Phase, surface_view::ViewMode},
+    evaluation::{Run, RunSettings},
+    training::{Method, MomentumSettings, StopReason},
+};
+use eframe::egui::{Key, Modifiers};
+
+use crate::{
+    configuring::choose_method,
+    driver::{Driver, small, table_of, trained},
+};
+
+const TABS: [&str; 5] = ["Loss", "Training state", "Error histogram", "Regression", "Nodes"];
+
+#[test]
+fn a_training_ends_with_the_librarys_own_numbers() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let run = trained(small());
+    assert_eq!(driver.table(), table_of(&run));
+    assert_eq!(driver.table().len(), 15, "three rows of five figures");
+    let reason = run.trainer().stop_reason().unwrap();
+    assert!(driver.has(&format!("Finished: {reason}")), "{reason}");
+    let epochs = run.trainer().latest().epoch;
+    assert!(driver.has(&format!("Epoch {epochs} of 15")));
+    let shown = driver.state().run.as_ref().unwrap();
+    assert_eq!(shown.history, run.trainer().history());
+    driver.settle();
+}
+
+#[test]
+fn the_published_errors_stand_below_where_the_paper_has_them() {
+    let mut driver = Driver::open();
+    driver.click("10×6");
+    driver.enter("Epochs", "1");
+    driver.train();
+    // Table 3 of the paper: 10×6_3×18 with 12 hidden nodes and 1000 samples.
+    let published: Vec<String> = driver
+        .table()
+        .into_iter()
+        .filter(|cell| cell.starts_with("published"))
+        .collect();
+    assert_eq!(published.len(), 5, "{published:?}");
+    let file = include_str!("../../assets/published_errors.csv");
+    let row = file
+        .lines()
+        .find(|line| line.starts_with('3') && line.contains("10x6_3x18"))
+        .unwrap();
+    for cell in &published[..3] {
+        let number: f64 = cell.rsplit(' ').next().unwrap().parse().unwrap();
+        assert!(
+            row.split(',').any(|field| field.parse() == Ok(number)),
+            "{cell} in {row}"
+        );
+    }
+    assert!(published[3].ends_with('–') && published[4].ends_with('–'));
+}
+
+#[test]
+fn every_picture_of_a_trained_network_can_be_looked_at() {
+    let mut driver = Driver::open();
+    for tab in TABS {
+        driver.click(tab);
+        driver.settle();
+    }
+    driver.configure_small();
+    driver.train();
+    let heights = driver.get("Decoupled surface").value().unwrap();
+    assert!(heights.starts_with("z ") && heights.ends_with(" mm"), "{heights}");
+
+    driver.click_button("Error");
+    let error = driver.get("Error surface").value().unwrap();
+    assert!(error.starts_with("error ") && error.ends_with(" mm"), "{error}");
+    assert!(!driver.has("Decoupled surface"));
+    driver.click_button("Decoupled");
+    assert!(driver.has("Decoupled surface"));
+
+    driver.click_button("Top view");
+    assert_eq!(driver.state().look.mode, ViewMode::Top);
+    assert!(driver.has("Actual surface") && driver.has("Decoupled surface"));
+    driver.click_button("3-D");
+    assert_eq!(driver.state().look.mode, ViewMode::ThreeD);
+
+    for tab in TABS {
+        driver.click(tab);
+        driver.settle();
+    }
+    driver.click("Regression");
+    assert!(driver.says("Correlation R = 0."));
+
+    let first = driver.get("Actual surface").value();
+    assert!(!driver.is_enabled("Previous snapshot"));
+    for snapshot in 2..=10 {
+        driver.click("Next snapshot");
+        assert!(driver.has(&format!("{snapshot} of 10")));
+    }
+    assert_ne!(driver.get("Actual surface").value(), first);
+    assert!(!driver.is_enabled("Next snapshot"));
+    for _ in 1..10 {
+        driver.click("Previous snapshot");
+    }
+    assert_eq!(driver.get("Actual surface").value(), first);
+
+    driver.click("Show");
+    let worst = driver.state().result().unwrap().errors.worst_node;
+    assert_eq!(driver.state().look.snapshot, worst.snapshot);
+    assert_eq!(driver.state().look.node, Some(worst.row * 6 + worst.node));
+    for theme in ["Light", "Dark"] {
+        driver.click_button(theme);
+        driver.settle();
+    }
+}
+
+/// A training that goes on for as long as one looks.
+fn endless() -> RunSettings {
+    let mut settings = small();
+    settings.training.method = Method::Momentum(MomentumSettings::default());
+    settings.training.stopping.epochs = 1_000_000;
+    settings
+}
+
+fn start_endless(driver: &mut Driver) {
+    driver.configure_small();
+    choose_method(driver, "Momentum, Eq. (11)");
+    driver.enter("Epochs", "1000000");
+    assert_eq!(driver.state().draft, endless());
+    driver.click("▶ Train");
+    driver.wait_for_epochs(5);
+}
+
+#[test]
+fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
+    let mut driver = Driver::open();
+    start_endless(&mut driver);
+    assert!(!driver.is_enabled("▶ Train") && !driver.is_enabled("Hidden nodes"));
+    driver.click("⏸ Pause");
+    driver.wait("the pause", |driver| driver.has("Paused"));
+    // The epoch that was under way when the button was pressed.
+    thread::sleep(Duration::from_millis(100));
+    driver.harness().run_steps(2);
+    let held = driver.epochs();
+    for _ in 0..50 {
+        thread::sleep(Duration::from_millis(5));
+        driver.harness().step();
+    }
+    assert_eq!(driver.epochs(), held);
+    driver.settle();
+    assert!(!driver.is_enabled("▶ Train") && driver.is_enabled("■ Stop"));
+
+    driver.click("▶ Resume");
+    driver.wait_for_epochs(20);
+    driver.click("■ Stop");
+    driver.wait("the end", |driver| {
+        driver.state().phase == Phase::Ended(StopReason::Stopped)
+    });
+    assert!(driver.says("stopped by you"));
+    let mut run = Run::prepare(endless()).unwrap();
+    for _ in 0..driver.epochs() {
+        run.trainer_mut().step();
+    }
+    assert_eq!(driver.state().run.as_ref().unwrap().history, run.trainer().history());
+    assert_eq!(driver.table(), table_of(&run));
+    assert!(driver.has("Decoupled surface") && driver.is_enabled("Hidden nodes"));
+    driver.settle();
+}
+
+#[test]
+fn keys_hold_resume_and_stop_and_the_next_training_starts_afresh() {
+    let mut driver = Driver::open();
+    start_endless(&mut driver);
+    driver.press_with(Modifiers::COMMAND, Key::P);
+    assert!(driver.has("Paused"));
+    driver.press_with(Modifiers::COMMAND, Key::P);
+    assert_eq!(driver.state().phase, Phase::Training);
+    driver.press_with(Modifiers::COMMAND, Key::P);
+    driver.press_with(Modifiers::COMMAND, Key::Period);
+    driver.wait("the end", |driver| driver.says("stopped by you"));
+
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    driver.enter("Epochs", "15");
+    driver.train();
+    assert_eq!(driver.table(), table_of(&trained(small())));
+}
+
+#[test]
+fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click("▶ Train");
+    driver.press_with(Modifiers::COMMAND, Key::Period);
+    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    assert_eq!(driver.table().len(), 15);
+    assert!(driver.has("Decoupled surface"));
+    driver.settle();
+}
+
+#[test]
+fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Learning rate", "1e6");
+    driver.enter("Epochs", "100000");
+    // With some held out, their rising error would end it before it is infinite.
+    driver.enter("Validation samples", "0");
+    driver.train();
+    assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
+    assert!(driver.says("error grew without bound: lower the learning rate"));
+    for tab in TABS {
+        driver.click(tab);
+        driver.settle();
+        for text in driver.texts() {
+            let words = text.split(|letter: char| !letter.is_alphanumeric());
+            assert!(
+                words.map(str::to_lowercase).all(|word| word != "nan" && word != "inf"),
+                "{tab}: {text}"
+            );
+        }
+    }
+    driver.click_button("Error");
+    assert!(driver.get("Error surface").value().unwrap().ends_with(" mm"));
+}
