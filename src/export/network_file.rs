@@ -275,20 +275,27 @@ impl NetworkFile {
 
 /// Why a file has no heading of ours.
 fn not_ours(path: PathBuf, bytes: &[u8], error: &serde_json::Error) -> NetworkFileError {
+    // To the parser a number that ends with the file, as "1e", is invalid; to us the file was cut off.
+    let in_last_number = error.to_string().starts_with("invalid number") && !bytes.trim_ascii_end().ends_with(b"}");
     match error.classify() {
         _ if bytes.trim_ascii().is_empty() => NetworkFileError::NotJson {
             path,
             reason: "it is empty".to_owned(),
         },
-        Category::Eof => NetworkFileError::CutOff {
-            path,
-            line: error.line(),
-            column: error.column(),
-        },
+        Category::Eof => cut_off(path, error),
+        Category::Syntax if in_last_number => cut_off(path, error),
         Category::Data => NetworkFileError::NotOurs { path },
         Category::Syntax | Category::Io => NetworkFileError::NotJson {
             path,
             reason: format!("{error}"),
         },
+    }
+}
+
+fn cut_off(path: PathBuf, error: &serde_json::Error) -> NetworkFileError {
+    NetworkFileError::CutOff {
+        path,
+        line: error.line(),
+        column: error.column(),
     }
 }

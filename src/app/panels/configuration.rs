@@ -120,7 +120,8 @@ fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     field_ui(ui, "Method", "How the weights are improved.", |ui| {
         let combo = ComboBox::from_id_salt("method")
             .selected_text(method.name())
-            .width(space(38));
+            .width(space(38))
+            .height(space(90));
         let shown = combo.show_ui(ui, |ui| {
             for option in Method::all() {
                 let is_selected = option.short_name() == method.short_name();

@@ -1,8 +1,8 @@
 //! A small table of numbers: names on the left, columns as wide as their widest cell, digits aligned on the right.
 
 use eframe::egui::{
-    Align, Color32, Label, Layout, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role,
-    pos2,
+    Align, Color32, FontId, Label, Layout, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
+    accesskit::Role, pos2,
 };
 
 use super::fields::capitalised;
@@ -22,22 +22,16 @@ pub struct Row {
     pub is_strong: bool,
 }
 
-/// Lays out the table over the available width.
+/// Lays out the table over the available width, in smaller type where that is narrow.
 pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
     let palette = Theme::of(ui).palette;
     let whole = ui.available_width();
     let row_height = space(6);
-    let measure = |text: &str, is_strong: bool| styled(text, Color32::WHITE, is_strong, ui).size().x;
-    let widths: Vec<f32> = (0..columns.len())
-        .map(|at| {
-            let cells = rows.iter().map(|row| measure(&row.cells[at], row.is_strong));
-            cells.fold(measure(columns[at].heading, false), f32::max)
-        })
-        .collect();
-    let names = rows
-        .iter()
-        .map(|row| measure(row.name, row.is_strong))
-        .fold(0.0, f32::max);
+    let (size, names, widths) = [type_size().note, type_size().small]
+        .map(|size| measured(ui, columns, rows, size))
+        .into_iter()
+        .reduce(|normal, small| if total_width(&normal) > whole { small } else { normal })
+        .expect("two sizes were measured");
     // What is left over is shared among the gaps before the columns.
     let gap = ((whole - names - widths.iter().sum::<f32>()) / columns.len() as f32).max(space(1));
     let line = |ui: &mut Ui, cells_ui: &mut dyn FnMut(&mut Ui, usize, Rect), is_last: bool| {
@@ -66,7 +60,7 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
         false,
     );
     for (index, row) in rows.iter().enumerate() {
-        let text = |text: &str| rich(text, row.colour, row.is_strong);
+        let text = |text: &str| rich(text, size, row.colour, row.is_strong);
         line(
             ui,
             &mut |ui, at, rect| match at.checked_sub(1) {
@@ -85,22 +79,50 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
     }
 }
 
-fn rich(text: &str, colour: Color32, is_strong: bool) -> RichText {
-    let text = RichText::new(text).size(type_size().note).color(colour);
-    if is_strong {
-        text.font(semibold(type_size().note))
-    } else {
-        text
-    }
+/// The type size, the width of the names, and that of each column.
+type Measured = (f32, f32, Vec<f32>);
+
+fn measured(ui: &Ui, columns: &[Column], rows: &[Row], size: f32) -> Measured {
+    let width = |text: &str, font: FontId| {
+        ui.painter()
+            .layout_no_wrap(text.to_owned(), font, Color32::WHITE)
+            .size()
+            .x
+    };
+    let in_row = |row: &Row, text: &str| {
+        width(
+            text,
+            if row.is_strong {
+                semibold(size)
+            } else {
+                FontId::proportional(size)
+            },
+        )
+    };
+    let heading = |column: &Column| width(column.heading, FontId::proportional(type_size().small));
+    let names = rows
+        .iter()
+        .map(|row| in_row(row, &capitalised(row.name)))
+        .fold(0.0, f32::max);
+    let widths = columns.iter().enumerate().map(|(at, column)| {
+        let cells = rows.iter().map(|row| in_row(row, &row.cells[at]));
+        cells.fold(heading(column), f32::max)
+    });
+    (size, names, widths.collect())
 }
 
-fn styled(text: &str, colour: Color32, is_strong: bool, ui: &Ui) -> std::sync::Arc<eframe::egui::Galley> {
-    let font = if is_strong {
-        semibold(type_size().note)
+/// With readable gaps between the columns.
+fn total_width((_, names, widths): &Measured) -> f32 {
+    names + widths.iter().sum::<f32>() + space(2) * widths.len() as f32
+}
+
+fn rich(text: &str, size: f32, colour: Color32, is_strong: bool) -> RichText {
+    let text = RichText::new(text).color(colour);
+    if is_strong {
+        text.font(semibold(size))
     } else {
-        eframe::egui::FontId::proportional(type_size().note)
-    };
-    ui.painter().layout_no_wrap(text.to_owned(), font, colour)
+        text.size(size)
+    }
 }
 
 fn cell_ui(ui: &mut Ui, rect: Rect, align: Align, text: RichText) -> eframe::egui::Response {
