@@ -240,6 +240,10 @@ impl DecouplerWindow {
 
     fn pressed_shortcuts(&self, ctx: &Context) -> Vec<Action> {
         let state = &self.state;
+        // The question for a path is to be answered first.
+        if state.saving.is_some() {
+            return Vec::new();
+        }
         let snapshots = state.test().map_or(0, |test| test.set.snapshots());
         let shown = state.look.snapshot;
         let pressed =

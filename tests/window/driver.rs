@@ -16,6 +16,9 @@ use crate::support::rasterise::Rasteriser;
 /// Looks at the window before something awaited counts as never coming: at 5 ms each, two minutes.
 const MOST_LOOKS: usize = 24_000;
 
+/// Frames until something scrolled to lies still.
+const SCROLLING: usize = 5;
+
 /// The window and hands to work it.
 pub(crate) struct Driver {
     harness: Harness<'static, Option<DecouplerWindow>>,
@@ -151,7 +154,7 @@ impl Driver {
     #[track_caller]
     fn click_by(&mut self, by: &By<'_>) {
         self.harness.get(by.clone()).scroll_to_me();
-        self.harness.run_steps(2);
+        self.harness.run_steps(SCROLLING);
         self.harness.get(by.clone()).click();
         self.harness.run_steps(2);
         self.harness.remove_cursor();
@@ -170,7 +173,7 @@ impl Driver {
     #[track_caller]
     pub(crate) fn type_into(&mut self, label: &str, text: &str) {
         self.get(label).scroll_to_me();
-        self.harness.run_steps(2);
+        self.harness.run_steps(SCROLLING);
         self.get(label).focus();
         self.harness.run_steps(2);
         self.press_with(Modifiers::COMMAND, Key::A);

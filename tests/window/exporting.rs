@@ -6,7 +6,7 @@ use decoupler::{
     export::{NetworkFile, format_number},
     network::DecouplingNetwork,
 };
-use eframe::egui::Key;
+use eframe::egui::{Key, Modifiers};
 
 use crate::driver::{Driver, small, trained};
 
@@ -141,6 +141,14 @@ fn a_form_is_closed_without_writing() {
     driver.click(ERRORS);
     driver.type_into("File", "  ");
     assert!(!driver.is_enabled("Save"), "a file needs a name");
+    let (phase, shown) = (driver.state().phase, driver.state().look.snapshot);
+    driver.press_with(Modifiers::COMMAND, Key::Enter);
+    driver.press(Key::PageDown);
+    assert_eq!(
+        (driver.state().phase, driver.state().look.snapshot),
+        (phase, shown),
+        "nothing happens behind the form"
+    );
 }
 
 #[test]

@@ -130,7 +130,6 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
             assert!(driver.has("Decoupled surface"), "{changes:?}");
             driver.click_button("Error");
         }
-        println!("{changes:?}: {:?} {:?}", driver.state().phase, driver.state().notice);
         shows_no_infinities(&driver);
     }
 }

@@ -65,9 +65,15 @@ fn album(size: Vec2, is_dark: bool) {
         album.driver.click(tab);
         album.take(&format!("8-{}", tab.replace(' ', "-").to_lowercase()));
     }
-    let surface = album.driver.get("Decoupled surface").rect().center();
-    album.driver.harness().hover_at(surface);
-    album.driver.harness().run_steps(6);
+    let surface = album.driver.get("Decoupled surface").rect();
+    for step in 0..80 {
+        let at = surface.left_center() + vec2(0.3 * surface.width() + step as f32, 0.0);
+        album.driver.harness().hover_at(at);
+        album.driver.harness().run_steps(2);
+        if album.driver.state().look.node.is_some() {
+            break;
+        }
+    }
     album.take("9-hover");
     album.driver.harness().remove_cursor();
     album.driver.click("Type a path for the network");
@@ -81,6 +87,9 @@ fn album(size: Vec2, is_dark: bool) {
     album.driver.click("Dismiss");
     choose_method(&mut album.driver, "Momentum, Eq. (11)");
     album.driver.enter("Learning rate", "1e6");
+    album.driver.train();
+    album.take("12-rising");
+    album.driver.enter("Validation samples", "0");
     album.driver.train();
     album.take("12-diverged");
     album.driver.click("Geometry");
