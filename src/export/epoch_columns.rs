@@ -22,6 +22,7 @@ struct Columns {
     test_mse: Vec<Option<Number>>,
     gradient_norm: Vec<Number>,
     parameter: Vec<Number>,
+    effective_parameters: Vec<Option<Number>>,
     validation_failures: Vec<usize>,
 }
 
@@ -36,6 +37,7 @@ impl From<History> for Columns {
                 test_mse,
                 gradient_norm,
                 parameter,
+                effective_parameters,
                 validation_failures,
             } = record;
             columns.epoch.push(epoch);
@@ -44,6 +46,7 @@ impl From<History> for Columns {
             columns.test_mse.push(test_mse.map(Number));
             columns.gradient_norm.push(Number(gradient_norm));
             columns.parameter.push(Number(parameter));
+            columns.effective_parameters.push(effective_parameters.map(Number));
             columns.validation_failures.push(validation_failures);
         }
         columns
@@ -61,6 +64,7 @@ impl TryFrom<Columns> for History {
             ("test_mse", columns.test_mse.len()),
             ("gradient_norm", columns.gradient_norm.len()),
             ("parameter", columns.parameter.len()),
+            ("effective_parameters", columns.effective_parameters.len()),
             ("validation_failures", columns.validation_failures.len()),
         ];
         for (name, length) in lengths {
@@ -78,6 +82,7 @@ impl TryFrom<Columns> for History {
             test_mse: columns.test_mse[place].map(|number| number.0),
             gradient_norm: columns.gradient_norm[place].0,
             parameter: columns.parameter[place].0,
+            effective_parameters: columns.effective_parameters[place].map(|number| number.0),
             validation_failures: columns.validation_failures[place],
         };
         Ok(Self((0..epochs).map(record).collect()))
@@ -149,6 +154,7 @@ mod tests {
             test_mse: None,
             gradient_norm: value,
             parameter: value,
+            effective_parameters: Some(value),
             validation_failures: epoch,
         };
         let history = History(values.iter().enumerate().map(record).collect());

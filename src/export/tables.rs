@@ -85,6 +85,7 @@ mod tests {
             test_mse: Some(1e-300),
             gradient_norm: f64::INFINITY,
             parameter: 1e-3,
+            effective_parameters: None,
             validation_failures: 0,
         };
         let mut table = Vec::new();
