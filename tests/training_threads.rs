@@ -13,7 +13,7 @@ use training_problems::wave;
 fn train(method: Method, threads: usize, epochs: usize) -> Mlp {
     let shape = Shape {
         inputs: 40,
-        hidden: 30,
+        hidden: 34,
         outputs: 5,
     };
     let columns = |count, first| Array2::from_shape_fn((700, count), |(row, column)| wave(row, first + column));
