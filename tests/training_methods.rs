@@ -152,6 +152,27 @@ fn bayesian_regularisation_tells_noise_from_structure() {
 }
 
 #[test]
+fn a_network_too_wide_for_the_normal_equations_is_refused_with_a_way_out() {
+    let shape = Shape {
+        inputs: 96,
+        hidden: 512,
+        outputs: 1,
+    };
+    let zeros = |columns| Array2::<f64>::zeros((5, columns));
+    let train = |name: &str| {
+        let examples = Examples::new(zeros(96).view(), zeros(1).view());
+        let settings = TrainingSettings {
+            method: named(name),
+            stopping: StoppingRules::default(),
+        };
+        Trainer::new(Mlp::zeros(shape), alone(examples), settings)
+    };
+    let refusal = train("lm").err().expect("20 GB are refused").to_string();
+    assert!(refusal.contains("scg"), "{refusal}");
+    assert!(train("scg").is_ok());
+}
+
+#[test]
 fn extremes_end_with_a_reason_and_without_nan() {
     let constant = |value: f64, samples: usize| {
         let targets = Array2::from_shape_fn((samples, 2), |(row, output)| wave(row, output));

@@ -5,9 +5,13 @@
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs)]
 
+mod dense;
 mod epoch;
+mod growth;
 mod timing;
 
 fn main() {
     epoch::print();
+    dense::print();
+    growth::print();
 }

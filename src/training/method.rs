@@ -164,6 +164,14 @@ impl Method {
         copy.settings().iter().try_for_each(Setting::check)
     }
 
+    /// Whether it factors the normal equations, whose memory grows with the square of the hidden weights.
+    pub(super) fn has_normal_equations(&self) -> bool {
+        matches!(
+            self,
+            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_)
+        )
+    }
+
     /// Puts the method to work from the weights of `mlp`.
     pub(super) fn start(&self, mlp: &Mlp, examples: &Examples) -> (Box<dyn Algorithm>, Evaluation) {
         fn boxed<A: Algorithm + 'static>((method, now): (A, Evaluation)) -> (Box<dyn Algorithm>, Evaluation) {

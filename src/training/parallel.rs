@@ -5,8 +5,9 @@
 
 use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
 
-/// Multiplications (rows × depth × columns) below which a product is not worth dividing: about 0.2 ms of work.
-const LARGE: usize = 1 << 23;
+/// Multiplications (rows × depth × columns) below which a product is not worth dividing: about a
+/// millisecond of work, many times what waking another thread costs.
+const LARGE: usize = 1 << 25;
 /// Narrower products waste the vector registers.
 const NARROWEST: usize = 16;
 

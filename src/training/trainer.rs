@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations,
-    algorithm::Algorithm,
+    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, StopReason, StoppingRules,
+    activations::Activations, algorithm::Algorithm,
 };
-use crate::network::Mlp;
+use crate::network::{Mlp, Shape};
 
 /// How to train.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,6 +53,32 @@ pub enum TrainingError {
     /// No hidden nodes.
     #[error("the network has no hidden nodes: give at least 1")]
     NoHiddenNodes,
+    /// The method's equations would take too much memory.
+    #[error(
+        "the network is too wide for this method: its equations would take {:.1} GB; use the scaled conjugate gradient \
+         (scg) or fewer hidden nodes",
+        *.bytes as f64 * 1e-9
+    )]
+    TooWide {
+        /// How many bytes they would take.
+        bytes: usize,
+    },
+}
+
+/// The most memory that the equations of a method may take.
+const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
+
+/// Refuses a method whose equations would not fit into memory.
+fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
+    let bytes = if method.has_normal_equations() {
+        NormalEquations::bytes(shape)
+    } else {
+        0
+    };
+    if bytes > LARGEST_EQUATIONS_BYTES {
+        return Err(TrainingError::TooWide { bytes });
+    }
+    Ok(())
 }
 
 /// A training in progress: a value that is stepped one epoch at a time, so that pausing is not stepping.
@@ -91,6 +117,7 @@ impl Trainer {
         if start.shape().hidden == 0 {
             return Err(TrainingError::NoHiddenNodes);
         }
+        check_width(&settings.method, start.shape())?;
         let begun = Instant::now();
         let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {
@@ -141,9 +168,10 @@ impl Trainer {
     /// the training has ended, unless it ended because all epochs were run. Epochs go on counting.
     ///
     /// # Errors
-    /// A setting out of range; then nothing has changed.
-    pub fn continue_with(&mut self, method: Method) -> Result<(), SettingError> {
+    /// A setting out of range, or a network too wide for the method; then nothing has changed.
+    pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
         method.check()?;
+        check_width(&method, self.mlp.shape())?;
         let begun = Instant::now();
         self.settings.method = method;
         (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);

@@ -1,4 +1,5 @@
 //! A small problem shared by the tests of training: two smooth functions of three inputs.
+#![allow(dead_code, reason = "each test uses a part")]
 
 use decoupler::{
     network::{Mlp, Shape},

@@ -31,6 +31,16 @@ impl NormalEquations {
         }
     }
 
+    /// About how much memory the equations of a network of this shape take: S, and BᵀB packed.
+    pub fn bytes(shape: Shape) -> usize {
+        let (n1, h, order) = (shape.inputs + 1, shape.hidden, shape.hidden_weights());
+        let gram = (n1 * (n1 + 1) / 2).saturating_mul(h * (h + 1) / 2);
+        order
+            .saturating_mul(order)
+            .saturating_add(gram)
+            .saturating_mul(size_of::<f64>())
+    }
+
     /// Mean squared error at the weights of `mlp`. To gather at the same weights next costs no second run of the
     /// network.
     pub fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
