@@ -204,9 +204,9 @@ impl DecouplerWindow {
         // Narrow windows give the side panels less, so that the surfaces keep most of the room.
         let width = ui.available_width();
         let (left, right) = if width < 1200.0 {
-            (space(58), space(68))
+            (space(60), space(84))
         } else {
-            (space(68), space(84))
+            (space(68), space(94))
         };
         Panel::top("top bar")
             .exact_size(space(11))

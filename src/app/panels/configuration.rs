@@ -70,7 +70,7 @@ fn scene_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     let hint = "Everything random follows from it: the same seed gives the same network.";
     field_ui(ui, "Seed", hint, |ui| {
         ui.add_sized(
-            [space(18), space(6)],
+            [space(16), space(6)],
             eframe::egui::DragValue::new(&mut draft.seed.0).speed(0.1),
         )
     });
@@ -120,7 +120,7 @@ fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     field_ui(ui, "Method", "How the weights are improved.", |ui| {
         let combo = ComboBox::from_id_salt("method")
             .selected_text(method.name())
-            .width(space(38))
+            .width(space(38).min(ui.available_width() - space(2)))
             .height(space(90));
         let shown = combo.show_ui(ui, |ui| {
             for option in Method::all() {

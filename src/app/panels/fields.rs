@@ -49,7 +49,7 @@ fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, u
             .custom_formatter(|value, _| input_text(value))
             .custom_parser(|text| text.trim().parse().ok());
     }
-    ui.add_sized([space(18), space(6)], drag)
+    ui.add_sized([space(16), space(6)], drag)
 }
 
 /// The name with its first letter large.

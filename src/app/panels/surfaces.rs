@@ -72,7 +72,7 @@ fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
 fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        title_ui(ui, "By the network");
+        title_ui(ui, "Network");
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
             if let Some(right) = segmented_ui(ui, "What the network's card shows", &options, state.look.right, false) {
