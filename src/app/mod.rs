@@ -1,6 +1,6 @@
 //! The window: state, actions, a worker thread, panels and theme.
 //!
-//! Panels read [`State`] and return [`Action`]s; [`DecouplerWindow`] applies them. The [`Worker`](worker::Worker)
+//! Panels read [`State`] and return [`Action`]s; [`DecouplerWindow`] applies them. The worker
 //! draws samples, trains and writes files on a thread of its own and wakes the window with events, so the window
 //! never blocks and asks for no repaint while nothing changes.
 
