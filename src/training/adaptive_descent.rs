@@ -97,7 +97,7 @@ pub(super) struct AdaptiveDescent {
     candidate: Mlp,
 }
 
-/// What [`AdaptiveDescent`] remembers.
+/// What `AdaptiveDescent` remembers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveState {

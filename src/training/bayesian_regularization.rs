@@ -88,7 +88,7 @@ pub(super) struct BayesianRegularization {
     candidate: Mlp,
 }
 
-/// What [`BayesianRegularization`] remembers.
+/// What `BayesianRegularization` remembers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BayesianState {

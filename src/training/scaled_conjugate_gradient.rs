@@ -60,7 +60,7 @@ pub(super) struct ScaledConjugateGradient {
     moved: Mlp,
 }
 
-/// What [`ScaledConjugateGradient`] remembers, in Møller's letters.
+/// What `ScaledConjugateGradient` remembers, in Møller's letters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConjugateState {

@@ -88,7 +88,7 @@ pub(super) struct VariableProjection {
     candidate: Mlp,
 }
 
-/// What [`VariableProjection`] remembers.
+/// What `VariableProjection` remembers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectionState {
