@@ -12,6 +12,7 @@ use std::{
 };
 
 use ndarray::Array2;
+use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 use super::{
     export_kind::ExportKind,
@@ -22,8 +23,9 @@ use crate::{
     training::{EpochRecord, StopReason},
 };
 
-/// The shortest time between two reports of a training: about one per frame.
-const REPORT_INTERVAL: Duration = Duration::from_millis(33);
+/// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
+/// between them in which the user is answered at once, also where frames are drawn without a graphics card.
+const REPORT_INTERVAL: Duration = Duration::from_millis(66);
 
 /// What the window asks of the worker.
 #[derive(Debug)]
@@ -108,9 +110,10 @@ impl Worker {
             outgoing,
             wake: Box::new(wake),
         };
-        thread::Builder::new()
-            .name("training".to_owned())
-            .spawn(move || Labour::new(report).run(&incoming))?;
+        thread::Builder::new().name("training".to_owned()).spawn(move || {
+            yield_to_window();
+            Labour::new(report).run(&incoming);
+        })?;
         Ok(Self { requests, events })
     }
 
@@ -130,6 +133,17 @@ impl Worker {
             Err(TryRecvError::Empty) => Ok(None),
             Err(TryRecvError::Disconnected) => Err(WorkerDied),
         }
+    }
+}
+
+/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about three times its
+/// share, and training is not starved by other programs.
+fn yield_to_window() {
+    /// Of 0 to 99, where about 50 is normal.
+    const BELOW_NORMAL: u8 = 37;
+    if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {
+        // Where the system refuses, training merely competes with the window.
+        let _ = ThreadPriority::Crossplatform(priority).set_for_current();
     }
 }
 
