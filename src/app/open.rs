@@ -6,16 +6,30 @@ use super::{DecouplerWindow, DialogKind};
 /// Why the window cannot open.
 #[derive(Debug, Error)]
 pub enum OpenError {
-    /// No display, or no OpenGL on it.
-    #[error("no window can be opened here ({0}); `decoupler train --help` does the same work in a terminal")]
+    /// Nothing to open it on.
+    #[error("there is no display to open a window on; `decoupler train --help` does the same work in a terminal")]
+    NoDisplay,
+    /// No OpenGL on it, or the display refuses.
+    #[error("no window can be opened here: {0}; {PACKAGES}")]
     NoWindow(String),
+    /// A library that the window needs cannot be loaded, or the window itself failed.
+    #[error("the window failed as said above; {PACKAGES}")]
+    Failed,
 }
+
+/// What a bare system lacks.
+const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommon-x11-0 libgl1-mesa-dri, or work in a \
+                        terminal: `decoupler train --help`";
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// There is no display to open it on.
+/// There is no display, or no OpenGL on it.
 pub fn open() -> Result<(), OpenError> {
+    let displays = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    if cfg!(target_os = "linux") && displays.iter().all(|name| std::env::var_os(name).is_none()) {
+        return Err(OpenError::NoDisplay);
+    }
     let icon = eframe::icon_data::from_png_bytes(include_bytes!("../../assets/icon.png"));
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("Decoupler")
@@ -35,5 +49,11 @@ pub fn open() -> Result<(), OpenError> {
         let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native)?;
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };
-    eframe::run_native("Decoupler", options, Box::new(create)).map_err(|error| OpenError::NoWindow(error.to_string()))
+    // A library that is not there makes the window system panic, with the library's name.
+    let run = || eframe::run_native("Decoupler", options, Box::new(create));
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(OpenError::NoWindow(error.to_string())),
+        Err(_) => Err(OpenError::Failed),
+    }
 }
