@@ -66,9 +66,9 @@ fn album(size: Vec2, is_dark: bool) {
         album.take(&format!("8-{}", tab.replace(' ', "-").to_lowercase()));
     }
     let surface = album.driver.get("Decoupled surface").rect();
-    for step in 0..80 {
-        let at = surface.left_center() + vec2(0.3 * surface.width() + step as f32, 0.0);
-        album.driver.harness().hover_at(at);
+    let places = (0..400).map(|step| vec2((step % 20) as f32 / 20.0, (step / 20) as f32 / 20.0));
+    for place in places {
+        album.driver.harness().hover_at(surface.lerp_inside(place));
         album.driver.harness().run_steps(2);
         if album.driver.state().look.node.is_some() {
             break;
