@@ -42,7 +42,7 @@ impl ExportKind {
     pub fn description(self) -> &'static str {
         match self {
             Self::Network => {
-                "Layers, scaling, array, geometry, training record and errors, as JSON; `decoupler decode` reads it."
+                "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal command decode reads it."
             }
             Self::Errors => "The table of errors, as CSV.",
             Self::LossCurves => "Training, validation and test error of every epoch, as CSV.",

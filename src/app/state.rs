@@ -32,6 +32,8 @@ pub struct State {
     pub notice: Option<Notice>,
     /// A file waiting for its path.
     pub saving: Option<Saving>,
+    /// The path last typed, offered again for the same kind of file.
+    pub typed: Option<Saving>,
 }
 
 /// What the worker is doing.
@@ -227,6 +229,7 @@ impl State {
             frames: Frames::default(),
             notice: None,
             saving: None,
+            typed: None,
         }
     }
 

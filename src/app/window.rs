@@ -100,7 +100,10 @@ impl DecouplerWindow {
                 }
                 state.refresh_frames();
             }
-            Event::Exported(Ok(path)) => state.notice = Some(Notice::Done(format!("Saved {}", path.display()))),
+            Event::Exported(Ok(path)) => {
+                state.typed = None;
+                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
+            }
             Event::Exported(Err(error)) => state.notice = Some(Notice::Failed(error)),
         }
     }
@@ -149,8 +152,12 @@ impl DecouplerWindow {
                     .ask(kind, &state.suggested_path(kind), move || ctx.request_repaint());
             }
             Action::TypePath(kind) => {
-                let path = state.suggested_path(kind).display().to_string();
-                state.saving = Some(Saving { kind, path });
+                let typed = state.typed.clone().filter(|typed| typed.kind == kind);
+                let suggested = || state.suggested_path(kind).display().to_string();
+                state.saving = Some(typed.unwrap_or_else(|| Saving {
+                    kind,
+                    path: suggested(),
+                }));
             }
             Action::EditPath(path) => {
                 if let Some(saving) = &mut state.saving {
@@ -158,7 +165,7 @@ impl DecouplerWindow {
                 }
             }
             Action::Export(kind, path) => {
-                state.saving = None;
+                state.typed = state.saving.take();
                 self.worker.ask(Request::Export(kind, path));
             }
             Action::CancelSave => state.saving = None,

@@ -230,11 +230,15 @@ impl Trainer {
 
     fn reason_to_stop(&self, epoch: usize, now: Evaluation) -> Option<StopReason> {
         let rules = self.settings.stopping;
+        let validation_rose = self.validation_failures >= rules.max_fail;
+        let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
             (!now.mse.is_finite(), StopReason::Diverged),
+            // Validation that rises together with the training error, above where it began, is no overfitting.
+            (validation_rose && now.mse > start_mse, StopReason::Diverged),
             (now.mse <= rules.goal_mse, StopReason::GoalReached),
             (now.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
-            (self.validation_failures >= rules.max_fail, StopReason::ValidationRose),
+            (validation_rose, StopReason::ValidationRose),
             (epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)

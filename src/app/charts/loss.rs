@@ -15,7 +15,7 @@ pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
         ("validation", palette.validation_series, |epoch| epoch.validation_mse),
         ("test", palette.test_series, |epoch| epoch.test_mse),
     ];
-    plot(ui, "loss", "epoch", "mean squared error, scaled")
+    plot(ui, "loss", "epoch", "mse (scaled)")
         .legend(legend())
         .y_grid_spacer(decades)
         .y_axis_formatter(|mark, _| decade_text(mark))

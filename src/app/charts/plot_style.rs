@@ -14,6 +14,10 @@ pub fn plot<'a>(ui: &Ui, id: &'static str, x_name: &'static str, y_name: &'stati
     Plot::new(id)
         .x_axis_label(x_name)
         .y_axis_label(y_name)
+        .x_grid_spacer(round_steps)
+        .y_grid_spacer(round_steps)
+        .x_axis_formatter(|mark, _| step_text(mark))
+        .y_axis_formatter(|mark, _| step_text(mark))
         .show_background(false)
         .grid_color(palette.line)
         .allow_scroll(false)
@@ -39,6 +43,41 @@ pub fn thinned<T: Copy>(items: &[T]) -> impl Iterator<Item = T> + '_ {
         .step_by(stride)
         .chain(items.last().filter(|_| is_last_extra))
         .copied()
+}
+
+/// About five marks in sight, at multiples of 1, 2 or 5 times a power of ten.
+pub fn round_steps(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let rough = (high - low) / 5.0;
+    if !(rough.is_finite() && rough > 0.0) {
+        return Vec::new();
+    }
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|step| step * power)
+        .into_iter()
+        .find(|step| *step >= rough);
+    let step = step.unwrap_or(rough);
+    let first = (low / step).ceil();
+    let count = ((high / step).floor() - first).clamp(0.0, 64.0) as usize;
+    let marks = (0..=count).map(|index| (first + index as f64) * step);
+    marks.map(|value| GridMark { value, step_size: step }).collect()
+}
+
+/// The number at a mark of [`round_steps`], with as many decimals as the step needs.
+pub fn step_text(mark: GridMark) -> String {
+    let decimals = (-mark.step_size.log10().floor()).clamp(0.0, 12.0) as usize;
+    let text = format!("{:.decimals$}", mark.value);
+    // Rounding may leave a zero with a sign.
+    if text
+        .trim_start_matches('-')
+        .bytes()
+        .all(|byte| matches!(byte, b'0' | b'.'))
+    {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
+    }
 }
 
 /// Marks for a chart that draws the decimal logarithm: whole decades, and 2 and 5 between them where few are seen.
@@ -71,6 +110,22 @@ pub fn decade_text(mark: GridMark) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_of_a_plain_axis_are_round_and_few() {
+        let marks = |low, high| -> Vec<String> {
+            let input = GridInput {
+                bounds: (low, high),
+                base_step_size: 0.1,
+            };
+            round_steps(input).into_iter().map(step_text).collect()
+        };
+        assert_eq!(marks(-0.3, 1.1), ["0.0", "0.5", "1.0"]);
+        assert_eq!(marks(3.98, 5.02), ["4.0", "4.5", "5.0"]);
+        assert_eq!(marks(0.0, 1000.0), ["0", "200", "400", "600", "800", "1000"]);
+        assert_eq!(marks(1.0, 1.0).len(), 0);
+        assert_eq!(marks(f64::NAN, 1.0).len(), 0);
+    }
 
     #[test]
     fn marks_of_a_log_axis_lie_in_sight_and_read_as_numbers() {

@@ -13,7 +13,7 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &
     let half = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
     let height = ui.available_height();
     ui.horizontal(|ui| {
-        plot(ui, "training state", "epoch", "on a log scale")
+        plot(ui, "training state", "epoch", "gradient, parameter")
             .width(half)
             .height(height)
             .legend(legend())
@@ -30,7 +30,7 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &
                     plot_ui.line(Line::new(name, PlotPoints::from(points)).color(colour).width(1.8));
                 }
             });
-        plot(ui, "validation failures", "epoch", "validation error rises in a row")
+        plot(ui, "validation failures", "epoch", "rises in a row")
             .width(half)
             .height(height)
             .include_y(0.0)

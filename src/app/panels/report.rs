@@ -29,7 +29,7 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         worst_node_ui(ui, result, &mut actions);
         section_heading_ui(ui, "Cost");
         cost_ui(ui, run, result);
-        section_heading_ui(ui, "Take it with you");
+        section_heading_ui(ui, "Export");
         export_ui(ui, &mut actions);
     });
     actions
@@ -122,7 +122,8 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     if epochs > 0 {
         rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
     }
-    rows.push(("Decoding a snapshot", format_duration(result.frame_time)));
+    let microseconds = 1e6 * result.frame_time.as_secs_f64();
+    rows.push(("Decoding a snapshot", format!("{} µs", format_number(microseconds))));
     rows.push(("Best epoch", result.best_epoch.to_string()));
     for (name, value) in rows {
         ui.horizontal(|ui| {

@@ -8,6 +8,7 @@ use crate::{
         theme::{Theme, space, type_size},
     },
     export::{format_duration, format_number},
+    training::StopReason,
 };
 
 /// What is going on: phase, epoch, error, speed, time left, and why it stopped.
@@ -42,6 +43,7 @@ fn phase_in_words(state: &State, ui: &Ui) -> (Color32, String) {
         Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),
         Phase::Paused => (palette.warning, "Paused".to_owned()),
+        Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),
         Phase::Ended(reason) if reason.was_successful() => (palette.good, format!("Finished: {reason}")),
         Phase::Ended(reason) => (palette.bad, format!("Ended: {reason}")),
         Phase::Died => (palette.bad, "The training thread ended unexpectedly".to_owned()),

@@ -44,14 +44,22 @@ fn in_card(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-fn title_ui(ui: &mut Ui, title: &str) {
+/// The card's title, where the options beside it, `options_width` wide, leave room for it.
+fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
+    let font = semibold(type_size().title);
+    let galley = ui
+        .painter()
+        .layout_no_wrap(title.to_owned(), font, eframe::egui::Color32::WHITE);
+    if galley.size().x + options_width > ui.available_width() {
+        return;
+    }
     ui.label(RichText::new(title).font(semibold(type_size().title)));
 }
 
 fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        title_ui(ui, "Actual");
+        title_ui(ui, "Actual", space(29));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
             if let Some(mode) = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false) {
@@ -72,7 +80,7 @@ fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
 fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        title_ui(ui, "Network");
+        title_ui(ui, "Network", space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
             if let Some(right) = segmented_ui(ui, "What the network's card shows", &options, state.look.right, false) {
