@@ -126,8 +126,8 @@ fn train(run: &mut Run, with_progress: bool) {
     let style = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.enable_steady_tick(Duration::from_millis(200));
-    while run.trainer_mut().step().is_none() {
-        let latest = run.trainer().latest();
+    while run.step().is_none() {
+        let latest = run.leader().latest();
         bar.set_position(latest.epoch as u64);
         if !bar.is_hidden() {
             bar.set_message(format!("mse {}", format_number(latest.training_mse)));
