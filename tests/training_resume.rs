@@ -87,7 +87,7 @@ fn a_damaged_or_foreign_state_is_refused() {
     let damaged = |error| matches!(error, ResumeError::Damaged(_));
     assert!(damaged(edited(|value| value["shape"]["hidden"] = 7.into())), "layers");
     assert!(
-        damaged(edited(|value| value["history"][1]["epoch"] = 5.into())),
+        damaged(edited(|value| value["history"]["epoch"][1] = 5.into())),
         "history"
     );
     assert!(
