@@ -151,19 +151,25 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
 #[test]
 fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = command(
-        "train --epochs 1000000 --max-fail 1000000 --min-gradient 0 --out n.json",
-        folder.path(),
-    );
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // Long enough for the samples to be drawn; earlier it ends at once, with the same status.
-    thread::sleep(Duration::from_secs(3));
-    interrupt(&child);
-    let output = child.wait_with_output().unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{told}");
+    let interrupted_after = |seconds| {
+        let arguments = "train --epochs 1000000 --max-fail 1000000 --min-gradient 0 --out n.json";
+        let mut command = command(arguments, folder.path());
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        thread::sleep(Duration::from_secs(seconds));
+        interrupt(&child);
+        let output = child.wait_with_output().unwrap();
+        (
+            output.status.code(),
+            String::from_utf8(output.stderr).unwrap(),
+            output.stdout,
+        )
+    };
+    // Before the first epoch there is nothing to keep, and it ends at once; then it is given more time.
+    let mut outputs = [1, 5, 20].into_iter().map(interrupted_after);
+    let (status, told, printed) = outputs.find(|(_, told, _)| told.contains("after epoch")).unwrap();
+    assert_eq!(status, Some(130), "{told}");
     assert!(told.contains("with --checkpoint FILE it could go on"), "{told}");
-    assert!(String::from_utf8(output.stdout).unwrap().contains("stopped by you"));
+    assert!(String::from_utf8(printed).unwrap().contains("stopped by you"));
     assert!(NetworkFile::load(&folder.path().join("n.json")).is_ok());
 }
 
