@@ -9,7 +9,7 @@ use super::camera::OrbitCamera;
 use super::edge::{Edge, GAP, SHORTEST_AXIS, TICK, to_egui, to_glam};
 use super::labels::Labels;
 use super::projection::{Bounds, PlotBox, Projection};
-use super::ticks::tick_text;
+use crate::app::ticks::tick_text;
 use crate::app::theme::Theme;
 
 /// A laid-out box.

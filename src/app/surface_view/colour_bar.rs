@@ -6,7 +6,7 @@ use eframe::egui::{self, Mesh, Rect, Response, Sense, Stroke, StrokeKind, Ui, Wi
 
 use super::edge::TICK;
 use super::labels::Labels;
-use super::ticks::{multiples, round_steps, tick_text};
+use crate::app::ticks::{multiples, round_steps, tick_text};
 use super::view::Colours;
 use crate::app::theme::Theme;
 

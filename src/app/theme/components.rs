@@ -1,8 +1,8 @@
 //! The few components that egui lacks, each reachable by its label.
 
 use eframe::egui::{
-    self, Button, Color32, CornerRadius, Frame, Id, Label, Margin, Response, RichText, Stroke, Ui, Widget, WidgetText,
-    vec2,
+    self, Align, Button, Color32, CornerRadius, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea, Stroke, Ui, UiBuilder, Widget,
+    WidgetText, vec2,
 };
 
 use super::Theme;
@@ -22,12 +22,31 @@ pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
     response
 }
 
-/// A card on the background.
-pub fn card_frame(theme: &Theme) -> Frame {
-    Frame::new()
-        .fill(theme.palette.panel)
+/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own beside
+/// them.
+pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
+    let strip = Margin {
+        right: 10,
+        ..Margin::ZERO
+    };
+    ScrollArea::vertical()
+        .id_salt(id)
+        .auto_shrink(false)
+        .show(ui, |ui| Frame::new().inner_margin(strip).show(ui, contents));
+}
+
+/// A card on the background that fills `rect`.
+pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
+    let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
+    card.set_clip_rect(rect.intersect(ui.clip_rect()));
+    let frame = Frame::new()
+        .fill(Theme::of(ui).palette.panel)
         .corner_radius(radius())
-        .inner_margin(Margin::same(12))
+        .inner_margin(Margin::same(12));
+    frame.show(&mut card, |ui| {
+        ui.set_min_size(ui.available_size());
+        contents(ui);
+    });
 }
 
 /// The one button that matters most.
