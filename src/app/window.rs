@@ -355,7 +355,12 @@ mod tests {
         window.worker = Worker::dead();
         wait(&mut window, |state| state.phase == Phase::Died);
         window.apply(Action::RestartWorker);
-        wait(&mut window, |state| state.preview.as_ref().is_some_and(|preview| preview.baselines.is_some()));
+        wait(&mut window, |state| {
+            state
+                .preview
+                .as_ref()
+                .is_some_and(|preview| preview.baselines.is_some())
+        });
     }
 
     #[test]
@@ -376,7 +381,10 @@ mod tests {
         window.apply(Action::DismissNotice);
         window.apply(Action::Export(super::super::ExportKind::Network, path.clone()));
         wait(&mut window, |state| state.notice.is_some());
-        assert_eq!(window.state.notice, Some(Notice::Done(format!("Saved {}", path.display()))));
+        assert_eq!(
+            window.state.notice,
+            Some(Notice::Done(format!("Saved {}", path.display())))
+        );
         let file = crate::export::NetworkFile::load(&path).unwrap();
         assert_eq!(file.settings.hidden, shown.hidden);
     }

@@ -54,7 +54,11 @@ fn what_a_network_has_to_beat_stands_there_before_a_training() {
     driver.enter("Training samples", "200");
     let before = driver.table();
     driver.wait("the new baselines", |driver| driver.table() != before);
-    assert_eq!(driver.table(), pending(&driver), "and the paper has none for 200 samples");
+    assert_eq!(
+        driver.table(),
+        pending(&driver),
+        "and the paper has none for 200 samples"
+    );
 }
 
 #[test]
@@ -64,7 +68,9 @@ fn rules_of_thumb_are_said_in_plain_words() {
     assert!(driver.has("30 inputs, 20 outputs, 632 weights"));
     assert!(!driver.says("Eq. (12)"));
     driver.get("Rules of thumb: 5, or 9 to 18").hover();
-    driver.wait("the equations", |driver| driver.says("(Eq. 12)") && driver.says("(Eq. 13)"));
+    driver.wait("the equations", |driver| {
+        driver.says("(Eq. 12)") && driver.says("(Eq. 13)")
+    });
 }
 
 #[test]

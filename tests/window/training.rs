@@ -14,7 +14,7 @@ use crate::{
     driver::{Driver, small, table_of, trained},
 };
 
-const TABS: [&str; 5] = ["Loss", "Training state", "Error histogram", "Regression", "Nodes"];
+const TABS: [&str; 5] = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
 
 #[test]
 fn a_training_ends_with_the_librarys_own_numbers() {
@@ -211,7 +211,8 @@ fn the_verdict_names_a_remedy_that_fits_the_end() {
     choose_method(&mut driver, "Levenberg-Marquardt");
     assert!(driver.says("The settings have changed since this training."));
     driver.enter("Epochs", "200");
-    driver.enter("Validation samples", "0");
+    driver.enter("Hidden nodes", "14");
+    driver.enter("Training samples", "1000");
     driver.train();
     assert!(driver.says("times as accurate as the linear map"));
 }
@@ -248,7 +249,10 @@ fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
     assert!(driver.says("error grew without bound: lower the learning rate"));
-    let verdict = driver.texts().into_iter().find(|text| text.contains("shown is the best network before that"));
+    let verdict = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.contains("shown is the best network before that"));
     assert!(verdict.is_some_and(|text| text.ends_with("Lower the learning rate.")));
     assert!(!driver.says("Train for more epochs"), "more of the same would not help");
     for tab in TABS {

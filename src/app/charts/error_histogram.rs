@@ -24,14 +24,19 @@ pub fn error_histogram_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64
         .color(palette.accent)
         .element_formatter(Box::new(text));
     let highest = counts.iter().copied().max().unwrap_or(0);
-    plot(ui, "error histogram", "error of z (mm), decoupled − actual", "nodes of the test set")
-        .include_y(0.0)
-        // Room for the words above the highest bar.
-        .include_y(1.1 * highest as f64)
-        .show(ui, |plot_ui| {
-            plot_ui.bar_chart(chart);
-            plot_ui.vline(VLine::new("no error", 0.0).color(palette.dim).width(1.0));
-        });
+    plot(
+        ui,
+        "error histogram",
+        "error of z (mm), decoupled − actual",
+        "nodes of the test set",
+    )
+    .include_y(0.0)
+    // Room for the words above the highest bar.
+    .include_y(1.1 * highest as f64)
+    .show(ui, |plot_ui| {
+        plot_ui.bar_chart(chart);
+        plot_ui.vline(VLine::new("no error", 0.0).color(palette.dim).width(1.0));
+    });
 }
 
 /// Counts in [`BINS`] bins symmetric about 0, and the width of a bin.

@@ -71,7 +71,12 @@ impl Key {
             }
             Mark::Squares => {
                 let square = Rect::from_center_size(middle, Vec2::splat(7.0));
-                painter.rect_stroke(square, CornerRadius::ZERO, Stroke::new(1.2, self.colour), StrokeKind::Inside);
+                painter.rect_stroke(
+                    square,
+                    CornerRadius::ZERO,
+                    Stroke::new(1.2, self.colour),
+                    StrokeKind::Inside,
+                );
             }
             Mark::Discs => {
                 painter.circle_filled(middle, 3.0, self.colour);

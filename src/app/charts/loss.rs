@@ -42,7 +42,7 @@ pub fn loss_keys(palette: &Palette, history: &[EpochRecord]) -> Vec<Key> {
 /// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights.
 pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
     let palette = Theme::of(ui).palette;
-    plot(ui, "loss", "epoch", "mean squared error (scaled)")
+    plot(ui, "loss", "epoch", "mse (scaled)")
         .y_grid_spacer(log_marks)
         .y_axis_formatter(|mark, _| log_text(mark.value))
         .label_formatter(hover_text)

@@ -11,7 +11,8 @@ use crate::app::{
 /// The most points drawn of one curve; more would not be seen.
 const MOST_POINTS: usize = 2000;
 
-/// What the number at a mark takes with the room around it, in points.
+/// The most parts into which marks divide an axis; and what the number at a mark takes with the room around it, in points.
+const MOST_MARKS: f64 = 7.0;
 const NUMBER_WIDTH: f64 = 50.0;
 const NUMBER_HEIGHT: f64 = 16.0;
 /// The least distance of grid lines, in points; the plot tells its scale by it.
@@ -31,8 +32,8 @@ pub fn plot<'a>(ui: &Ui, id: &'static str, x_name: &str, y_name: &str) -> Plot<'
     Plot::new(id)
         .custom_x_axes(vec![axis(AxisHints::new_x(), x_name, 24.0)])
         .custom_y_axes(vec![axis(AxisHints::new_y(), y_name, 12.0)])
-        .x_grid_spacer(|input| round_marks(input, NUMBER_WIDTH))
-        .y_grid_spacer(|input| round_marks(input, NUMBER_HEIGHT))
+        .x_grid_spacer(|input| round_marks(&input, NUMBER_WIDTH))
+        .y_grid_spacer(|input| round_marks(&input, NUMBER_HEIGHT))
         .grid_spacing(Rangef::new(LEAST_GRID, 300.0))
         .show_background(false)
         .grid_color(palette.line)
@@ -53,17 +54,28 @@ pub fn thinned<T: Copy>(items: &[T]) -> impl Iterator<Item = T> + '_ {
         .copied()
 }
 
-/// About five marks in sight, at round numbers, fewer where they would be nearer than so many points.
-pub fn round_marks(input: GridInput, apart: f64) -> Vec<GridMark> {
+/// A few marks in sight, at round numbers, fewer where they would be nearer than so many points.
+pub fn round_marks(input: &GridInput, apart: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let width = high - low;
     if !(width.is_finite() && width > 0.0) {
         return Vec::new();
     }
-    let parts = (width / value_of(apart, &input)).clamp(1.0, 5.0) as usize;
-    let step = step_for(&(low..=high), parts);
-    let marks = multiples(&(low..=high), step).into_iter();
-    marks.map(|value| GridMark { value, step_size: step }).collect()
+    let parts = (width / value_of(apart, input)).clamp(1.0, MOST_MARKS) as usize;
+    marks_of_step(input.bounds, step_for(&(low..=high), parts))
+}
+
+/// As [`round_marks`] for an upright axis that counts.
+pub fn whole_marks(input: GridInput) -> Vec<GridMark> {
+    match round_marks(&input, NUMBER_HEIGHT).first() {
+        Some(mark) => marks_of_step(input.bounds, mark.step_size.max(1.0)),
+        None => Vec::new(),
+    }
+}
+
+fn marks_of_step((low, high): (f64, f64), step_size: f64) -> Vec<GridMark> {
+    let marks = multiples(&(low..=high), step_size).into_iter();
+    marks.map(|value| GridMark { value, step_size }).collect()
 }
 
 /// Marks for a chart that draws the decimal logarithm: whole decades, 2 and 5 between them where there is room, and
@@ -94,7 +106,7 @@ fn marks_within_a_decade(input: GridInput) -> Vec<GridMark> {
     let (low, high) = (10.0_f64.powf(input.bounds.0), 10.0_f64.powf(input.bounds.1));
     // The upper end is the more crowded one.
     let number = high - 10.0_f64.powf(input.bounds.1 - value_of(NUMBER_HEIGHT, &input));
-    let parts = ((high - low) / number).clamp(1.0, 5.0) as usize;
+    let parts = ((high - low) / number).clamp(1.0, MOST_MARKS) as usize;
     let step = step_for(&(low..=high), parts);
     let marks = multiples(&(low..=high), step).into_iter();
     let mark = |value: f64| GridMark {
@@ -142,11 +154,11 @@ mod tests {
     #[test]
     fn marks_of_a_plain_axis_are_round_and_few() {
         let marks = |low, high, points| -> Vec<String> {
-            let marks = round_marks(input(low, high, points), NUMBER_WIDTH).into_iter();
+            let marks = round_marks(&input(low, high, points), NUMBER_WIDTH).into_iter();
             marks.map(|mark| tick_text(mark.value, mark.step_size)).collect()
         };
         assert_eq!(marks(-0.3, 1.1, 300.0), ["0.0", "0.5", "1.0"]);
-        assert_eq!(marks(3.98, 5.02, 300.0), ["4.0", "4.5", "5.0"]);
+        assert_eq!(marks(3.98, 5.02, 300.0), ["4.0", "4.2", "4.4", "4.6", "4.8", "5.0"]);
         assert_eq!(marks(0.0, 1000.0, 300.0), ["0", "200", "400", "600", "800", "1000"]);
         assert_eq!(marks(0.0, 1000.0, 120.0), ["0", "500", "1000"], "a narrow chart");
         assert_eq!(marks(1.0, 1.0, 300.0).len(), 0);
@@ -176,6 +188,16 @@ mod tests {
                 assert!(apart >= NUMBER_HEIGHT, "{apart} points between numbers");
             }
         }
+    }
+
+    #[test]
+    fn counts_have_no_marks_between_whole_numbers() {
+        let values = |high: f64| -> Vec<f64> {
+            let marks = whole_marks(input(-0.08, high, 150.0)).into_iter();
+            marks.map(|mark| mark.value).collect()
+        };
+        assert_eq!(values(1.08), [0.0, 1.0]);
+        assert_eq!(values(6.4), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     }
 
     #[test]

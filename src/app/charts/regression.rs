@@ -18,7 +18,7 @@ pub fn regression_keys(palette: &Palette) -> Vec<Key> {
     [
         ("nodes of the test set", Mark::Discs, palette.accent),
         ("fitted line", Mark::Line, palette.test_series),
-        ("equal", Mark::Dashes, palette.dim),
+        ("equal", Mark::Dashes, palette.text),
     ]
     .map(|(name, mark, colour)| Key { name, mark, colour })
     .to_vec()
@@ -45,7 +45,7 @@ pub fn regression_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64>) {
                 let dots = Points::new("nodes", dots).radius(1.6);
                 plot_ui.points(dots.color(palette.accent.gamma_multiply(0.7)));
                 let line = |name: &str, [a, b]: [f64; 2]| Line::new(name, PlotPoints::from(vec![[low, a], [high, b]]));
-                let equal = line("equal", [low, high]).color(palette.dim).width(1.2);
+                let equal = line("equal", [low, high]).color(palette.text).width(1.4);
                 plot_ui.line(equal.style(egui_plot::LineStyle::dashed_dense()));
                 if let Some(fit) = fit {
                     let ends = [low, high].map(|actual| fit.slope * actual + fit.offset_mm);

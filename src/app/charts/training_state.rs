@@ -3,7 +3,7 @@ use egui_plot::{Line, PlotPoints};
 
 use super::{
     legend::{Key, Mark},
-    plot_style::{log_marks, log_text, plot, thinned},
+    plot_style::{log_marks, log_text, plot, thinned, whole_marks},
 };
 use crate::{
     app::theme::{Palette, Theme},
@@ -54,11 +54,13 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &
         plot(ui, "validation failures", "epoch", "validation failures")
             .width(half)
             .height(height)
+            .y_grid_spacer(whole_marks)
             .include_y(0.0)
             .include_y(1.0)
             .show(ui, |plot_ui| {
                 let line = Line::new("validation failures", PlotPoints::from(steps(history)));
-                plot_ui.line(line.color(palette.validation_series).width(1.8));
+                // A band would make slopes of the steps.
+                plot_ui.line(line.color(palette.validation_series).width(1.8).allow_band(false));
             });
     });
 }

@@ -10,7 +10,7 @@ use crate::app::{
 const TABS: [(BottomTab, &str); 5] = [
     (BottomTab::Loss, "Loss"),
     (BottomTab::TrainingState, "Training state"),
-    (BottomTab::ErrorHistogram, "Error histogram"),
+    (BottomTab::ErrorHistogram, "Histogram"),
     (BottomTab::Regression, "Regression"),
     (BottomTab::Nodes, "Nodes"),
 ];
@@ -78,7 +78,9 @@ fn keys(ui: &Ui, state: &State) -> Vec<Key> {
 fn what_comes(tab: BottomTab) -> &'static str {
     match tab {
         BottomTab::Loss => "The error of each epoch appears here while the network trains.",
-        BottomTab::TrainingState => "The gradient and the method's own quantities appear here while the network trains.",
+        BottomTab::TrainingState => {
+            "The gradient and the method's own quantities appear here while the network trains."
+        }
         BottomTab::ErrorHistogram => "How often each error of z occurs in the test set appears here.",
         BottomTab::Regression => "Decoupled against actual z of every node in the test set appears here.",
         BottomTab::Nodes => "",

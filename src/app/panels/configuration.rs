@@ -101,7 +101,9 @@ fn network_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     };
     let text = format!("{n} inputs, {} outputs, {} weights", shape.outputs, shape.weights());
     ui.label(RichText::new(text).size(type_size().note).color(dim))
-        .on_hover_text("Inputs are the resistances of a row-wire; outputs are those coordinates of its nodes that vary.");
+        .on_hover_text(
+            "Inputs are the resistances of a row-wire; outputs are those coordinates of its nodes that vary.",
+        );
 }
 
 /// A slider for small networks, with small marks at the suggestions.

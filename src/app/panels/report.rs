@@ -22,10 +22,7 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         section_heading_ui(ui, "Errors on the test set");
         let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
         if let Some((run, result)) = shown {
-            error_table_ui(
-                ui,
-                &error_rows(&result.errors, &run.baselines, run.published.as_ref()),
-            );
+            error_table_ui(ui, &error_rows(&result.errors, &run.baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
             worst_node_ui(ui, result, &mut actions);
         } else {
@@ -118,7 +115,9 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     let loses_to = |baseline: &Errors| result.errors.z_mm > baseline.z_mm;
     let fault = if reason == StopReason::Diverged {
         let epoch = result.best_epoch;
-        Some(format!("The error grew without bound; shown is the best network before that, of epoch {epoch}."))
+        Some(format!(
+            "The error grew without bound; shown is the best network before that, of epoch {epoch}."
+        ))
     } else if loses_to(&baselines.mean) {
         Some("Always answering the mean of the training set would be better than this network.".to_owned())
     } else if loses_to(&baselines.linear) {

@@ -172,27 +172,26 @@ fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>)
     }
 }
 
-/// The node under the pointer and its values.
+/// The node under the pointer and its values, in two lines that hide little.
 fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
     let Some(actual) = state.frames.actual.nodes_mm.get(node) else {
         return;
     };
+    ui.spacing_mut().item_spacing.y = 0.0;
     let per_row = test.sensor.scale.nodes_per_row();
-    ui.label(
-        RichText::new(format!("Row {}, node {}", node / per_row + 1, node % per_row + 1))
-            .font(semibold(type_size().body)),
-    );
-    let line = |ui: &mut Ui, name: &str, value: f64| ui.label(format!("{name} {} mm", format_number(value)));
-    ui.label(format!(
-        "x {} mm, y {} mm",
-        format_number(actual.x),
-        format_number(actual.y)
-    ));
-    line(ui, "actual z", actual.z);
+    ui.horizontal(|ui| {
+        let name = format!("Row {}, node {}", node / per_row + 1, node % per_row + 1);
+        ui.label(RichText::new(name).font(semibold(type_size().note)));
+        let [x, y] = [actual.x, actual.y].map(format_number);
+        let place = RichText::new(format!("x {x}, y {y} mm")).size(type_size().note);
+        ui.label(place.color(Theme::of(ui).palette.dim));
+    });
+    let mut text = format!("z {} mm", format_number(actual.z));
     if let Some((decoupled, error)) = &state.frames.decoupled
         && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
     {
-        line(ui, "decoupled z", decoupled.z);
-        line(ui, "error", error.z);
+        let [decoupled, error] = [decoupled.z, error.z].map(format_number);
+        text += &format!(", decoupled {decoupled} mm, error {error} mm");
     }
+    ui.label(RichText::new(text).size(type_size().note));
 }

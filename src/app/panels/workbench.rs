@@ -36,7 +36,7 @@ pub fn workbench_ui(ui: &mut Ui, state: &State, layout: WorkbenchLayout) -> Vec<
     let gap = space(2);
     let (share, least) = match layout {
         WorkbenchLayout::ReportBeside => (0.32, space(40)),
-        WorkbenchLayout::ReportBelow => (0.38, space(54)),
+        WorkbenchLayout::ReportBelow => (0.42, space(54)),
     };
     let lower_height = (share * whole.height()).clamp(least, space(75));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);

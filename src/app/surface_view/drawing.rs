@@ -15,7 +15,7 @@ use super::nodes::{self, Dot};
 use super::plan::PlanAxes;
 use super::projection::PlotBox;
 use super::view::{SurfaceView, SurfaceViewResponse, ViewMode};
-use crate::app::theme::{Theme, type_size};
+use crate::app::theme::Theme;
 
 /// Room for overshoots of the surface above and below the range, as a part of it.
 const HEADROOM: f64 = 0.08;
@@ -32,7 +32,7 @@ pub(super) struct Drawing {
 }
 
 enum DrawnFrame {
-    Space(SpaceAxes),
+    Space(Box<SpaceAxes>),
     Plan(PlanAxes),
 }
 
@@ -62,16 +62,6 @@ impl SurfaceView<'_> {
 
     /// Lays out and projects everything that depends on no pointer.
     fn draw(&self, painter: &Painter, rect: Rect, camera: OrbitCamera, key: u64) -> Drawing {
-        let whole = self.draw_in(painter, rect, camera, key);
-        if nodes::beyond(&whole.dots) == 0 {
-            return whole;
-        }
-        // A line for the note about nodes beyond the axes.
-        let line = rect.with_max_y(rect.bottom() - 1.4 * type_size().small);
-        self.draw_in(painter, line, camera, key)
-    }
-
-    fn draw_in(&self, painter: &Painter, rect: Rect, camera: OrbitCamera, key: u64) -> Drawing {
         let range_mm = usable_range(&self.range_mm);
         let names = ["x (mm)", "y (mm)", self.colours.title()];
         let headroom = HEADROOM * (range_mm.end() - range_mm.start());
@@ -88,9 +78,8 @@ impl SurfaceView<'_> {
                 let tall_per_wide = (rect.height() - LABELS.y).max(1.0) / (rect.width() - LABELS.x).max(1.0);
                 let plot_box = PlotBox::new(min_mm, max_mm, tall_per_wide);
                 let card = rect.shrink(8.0);
-                DrawnFrame::Space(SpaceAxes::new(
-                    painter, card, plot_box, camera, &range_mm, names, self.theme,
-                ))
+                let axes = SpaceAxes::new(painter, card, plot_box, camera, &range_mm, names, self.theme);
+                DrawnFrame::Space(Box::new(axes))
             }
             ViewMode::Top => {
                 let (min_mm, max_mm) = (min_mm.truncate(), max_mm.truncate());

@@ -3,15 +3,15 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{Color32, Mesh, Pos2};
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::contour::cross_cell;
 use super::edge::to_egui;
 use super::plan::PlanAxes;
 use super::projection::Projection;
 use super::ribbon;
-use crate::app::ticks::{multiples, step_for};
 use crate::app::theme::ColourMap;
+use crate::app::ticks::{multiples, step_for};
 use crate::surface::Grid;
 
 /// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
@@ -195,9 +195,8 @@ impl Surface<'_> {
                 .color
                 .a()
                 .min(mesh.vertices[corners[2]].color.a());
-            let ink = |value: f64| {
-                contrast(self.colour(value)).gamma_multiply(CONTOUR_OPACITY * f32::from(opacity) / 255.0)
-            };
+            let ink =
+                |value: f64| contrast(self.colour(value)).gamma_multiply(CONTOUR_OPACITY * f32::from(opacity) / 255.0);
             for &level in levels.iter().filter(|level| (low..high).contains(level)) {
                 cross_cell(values, level, |ends| {
                     let [from, to] = ends.map(|(a, b, part)| places[a].lerp(places[b], part));

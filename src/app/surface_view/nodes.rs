@@ -143,7 +143,12 @@ mod tests {
             let corner = DVec3::new(grid.x_mm()[1], grid.y_mm()[1], 0.0);
             let far = DVec3::new(grid.x_mm()[points / 2 - 2], grid.y_mm()[points / 2 - 2], 0.0);
             // Eyes beyond the far corner, far out along either side, and almost above.
-            for sight in [far - corner, (far - corner) * 1e3, (far - corner).with_y(0.0), DVec3::new(0.0, 0.0, 1.0)] {
+            for sight in [
+                far - corner,
+                (far - corner) * 1e3,
+                (far - corner).with_y(0.0),
+                DVec3::new(0.0, 0.0, 1.0),
+            ] {
                 let steps = line_of_sight(corner, sight, grid)
                     .take_while(|(place, _)| place.z <= 1.0)
                     .take(100_000)

@@ -10,8 +10,8 @@ use glam::DVec3;
 
 use super::camera::OrbitCamera;
 use super::nodes::{self, Dot};
-use crate::app::ticks::tick_text;
 use crate::app::theme::{ColourMap, Theme, type_size};
+use crate::app::ticks::tick_text;
 use crate::surface::Grid;
 
 /// What the values mean, and with it their colours.
@@ -143,9 +143,7 @@ impl SurfaceView<'_> {
         let is_idle = !shown.response.dragged();
         let pointer = shown.response.hover_pos().filter(|_| is_idle);
         shown.hovered_node = pointer.and_then(|pointer| nodes::nearest(&drawing.dots, pointer));
-        shown.hovered_at = shown
-            .hovered_node
-            .and_then(|node| nodes::position(&drawing.dots, node));
+        shown.hovered_at = shown.hovered_node.and_then(|node| nodes::position(&drawing.dots, node));
         nodes::paint(
             &painter,
             &drawing.dots,
@@ -153,8 +151,9 @@ impl SurfaceView<'_> {
             self.theme,
         );
         if let Some(note) = beyond_text(&drawing.dots) {
+            // Below the axes, partly in the margin of the card, so that the picture keeps its size.
             let size = type_size().small;
-            let line = rect.with_min_y(rect.bottom() - 1.4 * size);
+            let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
             let text = RichText::new(note).size(size).color(self.theme.palette.warning);
             ui.put(line, Label::new(text).truncate());
         }
