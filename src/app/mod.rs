@@ -6,6 +6,7 @@
 
 mod action;
 mod charts;
+mod continuation;
 mod dialogs;
 mod export_kind;
 mod file_task;

@@ -16,15 +16,14 @@ use ndarray::Array2;
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 use super::{
+    continuation::{continue_run, furthest_epoch},
     export_kind::ExportKind,
     test_view::{TestView, TestViewError},
 };
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunError, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     export::CheckpointFile,
-    training::{
-        EpochRecord, GradientDescentSettings, Method, Stage, StopReason, StoppingRules, TrainingError, TrainingSettings,
-    },
+    training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainingSettings},
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
@@ -398,32 +397,6 @@ fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
     let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
     let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
     resumed.map_err(|error| format!("'{}': {error}", path.display()))
-}
-
-/// Gives `run` more epochs, counted from the start that is furthest. With the method it has, it goes on as if they had
-/// been given from the beginning; another method, or one that had ended for another reason, starts from the present
-/// weights.
-fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<RunSettings, RunError> {
-    training.check().map_err(TrainingError::from)?;
-    let stopping = StoppingRules {
-        epochs: (furthest_epoch(run) + training.stopping.epochs).min(StoppingRules::MOST_EPOCHS),
-        ..training.stopping
-    };
-    let is_other = training.method != run.settings().training.method;
-    if is_other {
-        run.continue_with(training.method)?;
-    }
-    run.set_stopping(stopping).map_err(TrainingError::from)?;
-    if !is_other && run.stop_reason().is_some() {
-        run.continue_with(training.method)?;
-    }
-    Ok(*run.settings())
-}
-
-/// The epoch of the start that is furthest.
-fn furthest_epoch(run: &Run) -> usize {
-    let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
-    epochs.max().unwrap_or(0)
 }
 
 /// Puts a request at the end of the queue. While a slider is dragged many pictures are asked for; only the newest

@@ -53,7 +53,7 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
 
     let axis = Stroke::new(1.0, palette.line);
     painter.hline(whole.x_range(), strip.bottom(), axis);
-    let step = step_for(&(low..=high), 4);
+    let step = step_for(&(low..=high), 6);
     let font = FontId::proportional(type_size().small);
     for mark in multiples(&(low..=high), step) {
         painter.vline(x(mark), strip.bottom()..=strip.bottom() + space(1), axis);
@@ -75,7 +75,7 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
     painter.rect(
         half,
         radius() / 3,
-        palette.raised,
+        palette.hovered,
         Stroke::new(1.0, palette.line),
         StrokeKind::Outside,
     );

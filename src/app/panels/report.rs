@@ -239,7 +239,7 @@ fn format_short_time(time: Duration) -> String {
     }
 }
 
-const PATH_BUTTON_WIDTH: f32 = space(22);
+const PATH_BUTTON_WIDTH: f32 = space(24);
 
 fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
     let theme = Theme::of(ui);
