@@ -397,6 +397,11 @@ mod tests {
         wait(&mut window, |state| state.notice.is_some());
         let lost = "the network was lost when the training thread ended: train again";
         assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        window.apply(Action::DismissNotice);
+        window.apply(Action::Continue);
+        wait(&mut window, |state| state.notice.is_some());
+        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        assert_eq!(window.state.phase, ended);
         window.apply(Action::Train);
         wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
     }

@@ -9,6 +9,8 @@ use decoupler::{
     training::{Method, MomentumSettings, StopReason, StoppingRules},
 };
 
+use eframe::egui::vec2;
+
 use crate::{
     configuring::choose_method,
     driver::{Driver, small, table_of, trained},
@@ -352,4 +354,32 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.train();
     assert!(!driver.says("Effective parameters"));
+}
+
+#[test]
+fn the_spread_and_continue_have_their_place_in_narrow_windows() {
+    let mut driver = Driver::open_sized(vec2(960.0, 640.0));
+    driver.enter("Starts", "3");
+    driver.enter("Epochs", "1");
+    driver.train();
+    driver.settle();
+    let buttons = ["Next snapshot", "Continue", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
+    assert!(
+        buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
+        "{buttons:?}"
+    );
+    let column = driver.get("ERRORS ON THE TEST SET").rect().left();
+    let of_spread = |text: &str| text.starts_with("Spread of Z %") || text.starts_with("test Z %, ");
+    let places: Vec<_> = driver
+        .places()
+        .into_iter()
+        .filter(|(text, _)| of_spread(text))
+        .collect();
+    assert_eq!(places.len(), 4, "the strip and three figures");
+    for (text, place) in places {
+        assert!(
+            place.left() >= column - 0.5 && place.right() <= 960.0,
+            "{text} is at {place:?}"
+        );
+    }
 }
