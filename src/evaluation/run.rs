@@ -114,6 +114,8 @@ impl Run {
             validation: validation.as_ref().map(examples),
             test: Some(examples(&test)),
         };
+        // They are in `problem`, scaled: large sets need not be held twice.
+        drop((training, validation));
         let shape = Shape {
             inputs: problem.training.inputs(),
             hidden: settings.hidden,

@@ -27,6 +27,33 @@ pub(super) fn multiply(values: &mut [f64], factors: &[f64]) {
     });
 }
 
+/// Multiplies `values` by `factor`.
+pub(super) fn scale(values: &mut [f64], factor: f64) {
+    pulp::Arch::new().dispatch(|| {
+        for value in &mut *values {
+            *value *= factor;
+        }
+    });
+}
+
+/// Adds `factor · a` to `sum`.
+pub(super) fn add_scaled(sum: &mut [f64], factor: f64, a: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (sum, a) in sum.iter_mut().zip(a) {
+            *sum += factor * a;
+        }
+    });
+}
+
+/// Multiplies `values` by the slopes of tanh where its values are `h`: 1 − h².
+pub(super) fn multiply_by_tanh_slopes(values: &mut [f64], h: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (value, h) in values.iter_mut().zip(h) {
+            *value *= 1.0 - h * h;
+        }
+    });
+}
+
 /// Writes the slope of tanh where its value is `h`: 1 − h².
 pub(super) fn tanh_slopes_into(slopes: &mut [f64], h: &[f64]) {
     pulp::Arch::new().dispatch(|| {

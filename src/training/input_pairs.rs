@@ -13,40 +13,52 @@ const LARGEST_KEPT_BYTES: usize = 32 << 20;
 /// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a
 /// sample are contiguous and enter the product as they are. They never change during training.
 #[derive(Debug)]
-pub(super) enum InputPairs {
-    /// One matrix per block.
-    Kept(Vec<Mat<f64>>),
-    /// Room for one block, and for one sample of it.
-    Made(Mat<f64>, Vec<f64>),
+pub(super) struct InputPairs {
+    /// One matrix per block; none if they are made anew.
+    kept: Vec<Mat<f64>>,
+}
+
+/// Room for the pairs of one block, if they are made anew.
+#[derive(Debug)]
+pub(super) struct PairsRoom {
+    pairs: Mat<f64>,
+    sample: Vec<f64>,
 }
 
 impl InputPairs {
     pub(super) fn new(examples: &Examples) -> Self {
         let n1 = examples.inputs() + 1;
-        let pairs = n1 * (n1 + 1) / 2;
-        if examples.samples() * pairs * size_of::<f64>() > LARGEST_KEPT_BYTES {
-            return Self::Made(Mat::zeros(pairs, BLOCK), vec![0.0; n1]);
+        if examples.samples() * pairs(n1) * size_of::<f64>() > LARGEST_KEPT_BYTES {
+            return Self { kept: Vec::new() };
         }
         let mut sample = vec![0.0; n1];
         let filled = |block: &Block| {
-            let mut kept = Mat::zeros(pairs, block.samples());
+            let mut kept = Mat::zeros(pairs(n1), block.samples());
             fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
             kept
         };
-        Self::Kept(examples.blocks().iter().map(filled).collect())
+        Self {
+            kept: examples.blocks().iter().map(filled).collect(),
+        }
+    }
+
+    /// Room for [`Self::of`].
+    pub(super) fn room(&self, n1: usize) -> PairsRoom {
+        let samples = if self.kept.is_empty() { BLOCK } else { 0 };
+        PairsRoom {
+            pairs: Mat::zeros(pairs(n1), samples),
+            sample: vec![0.0; n1],
+        }
     }
 
     /// The pairs of block number `index`.
-    pub(super) fn of(&mut self, index: usize, block: &Block) -> MatRef<'_, f64> {
-        match self {
-            Self::Kept(blocks) => blocks[index].as_ref(),
-            Self::Made(room, sample) => {
-                fill(
-                    block.inputs.as_ref(),
-                    sample,
-                    room.as_mut().subcols_mut(0, block.samples()),
-                );
-                room.as_ref().subcols(0, block.samples())
+    pub(super) fn of<'a>(&'a self, index: usize, block: &Block, room: &'a mut PairsRoom) -> MatRef<'a, f64> {
+        match self.kept.get(index) {
+            Some(kept) => kept.as_ref(),
+            None => {
+                let mut pairs = room.pairs.as_mut().subcols_mut(0, block.samples());
+                fill(block.inputs.as_ref(), &mut room.sample, pairs.as_mut());
+                room.pairs.as_ref().subcols(0, block.samples())
             }
         }
     }
@@ -64,6 +76,10 @@ impl InputPairs {
             }
         }
     }
+}
+
+fn pairs(n1: usize) -> usize {
+    n1 * (n1 + 1) / 2
 }
 
 fn fill(inputs: MatRef<'_, f64>, sample: &mut [f64], mut pairs: MatMut<'_, f64>) {

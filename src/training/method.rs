@@ -7,11 +7,11 @@ use super::{
     LevenbergMarquardtSettings, MethodState, MomentumSettings, ResilientSettings, ScaledConjugateGradientSettings,
     Setting, SettingError, StepMomentumSettings, VariableProjectionSettings, adaptive_descent::AdaptiveDescent,
     algorithm::Algorithm, bayesian_regularization::BayesianRegularization, gradient_descent::GradientDescent,
-    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, resilient::Resilient,
+    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, normal_equations::Way, resilient::Resilient,
     scaled_conjugate_gradient::ScaledConjugateGradient, step_momentum::StepMomentum,
     variable_projection::VariableProjection,
 };
-use crate::network::Mlp;
+use crate::network::{Mlp, Shape};
 
 /// A training method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -164,12 +164,14 @@ impl Method {
         copy.settings().iter().try_for_each(Setting::check)
     }
 
-    /// Whether it factors the normal equations, whose memory grows with the square of the hidden weights.
-    pub(super) fn has_normal_equations(&self) -> bool {
-        matches!(
-            self,
-            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_)
-        )
+    /// How it solves the normal equations for a network of this shape and so many samples, if it has any.
+    pub(super) fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
+        match self {
+            Self::LevenbergMarquardt(_) | Self::VariableProjection(_) => Some(Way::cheaper(shape, samples)),
+            // It needs the trace of the inverse.
+            Self::BayesianRegularization(_) => Some(Way::Factored),
+            _ => None,
+        }
     }
 
     /// Puts the method to work from the weights of `mlp`.

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, StopReason, StoppingRules,
-    activations::Activations, algorithm::Algorithm,
+    EpochRecord, Evaluation, Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations,
+    algorithm::Algorithm,
 };
 use crate::network::{Mlp, Shape};
 
@@ -69,12 +69,8 @@ pub enum TrainingError {
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
-fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
-    let bytes = if method.has_normal_equations() {
-        NormalEquations::bytes(shape)
-    } else {
-        0
-    };
+fn check_width(method: &Method, shape: Shape, samples: usize) -> Result<(), TrainingError> {
+    let bytes = method.equations(shape, samples).map_or(0, |way| way.bytes(shape));
     if bytes > LARGEST_EQUATIONS_BYTES {
         return Err(TrainingError::TooWide { bytes });
     }
@@ -117,7 +113,7 @@ impl Trainer {
         if start.shape().hidden == 0 {
             return Err(TrainingError::NoHiddenNodes);
         }
-        check_width(&settings.method, start.shape())?;
+        check_width(&settings.method, start.shape(), problem.training.samples())?;
         let begun = Instant::now();
         let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {
@@ -171,7 +167,7 @@ impl Trainer {
     /// A setting out of range, or a network too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
         method.check()?;
-        check_width(&method, self.mlp.shape())?;
+        check_width(&method, self.mlp.shape(), self.problem.training.samples())?;
         let begun = Instant::now();
         self.settings.method = method;
         (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);
