@@ -46,6 +46,8 @@ pub(super) struct ConjugateGradient {
     mixing: Mat<f64>,
     /// Cholesky factors of the blocks of S on its diagonal: n1 × h·n1.
     blocks: Mat<f64>,
+    /// F with the entries of each node together: n1 × h·(h+1).
+    f: Mat<f64>,
     cholesky: Cholesky,
     /// One for each part of the samples; the first gets the sum.
     parts: Vec<PartRoom>,
@@ -87,6 +89,7 @@ impl ConjugateGradient {
             shape,
             mixing: Mat::zeros(h, h),
             blocks: Mat::zeros(n1, order),
+            f: Mat::zeros(n1, h * (h + 1)),
             cholesky: Cholesky::new(n1),
             parts: (0..parts).map(room).collect(),
             eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
@@ -116,7 +119,7 @@ impl ConjugateGradient {
         let mut length = self.precondition();
         self.direction.copy_from_slice(&self.preconditioned);
         let goal = TOLERANCE * TOLERANCE * length;
-        for _ in 0..MOST_ITERATIONS {
+        for iteration in 0..MOST_ITERATIONS {
             self.apply(system, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
@@ -135,6 +138,9 @@ impl ConjugateGradient {
             let before = length;
             length = self.precondition();
             if length <= goal {
+                if std::env::var("COUNT").is_ok() {
+                    eprint!("[{}] ", iteration + 1);
+                }
                 break;
             }
             for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {
@@ -146,7 +152,7 @@ impl ConjugateGradient {
 
     /// Writes S·direction to the first part's sum.
     fn apply(&mut self, system: System<'_>, kept: &mut KeptActivations) {
-        let (h, n1) = (self.shape.hidden, self.shape.inputs + 1);
+        let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
         let direction = MatRef::from_column_major_slice(&self.direction, n1, h);
         let mixing = self.mixing.as_ref();
         for_each_part(&mut self.parts, |part| part.sum.fill(0.0));
@@ -156,31 +162,33 @@ impl ConjugateGradient {
         let (first, others) = self.parts.split_at_mut(1);
         let sum = &mut first[0].sum;
         others.iter().for_each(|other| *sum += &other.sum);
-        let f = system.elimination.f.as_ref();
+        let f = |node: usize| self.f.as_ref().subcols(node * h1, h1);
         let [reduced, mixed] = &mut self.eliminated;
         for node in 0..h {
-            let (f, p) = (f.subrows(node * n1, n1), direction.subcols(node, 1));
+            let (f, p) = (f(node), direction.subcols(node, 1));
             let reduced = reduced.as_mut().subcols_mut(node, 1);
             matmul(reduced, Accum::Replace, f.transpose(), p, 1.0, Par::Seq);
         }
         matmul(mixed.as_mut(), Accum::Replace, reduced.as_ref(), mixing, 1.0, Par::Seq);
         for node in 0..h {
             let mut sum = sum.as_mut().subcols_mut(node, 1);
-            let (f, mixed) = (f.subrows(node * n1, n1), mixed.as_ref().subcols(node, 1));
+            let (f, mixed) = (f(node), mixed.as_ref().subcols(node, 1));
             matmul(sum.as_mut(), Accum::Add, f, mixed, -1.0, Par::Seq);
             add_scaled(column_mut(sum, 0), system.damping, column(direction, node));
         }
     }
 
-    /// Factors the blocks of S of each node with itself.
+    /// Gathers F by nodes, and factors the blocks of S of each node with itself.
     fn factor_blocks(&mut self, system: System<'_>) -> bool {
-        let n1 = self.shape.inputs + 1;
+        let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
         self.blocks.copy_from(&system.sums.gram);
         for node in 0..self.shape.hidden {
             let mut block = self.blocks.as_mut().subcols_mut(node * n1, n1);
             let weight = self.mixing[(node, node)];
             let largest = (0..n1).fold(0.0, |largest: f64, index| largest.max(block[(index, index)]));
-            let f = system.elimination.f.as_ref().subrows(node * n1, n1);
+            let mut f = self.f.as_mut().subcols_mut(node * h1, h1);
+            f.copy_from(system.elimination.f.as_ref().subrows(node * n1, n1));
+            let f = f.as_ref();
             let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
             triangular::matmul(
                 block.as_mut(),

@@ -30,6 +30,11 @@ const SPEED: f64 = 2.0;
 impl Way {
     /// The cheaper way for a network of this shape and so many samples.
     pub(in crate::training) fn cheaper(shape: Shape, samples: usize) -> Self {
+        match std::env::var("WAY").as_deref() {
+            Ok("f") => return Self::Factored,
+            Ok("i") => return Self::Iterated,
+            _ => {}
+        }
         let [factored, iterated] = [Self::Factored, Self::Iterated].map(|way| {
             let gathering = samples as f64 * way.gathering_per_sample(shape);
             gathering + way.solving(shape, samples)
@@ -91,7 +96,7 @@ impl Way {
         let (order, n1, h1) = (shape.hidden_weights(), shape.inputs + 1, shape.hidden + 1);
         let matrices = match self {
             Self::Factored => order.saturating_mul(order + h1 + n1),
-            Self::Iterated => order.saturating_mul(h1 + n1),
+            Self::Iterated => order.saturating_mul(2 * h1 + n1),
         };
         let sums = Products::bytes(shape, self.gram_part());
         matrices.saturating_mul(size_of::<f64>()).saturating_add(sums)

@@ -10,6 +10,8 @@ use faer::{
     },
 };
 
+use pulp::{Simd, WithSimd};
+
 use super::{
     cholesky::{Cholesky, substitute},
     elimination::{Elimination, fill},
@@ -148,7 +150,12 @@ fn fill_schur(terms: &Terms<'_>, first: usize, s: MatMut<'_, f64>, squares: &mut
         Par::Seq,
     );
     matmul(below.as_mut(), replace, f_below, right, 1.0, Par::Seq);
-    pulp::Arch::new().dispatch(|| complete(terms, first, s.as_mut(), squares));
+    pulp::Arch::new().dispatch(Completion {
+        terms,
+        first,
+        s,
+        square: &mut squares[..terms.n1 * terms.n1],
+    });
 }
 
 /// What S is made of.
@@ -159,22 +166,35 @@ struct Terms<'a> {
     n1: usize,
 }
 
-/// Turns F Fᵀ into S without its damping.
-#[inline(always)]
-fn complete(terms: &Terms<'_>, first: usize, mut s: MatMut<'_, f64>, squares: &mut [f64]) {
-    let Terms { gram, v, n1, .. } = *terms;
-    let square = &mut squares[..n1 * n1];
-    for j in 0..s.ncols() / n1 {
-        for i in j..s.nrows() / n1 {
-            let (node, other) = (first + i, first + j);
-            InputPairs::unpack(column(gram, node * (node + 1) / 2 + other), n1, square);
-            let products = v.row(node).iter().zip(v.row(other).iter());
-            let weight: f64 = products.map(|(a, b)| a * b).sum();
-            for b in 0..n1 {
-                let start = if i == j { b } else { 0 };
-                let values = &mut column_mut(s.as_mut(), j * n1 + b)[i * n1 + start..(i + 1) * n1];
-                for (value, product) in values.iter_mut().zip(&square[b * n1 + start..(b + 1) * n1]) {
-                    *value = weight * (product - *value);
+/// Turns F Fᵀ, in the columns of `s`, into S without its damping. A type rather than a closure, which would be too long to
+/// be moved into the code for vector registers.
+struct Completion<'a, 'b> {
+    terms: &'a Terms<'b>,
+    first: usize,
+    s: MatMut<'a, f64>,
+    /// Room for n1 × n1.
+    square: &'a mut [f64],
+}
+
+impl WithSimd for Completion<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Terms { gram, v, n1, .. } = *self.terms;
+        let (mut s, square) = (self.s, self.square);
+        for j in 0..s.ncols() / n1 {
+            for i in j..s.nrows() / n1 {
+                let (node, other) = (self.first + i, self.first + j);
+                InputPairs::unpack(column(gram, node * (node + 1) / 2 + other), n1, square);
+                let products = v.row(node).iter().zip(v.row(other).iter());
+                let weight: f64 = products.map(|(a, b)| a * b).sum();
+                for b in 0..n1 {
+                    let start = if i == j { b } else { 0 };
+                    let values = &mut column_mut(s.as_mut(), j * n1 + b)[i * n1 + start..(i + 1) * n1];
+                    for (value, product) in values.iter_mut().zip(&square[b * n1 + start..(b + 1) * n1]) {
+                        *value = weight * (product - *value);
+                    }
                 }
             }
         }
