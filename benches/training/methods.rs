@@ -36,19 +36,18 @@ fn train(method: Method, seed: u64) -> Outcome {
         ..RunSettings::default()
     };
     let mut run = Run::prepare(settings).expect("the paper's experiment is possible");
-    while run.trainer().stop_reason().is_none() {
-        run.trainer_mut().step();
-        if run.trainer().elapsed() >= MOST_TIME {
-            run.trainer_mut().stop();
+    while run.step().is_none() {
+        if run.leader().elapsed() >= MOST_TIME {
+            run.stop();
         }
     }
     let (_, errors) = run.decouple_test();
     Outcome {
-        epochs: run.trainer().latest().epoch as f64,
-        seconds: run.trainer().elapsed().as_secs_f64(),
+        epochs: run.leader().latest().epoch as f64,
+        seconds: run.leader().elapsed().as_secs_f64(),
         z_percent: errors.z_percent.expect("z is never 0"),
         x_percent: errors.x_percent.expect("x is never 0"),
-        timed_out: run.trainer().stop_reason() == Some(StopReason::Stopped),
+        timed_out: run.stop_reason() == Some(StopReason::Stopped),
     }
 }
 

@@ -13,9 +13,11 @@ const LARGEST_KEPT_BYTES: usize = 32 << 20;
 /// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a
 /// sample are contiguous and enter the product as they are. They never change during training.
 #[derive(Debug)]
-pub(super) struct InputPairs {
-    /// One matrix per block; none if they are made anew.
-    kept: Vec<Mat<f64>>,
+pub(super) enum InputPairs {
+    /// One matrix per block, shared by all trainings on these examples.
+    Kept(Examples),
+    /// Made anew for each block.
+    Made,
 }
 
 /// Room for the pairs of one block, if they are made anew.
@@ -29,22 +31,18 @@ impl InputPairs {
     pub(super) fn new(examples: &Examples) -> Self {
         let n1 = examples.inputs() + 1;
         if examples.samples() * pairs(n1) * size_of::<f64>() > LARGEST_KEPT_BYTES {
-            return Self { kept: Vec::new() };
+            return Self::Made;
         }
-        let mut sample = vec![0.0; n1];
-        let filled = |block: &Block| {
-            let mut kept = Mat::zeros(pairs(n1), block.samples());
-            fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
-            kept
-        };
-        Self {
-            kept: examples.blocks().iter().map(filled).collect(),
-        }
+        kept(examples);
+        Self::Kept(examples.clone())
     }
 
     /// Room for [`Self::of`].
     pub(super) fn room(&self, n1: usize) -> PairsRoom {
-        let samples = if self.kept.is_empty() { BLOCK } else { 0 };
+        let samples = match self {
+            Self::Kept(_) => 0,
+            Self::Made => BLOCK,
+        };
         PairsRoom {
             pairs: Mat::zeros(pairs(n1), samples),
             sample: vec![0.0; n1],
@@ -53,9 +51,9 @@ impl InputPairs {
 
     /// The pairs of block number `index`.
     pub(super) fn of<'a>(&'a self, index: usize, block: &Block, room: &'a mut PairsRoom) -> MatRef<'a, f64> {
-        match self.kept.get(index) {
-            Some(kept) => kept.as_ref(),
-            None => {
+        match self {
+            Self::Kept(examples) => kept(examples)[index].as_ref(),
+            Self::Made => {
                 let mut pairs = room.pairs.as_mut().subcols_mut(0, block.samples());
                 fill(block.inputs.as_ref(), &mut room.sample, pairs.as_mut());
                 room.pairs.as_ref().subcols(0, block.samples())
@@ -80,6 +78,17 @@ impl InputPairs {
 
 fn pairs(n1: usize) -> usize {
     n1 * (n1 + 1) / 2
+}
+
+/// The pairs of all blocks, made when first asked for.
+fn kept(examples: &Examples) -> &[Mat<f64>] {
+    examples.input_pairs(|block| {
+        let n1 = block.inputs.ncols();
+        let mut sample = vec![0.0; n1];
+        let mut kept = Mat::zeros(pairs(n1), block.samples());
+        fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
+        kept
+    })
 }
 
 fn fill(inputs: MatRef<'_, f64>, sample: &mut [f64], mut pairs: MatMut<'_, f64>) {

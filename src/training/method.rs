@@ -17,11 +17,15 @@ use crate::network::{Mlp, Shape};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Damped Gauss-Newton steps (`trainlm`).
+    /// Damped Gauss-Newton steps (`trainlm`). Their equations are factored, or where it is cheaper, which is for wide
+    /// networks and decided by their shape and the number of samples, solved by conjugate gradients to a relative
+    /// residual of 1e-8: the same steps to about as many digits.
     LevenbergMarquardt(LevenbergMarquardtSettings),
-    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`).
+    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`). Its equations are
+    /// always factored, since it needs the trace of their inverse.
     BayesianRegularization(BayesianRegularizationSettings),
-    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer.
+    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer, their equations solved as those of
+    /// Levenberg-Marquardt.
     VariableProjection(VariableProjectionSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
     ScaledConjugateGradient(ScaledConjugateGradientSettings),
@@ -165,13 +169,18 @@ impl Method {
     }
 
     /// How it solves the normal equations for a network of this shape and so many samples, if it has any.
-    pub(super) fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
+    fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
         match self {
             Self::LevenbergMarquardt(_) | Self::VariableProjection(_) => Some(Way::cheaper(shape, samples)),
             // It needs the trace of the inverse.
             Self::BayesianRegularization(_) => Some(Way::Factored),
             _ => None,
         }
+    }
+
+    /// About how many bytes its equations take for a network of this shape and so many samples.
+    pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
+        self.equations(shape, samples).map_or(0, |way| way.bytes(shape))
     }
 
     /// Puts the method to work from the weights of `mlp`.
