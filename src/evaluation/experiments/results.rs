@@ -1,0 +1,90 @@
+use super::{Cell, Experiment, Trial, TrialFailure};
+use crate::evaluation::Spread;
+
+/// What is known of an experiment so far.
+#[derive(Clone, Debug)]
+pub struct ExperimentResults {
+    /// The experiment.
+    pub experiment: Experiment,
+    /// Its cells, row by row as [`Experiment::cells`] gives them.
+    pub cells: Vec<CellResults>,
+}
+
+/// What is known of a cell so far.
+#[derive(Clone, Debug)]
+pub struct CellResults {
+    /// The cell.
+    pub cell: Cell,
+    /// How many trials there will be.
+    pub expected: usize,
+    /// The finished ones by seed and repeat, in whichever order they were finished.
+    pub trials: Vec<Trial>,
+    /// Those that could not be carried out.
+    pub failures: Vec<TrialFailure>,
+}
+
+impl ExperimentResults {
+    /// Nothing known yet.
+    pub fn new(experiment: Experiment) -> Self {
+        let cells = experiment.cells().into_iter().map(|cell| CellResults {
+            cell,
+            expected: experiment.seeds_of(&cell.settings).count() * experiment.repeats(),
+            trials: Vec::new(),
+            failures: Vec::new(),
+        });
+        Self {
+            cells: cells.collect(),
+            experiment,
+        }
+    }
+
+    /// Adds what a trial of cell `cell` came to.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn record(&mut self, cell: usize, outcome: Result<Trial, TrialFailure>) {
+        let cell = &mut self.cells[cell];
+        match outcome {
+            Ok(trial) => {
+                let key = |trial: &Trial| (trial.seed.0, trial.repeat);
+                let place = cell.trials.partition_point(|other| key(other) < key(&trial));
+                cell.trials.insert(place, trial);
+            }
+            Err(failure) => {
+                let key = |failure: &TrialFailure| (failure.seed.0, failure.repeat);
+                let place = cell.failures.partition_point(|other| key(other) < key(&failure));
+                cell.failures.insert(place, failure);
+            }
+        }
+    }
+
+    /// Whether every trial has come to something.
+    pub fn is_complete(&self) -> bool {
+        self.cells.iter().all(CellResults::is_complete)
+    }
+}
+
+impl CellResults {
+    /// Whether every trial has come to something.
+    pub fn is_complete(&self) -> bool {
+        self.trials.len() + self.failures.len() == self.expected
+    }
+
+    /// The spread of a figure over the trials that have it.
+    pub fn spread(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<Spread> {
+        Spread::of(self.trials.iter().filter_map(figure))
+    }
+
+    /// AveZerr.
+    pub fn z_percent(&self) -> Option<Spread> {
+        self.spread(|trial| trial.errors.z_percent)
+    }
+
+    /// The trial of median AveZerr (the lower one of two), whose network may stand for the cell.
+    pub fn median_trial(&self) -> Option<&Trial> {
+        let mut trials: Vec<&Trial> = self.trials.iter().filter(|trial| trial.errors.z_percent.is_some()).collect();
+        trials.sort_by(|one, other| one.errors.z_mm.total_cmp(&other.errors.z_mm));
+        let middle = trials.len().checked_sub(1)? / 2;
+        trials.get(middle).copied()
+    }
+}
