@@ -5,10 +5,14 @@ mod errors;
 mod published;
 mod run;
 mod settings;
+mod spread;
+mod starts;
 mod table;
 
 pub use errors::{Errors, NodeAddress};
 pub use published::{PublishedErrors, published_errors};
 pub use run::{Baselines, Run, RunError};
-pub use settings::{CountError, RunSettings};
+pub use settings::{CountError, MOST_STARTS, RunSettings};
+pub use spread::Spread;
+pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};

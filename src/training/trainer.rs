@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, StopReason, StoppingRules,
+    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, Stage, StopReason, StoppingRules,
     activations::Activations, algorithm::Algorithm,
 };
 use crate::network::{Mlp, Shape};
@@ -89,6 +89,7 @@ pub struct Trainer {
     pub(super) mlp: Mlp,
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
+    pub(super) stages: Vec<Stage>,
     /// How often the validation error has risen since it last fell, under the present method.
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
@@ -129,6 +130,10 @@ impl Trainer {
                 mse: f64::INFINITY,
             },
             history: Vec::new(),
+            stages: vec![Stage {
+                first_epoch: 0,
+                method: settings.method,
+            }],
             validation_failures: 0,
             stop_reason: None,
             elapsed: Duration::ZERO,
@@ -148,15 +153,23 @@ impl Trainer {
             match self.algorithm.step(&mut self.mlp, &self.problem.training) {
                 Ok(evaluation) => self.record(evaluation),
                 Err(reason) => {
-                    if reason == StopReason::Diverged {
-                        self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
-                    }
                     self.stop_reason = Some(reason);
+                    self.restart_method();
                 }
+            }
+            if self.stop_reason == Some(StopReason::Diverged) {
+                self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
+                self.restart_method();
             }
             self.elapsed += begun.elapsed();
         }
         self.stop_reason
+    }
+
+    /// Puts the method to work anew where it gave up with numbers that need not be finite, so that the state can be
+    /// saved and other rules can let it go on.
+    fn restart_method(&mut self) {
+        (self.algorithm, _) = self.settings.method.start(&self.mlp, &self.problem.training);
     }
 
     /// Ends the training by the user's wish.
@@ -173,6 +186,9 @@ impl Trainer {
         method.check()?;
         check_width(&method, self.mlp.shape())?;
         let begun = Instant::now();
+        let first_epoch = self.latest().epoch + 1;
+        self.stages.retain(|stage| stage.first_epoch < first_epoch);
+        self.stages.push(Stage { first_epoch, method });
         self.settings.method = method;
         (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);
         self.validation_failures = 0;
@@ -182,15 +198,24 @@ impl Trainer {
         Ok(())
     }
 
-    /// Changes when to stop; more epochs let a training go on that had run all of its own.
+    /// Changes when to stop. A training that these rules would not have ended where it stands goes on, say with more
+    /// epochs; one that they would have ended, ends.
     ///
     /// # Errors
     /// A setting out of range; then nothing has changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
         stopping.check()?;
+        if stopping == self.settings.stopping {
+            return Ok(());
+        }
         self.settings.stopping = stopping;
-        if self.stop_reason == Some(StopReason::EpochsReached) && self.latest().epoch < stopping.epochs {
-            self.stop_reason = None;
+        let by_rule = !matches!(
+            self.stop_reason,
+            Some(StopReason::Stopped | StopReason::Diverged | StopReason::MuLarge)
+        );
+        if by_rule {
+            let latest = *self.latest();
+            self.stop_reason = self.reason_to_stop(&latest);
         }
         Ok(())
     }
@@ -215,7 +240,7 @@ impl Trainer {
             Some(last) if validation_mse == last.validation_mse => {}
             _ => self.validation_failures = 0,
         }
-        self.history.push(EpochRecord {
+        let latest = EpochRecord {
             epoch,
             training_mse: mse,
             validation_mse,
@@ -224,22 +249,24 @@ impl Trainer {
             parameter: self.algorithm.parameter(),
             effective_parameters: self.algorithm.effective_parameters(),
             validation_failures: self.validation_failures,
-        });
-        self.stop_reason = self.reason_to_stop(epoch, evaluation);
+        };
+        self.history.push(latest);
+        self.stop_reason = self.reason_to_stop(&latest);
     }
 
-    fn reason_to_stop(&self, epoch: usize, now: Evaluation) -> Option<StopReason> {
+    fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
         let rules = self.settings.stopping;
         let validation_rose = self.validation_failures >= rules.max_fail;
+        let mse = latest.training_mse;
         let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
-            (!now.mse.is_finite(), StopReason::Diverged),
+            (!mse.is_finite(), StopReason::Diverged),
             // Validation that rises together with the training error, above where it began, is no overfitting.
-            (validation_rose && now.mse > start_mse, StopReason::Diverged),
-            (now.mse <= rules.goal_mse, StopReason::GoalReached),
-            (now.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
+            (validation_rose && mse > start_mse, StopReason::Diverged),
+            (mse <= rules.goal_mse, StopReason::GoalReached),
+            (latest.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
             (validation_rose, StopReason::ValidationRose),
-            (epoch >= rules.epochs, StopReason::EpochsReached),
+            (latest.epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
     }
@@ -262,6 +289,16 @@ impl Trainer {
     /// The epoch of [`Self::best`].
     pub fn best_epoch(&self) -> usize {
         self.best.epoch
+    }
+
+    /// The error of [`Self::best`]: on the validation set, or on the training set where nothing is held out.
+    pub fn best_mse(&self) -> f64 {
+        self.best.mse
+    }
+
+    /// The methods so far, the first one first.
+    pub fn stages(&self) -> &[Stage] {
+        &self.stages
     }
 
     /// Every epoch so far, the start first.
