@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::{CountError, Errors, RunSettings, StartRecord, starts::lowest};
 use crate::{
-    dataset::{Dataset, DatasetError, Split, Stream, hold_out},
+    dataset::{Dataset, DatasetError, FoldsError, Split, Stream, hold_out},
     decoupling::{Decoupler, LinearMap, TrainingMean},
     network::{DecouplingNetwork, MinMax, ScalingError, Shape, nguyen_widrow},
     scene::SceneError,
@@ -57,6 +57,9 @@ pub enum RunError {
     /// Samples that cannot be drawn.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// Folds that cannot be filled.
+    #[error(transparent)]
+    Folds(#[from] FoldsError),
     /// Samples that cannot be scaled.
     #[error(transparent)]
     Scaling(#[from] ScalingError),
@@ -102,7 +105,16 @@ impl Run {
     /// # Errors
     /// Settings that are impossible, with the reason.
     pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
-        Self::with_trainers(settings, |problem, shape| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::on_sets(settings, split, test)
+    }
+
+    /// As [`Self::prepare`], on sets that come from elsewhere, such as the folds of a cross-validation.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        Self::with_sets(settings, split, test, |problem, shape| {
             let start = |number| nguyen_widrow(shape, &mut settings.seed.start_rng(number));
             let trainers = (0..settings.starts).into_par_iter().map(|number| {
                 let trainer = Trainer::new(start(number), problem.clone(), settings.training);
@@ -123,7 +135,8 @@ impl Run {
                 expected: settings.starts,
             });
         }
-        Self::with_trainers(settings, |problem, _| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::with_sets(settings, split, test, |problem, _| {
             let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
                 let trainer = Trainer::resume(state, problem.clone());
                 trainer.map_err(|source| RunError::Resume { start, source })
@@ -132,22 +145,22 @@ impl Run {
         })
     }
 
-    fn with_trainers(
-        settings: RunSettings,
-        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
-    ) -> Result<Self, RunError> {
+    /// The training and validation set of these settings, and their test set.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn draw(settings: &RunSettings) -> Result<(Split, Dataset), RunError> {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
-        let test = Self::test_set(&settings)?;
+        let test = Self::test_set(settings)?;
         let RunSettings {
             sensor, scene, seed, ..
         } = settings;
         let rows = sensor.scale.rows();
         let held_out = settings.validation_samples.div_ceil(rows);
         let drawn = (settings.samples.div_ceil(rows) + held_out) * rows;
-        let drawn = Dataset::simulate(&sensor, &scene, drawn, &mut seed.rng(Stream::Training))?;
-        let split = hold_out(drawn, held_out, &mut seed.rng(Stream::Split));
-        Self::with_sets(settings, split, test, trainers)
+        let drawn = Dataset::simulate(sensor, scene, drawn, &mut seed.rng(Stream::Training))?;
+        Ok((hold_out(drawn, held_out, &mut seed.rng(Stream::Split)), test))
     }
 
     /// The test set of these settings: what the window shows before anything is trained.
@@ -172,6 +185,7 @@ impl Run {
         test: Dataset,
         trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
     ) -> Result<Self, RunError> {
+        settings.check_counts()?;
         let Split { training, validation } = split;
         let stroke_mm = settings.stroke_mm();
         let score = |decoupler: &dyn Decoupler| {

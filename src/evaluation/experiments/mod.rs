@@ -19,7 +19,7 @@ pub use bottleneck::Bottleneck;
 pub use experiment::{Cell, CrossValidation, Experiment, ExperimentError, PaperTable};
 pub use growth::{Growth, GrowthLaw};
 pub use results::{CellResults, ExperimentResults};
-pub use runner::{CancelToken, Finished, run_experiments, worker_threads};
+pub use runner::{Finished, run_experiments, worker_threads};
 pub use summary::CellSummary;
 pub use trial::{Trial, TrialFailure};
 pub use verdict::{Standing, Verdict, verdicts};

@@ -58,6 +58,12 @@ impl ExperimentResults {
         }
     }
 
+    /// The values of a cell on each axis, in words.
+    pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
+        let places = [cell.cell.column, cell.cell.row].into_iter();
+        places.zip(self.experiment.axes()).map(|(place, axis)| axis.label(place)).collect()
+    }
+
     /// Whether every trial has come to something.
     pub fn is_complete(&self) -> bool {
         self.cells.iter().all(CellResults::is_complete)

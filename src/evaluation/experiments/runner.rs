@@ -1,8 +1,7 @@
 use std::{
     num::NonZero,
     sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
+        atomic::{AtomicUsize, Ordering},
         mpsc::channel,
     },
     thread,
@@ -16,22 +15,6 @@ use super::{
     time_left::{TimeLeft, work},
 };
 use crate::evaluation::RunSettings;
-
-/// Ends experiments early when told to, from any thread. Looked at before every epoch.
-#[derive(Clone, Debug, Default)]
-pub struct CancelToken(Arc<AtomicBool>);
-
-impl CancelToken {
-    /// Asks everything that looks at this token, or a clone of it, to end.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether it was asked to.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
 
 /// A trial that has come to something.
 #[derive(Clone, Debug)]
@@ -58,7 +41,8 @@ pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
 }
 
 /// Runs all trials of `experiments` on `threads` threads, one trial on a thread, and hands over each as it is
-/// finished, on the calling thread. Returns when all are done or, after `cancel`, when the epochs in progress are.
+/// finished, on the calling thread. Returns when all are done or, once `is_cancelled`, when the epochs in progress
+/// are: it is asked before every epoch, from every thread.
 ///
 /// What a trial comes to depends on its settings alone, not on the number of threads or on other trials; only its
 /// times do.
@@ -68,7 +52,7 @@ pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
 pub fn run_experiments(
     experiments: &[Experiment],
     threads: NonZero<usize>,
-    cancel: &CancelToken,
+    is_cancelled: impl Fn() -> bool + Sync,
     mut on_finished: impl FnMut(Finished),
 ) -> Result<(), ExperimentError> {
     experiments.iter().try_for_each(Experiment::check)?;
@@ -83,12 +67,12 @@ pub fn run_experiments(
     let (sender, receiver) = channel();
     thread::scope(|scope| {
         for pool in &pools {
-            let (sender, jobs, next) = (sender.clone(), &jobs, &next);
+            let (sender, jobs, next, is_cancelled) = (sender.clone(), &jobs, &next, &is_cancelled);
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
                     // The receiver is gone only if the calling thread panicked.
-                    match job.run(cancel) {
+                    match job.run(is_cancelled) {
                         Some(outcome) if sender.send((job, outcome, begun.elapsed())).is_ok() => {}
                         _ => break,
                     }
@@ -166,13 +150,13 @@ impl Queue {
 
 impl Job {
     /// `None` if cancelled.
-    fn run(&self, cancel: &CancelToken) -> Option<Result<Trial, TrialFailure>> {
-        if cancel.is_cancelled() {
+    fn run(&self, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
+        if is_cancelled() {
             return None;
         }
         let trial = match self.cross_validation {
-            None => Trial::on_drawn_sets(self.settings, cancel),
-            Some(validation) => Trial::by_cross_validation(self.settings, validation, self.repeat, cancel),
+            None => Trial::on_drawn_sets(self.settings, is_cancelled),
+            Some(validation) => Trial::by_cross_validation(self.settings, validation, self.repeat, is_cancelled),
         };
         trial.transpose().map(|trial| {
             trial.map_err(|reason| TrialFailure {

@@ -3,7 +3,7 @@ use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Bottleneck, CancelToken, CrossValidation};
+use super::{Bottleneck, CrossValidation};
 use crate::{
     dataset::{Dataset, DatasetError, Folds, Seed, Split, Stream},
     decoupling::{Decoupler, LinearMap, TrainingMean},
@@ -59,13 +59,13 @@ impl Trial {
     }
 
     /// Trains on sets drawn with the seed of `settings` and tests on the test set. `None` if cancelled.
-    pub(super) fn on_drawn_sets(settings: RunSettings, cancel: &CancelToken) -> Result<Option<Self>, RunError> {
+    pub(super) fn on_drawn_sets(settings: RunSettings, is_cancelled: impl Fn() -> bool) -> Result<Option<Self>, RunError> {
         let (split, test) = Run::draw(&settings)?;
         let bottleneck = Bottleneck::fit(split.training.coordinates_mm.view(), settings.hidden)?;
         let reconstructed = bottleneck.reconstruct(test.coordinates_mm.view());
         let bottleneck = Errors::measure(&test, &reconstructed, settings.stroke_mm());
         let mut run = Run::on_sets(settings, split, test)?;
-        if !train(&mut run, cancel) {
+        if !train(&mut run, &is_cancelled) {
             return Ok(None);
         }
         let spent = Spent::on(&run);
@@ -87,11 +87,11 @@ impl Trial {
         settings: RunSettings,
         CrossValidation { folds, unit, .. }: CrossValidation,
         repeat: usize,
-        cancel: &CancelToken,
+        is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
         let set = draw(&settings)?;
         let own_seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(&set, folds, unit, &mut own_seed.rng(Stream::Folds))?;
+        let folds = Folds::deal(&set, folds, unit, &mut own_seed.rng(Stream::Split))?;
         let mut pooled = Pooled::new(&set);
         let mut spent = Spent::default();
         for fold in 0..folds.count() {
@@ -103,7 +103,7 @@ impl Trial {
                 ..settings
             };
             let mut run = Run::on_sets(settings, split, test)?;
-            if !train(&mut run, cancel) {
+            if !train(&mut run, &is_cancelled) {
                 return Ok(None);
             }
             scatter(&mut pooled.network, folds.test(fold), &run.decouple_test().0);
@@ -128,9 +128,9 @@ impl Trial {
 }
 
 /// Steps to the end; false if cancelled before.
-fn train(run: &mut Run, cancel: &CancelToken) -> bool {
+fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> bool {
     while run.stop_reason().is_none() {
-        if cancel.is_cancelled() {
+        if is_cancelled() {
             return false;
         }
         run.step();

@@ -84,14 +84,11 @@ struct Measured {
 
 impl Measured {
     fn all(results: &ExperimentResults) -> Vec<Self> {
-        let experiment = &results.experiment;
         let measure = |cell: &CellResults| {
             let place = cell.cell;
-            let labels = [place.column, place.row].into_iter().zip(experiment.axes());
-            let labels: Vec<_> = labels.map(|(index, axis)| axis.label(index)).collect();
             let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
             Some(Self {
-                label: labels.join(", "),
+                label: results.cell_labels(cell).join(", "),
                 column: place.column,
                 z: cell.z_percent()?,
                 published: place.published.map(|published| published.z_percent),
