@@ -37,7 +37,7 @@ impl ExperimentTable {
     fn figures(summary: Option<&CellSummary>, has_published: bool) -> Vec<(&'static str, String)> {
         let number = |figure: fn(&CellSummary) -> Option<f64>| format_number(summary.and_then(figure));
         let mut figures = Vec::new();
-        let mut published = |heading, figure: fn(&CellSummary) -> Option<f64>| {
+        let published = |heading, figure: fn(&CellSummary) -> Option<f64>| {
             if has_published {
                 vec![(heading, number(figure))]
             } else {

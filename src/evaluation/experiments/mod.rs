@@ -20,6 +20,6 @@ pub use experiment::{Cell, CrossValidation, Experiment, ExperimentError, PaperTa
 pub use growth::{Growth, GrowthLaw};
 pub use results::{CellResults, ExperimentResults};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use summary::CellSummary;
+pub use summary::{CellSummary, Figure};
 pub use trial::{Trial, TrialFailure};
 pub use verdict::{Standing, Verdict, verdicts};

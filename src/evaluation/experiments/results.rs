@@ -94,3 +94,62 @@ impl CellResults {
         trials.get(middle).copied()
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::{
+        dataset::Seed,
+        evaluation::{Baselines, Errors, NodeAddress, experiments::PaperTable},
+    };
+
+    fn errors(z_percent: f64) -> Errors {
+        Errors {
+            z_percent: Some(z_percent),
+            x_percent: Some(0.1),
+            y_percent: Some(1e-12),
+            z_mm: z_percent / 20.0,
+            z_full_scale_percent: 5.0 * z_percent,
+            worst_mm: 0.5,
+            worst_node: NodeAddress::default(),
+        }
+    }
+
+    /// A trial of these errors; the linear map has 1.6 %, an epoch takes a second.
+    pub(in crate::evaluation::experiments) fn trial(seed: u64, z_percent: f64) -> Trial {
+        Trial {
+            seed: Seed(seed),
+            repeat: 0,
+            errors: errors(z_percent),
+            baselines: Baselines {
+                mean: errors(5.5),
+                linear: errors(1.6),
+            },
+            bottleneck: errors(0.0),
+            networks: 1,
+            epochs: 10,
+            seconds: 10.0,
+            network: None,
+        }
+    }
+
+    #[test]
+    fn the_order_in_which_trials_finish_leaves_no_trace() {
+        let mut forwards = ExperimentResults::new(PaperTable::HiddenNodes.experiment());
+        let mut backwards = forwards.clone();
+        let trials = [trial(0, 3.0), trial(1, 1.0), trial(2, 2.0), trial(3, 9.0)];
+        for trial in &trials {
+            forwards.record(2, Ok(trial.clone()));
+        }
+        for trial in trials.iter().rev() {
+            backwards.record(2, Ok(trial.clone()));
+        }
+        assert_eq!(forwards.cells[2].trials, trials);
+        assert_eq!(backwards.cells[2].trials, trials);
+        assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
+        assert!(!forwards.cells[2].is_complete());
+        let z = forwards.cells[2].summary().z_percent;
+        assert_eq!([z.published, z.min, z.median, z.max], [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]);
+        assert_eq!(forwards.cells[1].median_trial(), None);
+    }
+}

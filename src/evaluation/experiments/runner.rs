@@ -71,10 +71,10 @@ pub fn run_experiments(
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
+                    let Some(outcome) = job.run(is_cancelled) else { break };
                     // The receiver is gone only if the calling thread panicked.
-                    match job.run(is_cancelled) {
-                        Some(outcome) if sender.send((job, outcome, begun.elapsed())).is_ok() => {}
-                        _ => break,
+                    if sender.send((job, outcome, begun.elapsed())).is_err() {
+                        break;
                     }
                 }
             };

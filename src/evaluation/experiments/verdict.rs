@@ -296,3 +296,103 @@ fn linear_map_is_beaten(measured: &[Measured]) -> Verdict {
         finding: sentence(&parts.join("; ")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::experiments::{PaperTable, Trial, results::tests::trial};
+
+    /// Z errors of the trials of each cell.
+    fn judged(table: PaperTable, cells: &[&[f64]], change: impl Fn(usize, &mut Trial)) -> Vec<Verdict> {
+        let mut results = ExperimentResults::new(table.experiment());
+        for (cell, z_percent) in cells.iter().enumerate() {
+            for (seed, z_percent) in (0..).zip(*z_percent) {
+                let mut trial = trial(seed, *z_percent);
+                change(cell, &mut trial);
+                results.record(cell, Ok(trial));
+            }
+        }
+        verdicts(&results)
+    }
+
+    fn standing(verdicts: &[Verdict], claim: &str) -> Standing {
+        let verdict = verdicts.iter().find(|verdict| verdict.claim.contains(claim));
+        verdict.unwrap_or_else(|| panic!("no verdict on {claim}")).standing
+    }
+
+    #[test]
+    fn an_optimum_needs_a_rise_beyond_the_spread() {
+        let cases: [(&[&[f64]], Standing); 5] = [
+            (&[&[4.0], &[3.0], &[2.0], &[1.7, 1.8], &[1.7, 1.8], &[2.0]], Standing::Holds),
+            (&[&[4.0], &[3.0], &[2.0], &[1.7, 1.9], &[1.7, 2.9], &[1.9]], Standing::Holds),
+            (&[&[4.0], &[3.0], &[2.0], &[1.6, 1.7, 2.9], &[1.8]], Standing::Undecided),
+            (&[&[4.0], &[3.0], &[2.0], &[1.0]], Standing::Fails),
+            (&[&[1.0], &[3.0], &[4.0], &[5.0]], Standing::Fails),
+        ];
+        for (cells, expected) in cases {
+            let verdicts = judged(PaperTable::HiddenNodes, cells, |_, _| {});
+            assert_eq!(standing(&verdicts, "optimal"), expected, "{cells:?}: {verdicts:?}");
+        }
+        let few = judged(PaperTable::HiddenNodes, &[&[4.0], &[3.0]], |_, _| {});
+        assert_eq!(standing(&few, "optimal"), Standing::Undecided);
+    }
+
+    #[test]
+    fn an_order_holds_if_no_trial_departs_from_it() {
+        let cases: [(&[&[f64]], Standing); 5] = [
+            (&[&[1.0, 1.2], &[1.3, 1.6], &[2.0]], Standing::Holds),
+            (&[&[1.0, 1.4], &[1.3, 1.6], &[2.0]], Standing::Undecided),
+            (&[&[1.0], &[3.0], &[2.0]], Standing::HoldsInPart),
+            (&[&[3.0], &[2.0], &[1.0]], Standing::Fails),
+            (&[&[3.0]], Standing::Undecided),
+        ];
+        for (cells, expected) in cases {
+            let verdicts = judged(PaperTable::ArrayScales, cells, |_, _| {});
+            assert_eq!(standing(&verdicts, "Smaller arrays"), expected, "{cells:?}");
+        }
+        // The large dataset is the first cell.
+        let sizes = |cells| judged(PaperTable::CrossValidation, cells, |_, _| {});
+        assert_eq!(standing(&sizes(&[&[1.0, 1.1], &[3.0, 3.3]]), "larger dataset"), Standing::Holds);
+        assert_eq!(standing(&sizes(&[&[3.0], &[1.0]]), "larger dataset"), Standing::Fails);
+    }
+
+    #[test]
+    fn published_figures_and_the_linear_map_are_met_everywhere_in_part_or_nowhere() {
+        let of = |cells: [&[f64]; 3]| judged(PaperTable::ArrayScales, &cells, |_, _| {});
+        let good = of([&[0.1], &[0.2], &[0.3]]);
+        let mixed = of([&[1.0], &[1.7], &[2.0]]);
+        let bad = of([&[3.0], &[3.0], &[3.0]]);
+        for (claim, mixed_standing) in [("published", Standing::HoldsInPart), ("linear map", Standing::HoldsInPart)] {
+            assert_eq!(standing(&good, claim), Standing::Holds);
+            assert_eq!(standing(&mixed, claim), mixed_standing);
+            assert_eq!(standing(&bad, claim), Standing::Fails);
+        }
+        let published = mixed.iter().find(|verdict| verdict.claim.contains("published")).unwrap();
+        assert_eq!(
+            published.finding,
+            "Met or beaten at 10×6_3×18 (1.00 against 1.41), 10×10_5×30 (2.00 against 2.28); missed at 10×8_4×24 (1.70 \
+             against 1.63, 4.29 % more)."
+        );
+    }
+
+    #[test]
+    fn time_is_judged_by_the_law_that_fits_better() {
+        let hidden = [6.0, 8.0, 10.0, 12.0, 14.0, 16.0_f64];
+        let cells: [&[f64]; 6] = [&[1.0]; 6];
+        let judge = |law: &dyn Fn(f64) -> f64| {
+            let verdicts = judged(PaperTable::HiddenNodes, &cells, |cell, trial| trial.seconds = law(hidden[cell]));
+            standing(&verdicts, "time")
+        };
+        assert_eq!(judge(&|h| 0.01 * h * h), Standing::Holds);
+        assert_eq!(judge(&|h| 0.01 * 1.3_f64.powf(h)), Standing::Fails);
+    }
+
+    #[test]
+    fn nothing_finished_decides_nothing() {
+        for table in PaperTable::ALL {
+            let verdicts = judged(table, &[], |_, _| {});
+            assert!(!verdicts.is_empty());
+            assert!(verdicts.iter().all(|verdict| verdict.standing == Standing::Undecided), "{verdicts:?}");
+        }
+    }
+}
