@@ -41,8 +41,8 @@ pub fn open() -> Result<(), OpenError> {
     }
     let options = NativeOptions {
         viewport,
-        // egui smooths lines and text itself, but not the meshes of the surfaces.
-        multisampling: 4,
+        // egui smooths lines and text itself; smoothing the meshes too doubles the time of a frame without a graphics card.
+        multisampling: 0,
         ..NativeOptions::default()
     };
     let create = |creation: &eframe::CreationContext<'_>| {

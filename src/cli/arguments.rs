@@ -25,7 +25,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Train(Train),
+    Train(Box<Train>),
     Decode(Decode),
     Simulate(Simulate),
     Reproduce(Reproduce),

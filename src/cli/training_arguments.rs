@@ -15,7 +15,7 @@ use crate::{
     training::{Method, StoppingRules, TrainingSettings},
 };
 
-/// What to train. Whatever is not given is the default, or what a checkpoint says.
+// What to train. Whatever is not given is the default, or what a checkpoint says.
 #[derive(Args)]
 pub(super) struct TrainingArguments {
     /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]

@@ -5,6 +5,7 @@ mod errors;
 pub mod experiments;
 mod published;
 mod run;
+mod run_error;
 mod settings;
 mod spread;
 mod starts;
@@ -12,7 +13,8 @@ mod table;
 
 pub use errors::{Errors, NodeAddress};
 pub use published::{PublishedErrors, published_errors};
-pub use run::{Baselines, Run, RunError};
+pub use run::{Baselines, Run};
+pub use run_error::RunError;
 pub use settings::{CountError, MOST_STARTS, RunSettings};
 pub use spread::Spread;
 pub use starts::{StartRecord, best_start};

@@ -3,15 +3,12 @@ use std::sync::Arc;
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::{CountError, Errors, RunSettings, StartRecord, starts::lowest};
+use super::{Errors, RunError, RunSettings, StartRecord, starts::lowest};
 use crate::{
-    dataset::{Dataset, DatasetError, FoldsError, Split, Stream, hold_out},
+    dataset::{Dataset, Split, Stream, hold_out},
     decoupling::{Decoupler, LinearMap, TrainingMean},
-    network::{DecouplingNetwork, MinMax, ScalingError, Shape, nguyen_widrow},
-    scene::SceneError,
-    sensor::SensorError,
+    network::{DecouplingNetwork, MinMax, Shape, nguyen_widrow},
     training::{
         Examples, Method, NormalEquations, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer,
         TrainerState, TrainingError,
@@ -40,60 +37,6 @@ pub struct Baselines {
     pub mean: Errors,
     /// The best affine map on resistance.
     pub linear: Errors,
-}
-
-/// Why a run cannot be prepared.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum RunError {
-    /// A number out of range.
-    #[error(transparent)]
-    Count(#[from] CountError),
-    /// An impossible sensor.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// An impossible scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Samples that cannot be drawn.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// Folds that cannot be filled.
-    #[error(transparent)]
-    Folds(#[from] FoldsError),
-    /// Samples that cannot be scaled.
-    #[error(transparent)]
-    Scaling(#[from] ScalingError),
-    /// A training that cannot begin.
-    #[error(transparent)]
-    Training(#[from] TrainingError),
-    /// The method's equations of all starts would take too much memory.
-    #[error(
-        "{starts} starts of this network would take {:.1} GB with this method: use fewer starts, fewer hidden nodes, \
-         or the scaled conjugate gradient (scg)",
-        *.bytes as f64 * 1e-9
-    )]
-    TooManyStarts {
-        /// How many were asked for.
-        starts: usize,
-        /// How many bytes they would take.
-        bytes: usize,
-    },
-    /// A saved training that cannot be resumed.
-    #[error("start {}: {source}", .start + 1)]
-    Resume {
-        /// Which start, from 0.
-        start: usize,
-        /// What is wrong with it.
-        source: ResumeError,
-    },
-    /// Not as many saved trainings as starts.
-    #[error("{found} saved trainings, but the settings ask for {expected} starts")]
-    Starts {
-        /// Trainings found.
-        found: usize,
-        /// Starts asked for.
-        expected: usize,
-    },
 }
 
 /// The most memory that the equations of all starts may take.
@@ -136,10 +79,14 @@ impl Run {
             });
         }
         let (split, test) = Self::draw(&settings)?;
-        Self::with_sets(settings, split, test, |problem, _| {
+        Self::with_sets(settings, split, test, |problem, shape| {
             let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
-                let trainer = Trainer::resume(state, problem.clone());
-                trainer.map_err(|source| RunError::Resume { start, source })
+                let refused = |source| RunError::Resume { start, source };
+                let trainer = Trainer::resume(state, problem.clone()).map_err(refused)?;
+                if trainer.present().shape() != shape {
+                    return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
+                }
+                Ok(trainer)
             });
             trainers.collect()
         })
@@ -248,10 +195,15 @@ impl Run {
         self.trainers.iter_mut().for_each(Trainer::stop);
     }
 
-    /// Why the run has ended: the leader's reason, once every start has ended.
+    /// Why the run has ended, once every start has ended: the leader's reason, or the user's wish if any start could
+    /// have gone on.
     pub fn stop_reason(&self) -> Option<StopReason> {
-        let all_ended = self.trainers.iter().all(|trainer| trainer.stop_reason().is_some());
-        all_ended.then(|| self.leader().stop_reason()).flatten()
+        let reasons = self.trainers.iter().map(Trainer::stop_reason);
+        let reasons: Vec<_> = reasons.collect::<Option<_>>()?;
+        if reasons.contains(&StopReason::Stopped) {
+            return Some(StopReason::Stopped);
+        }
+        self.leader().stop_reason()
     }
 
     /// Goes on with another method from the present weights of every start: [`Trainer::continue_with`].

@@ -159,8 +159,9 @@ impl Trainer {
         let mut activations = Activations::new(shape);
         let found = training.mse(&mlp, &mut activations);
         let saved = state.mse;
-        // The negation refuses NaN.
-        if !((found - saved).abs() <= SAME_ERROR * saved.abs()) {
+        // False for NaN.
+        let is_same = (found - saved).abs() <= SAME_ERROR * saved.abs();
+        if !is_same {
             return Err(ResumeError::OtherSamples { saved, found });
         }
         let algorithm = state.settings.method.resume(state.method, &mlp, training);

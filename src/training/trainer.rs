@@ -69,7 +69,7 @@ pub enum TrainingError {
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
-fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
+pub(super) fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
     let bytes = if method.has_normal_equations() {
         NormalEquations::bytes(shape)
     } else {
@@ -177,49 +177,6 @@ impl Trainer {
         self.stop_reason.get_or_insert(StopReason::Stopped);
     }
 
-    /// Goes on from the present weights with another method (momentum first, Levenberg-Marquardt to finish), also after
-    /// the training has ended, unless it ended because all epochs were run. Epochs go on counting.
-    ///
-    /// # Errors
-    /// A setting out of range, or a network too wide for the method; then nothing has changed.
-    pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        method.check()?;
-        check_width(&method, self.mlp.shape())?;
-        let begun = Instant::now();
-        let first_epoch = self.latest().epoch + 1;
-        self.stages.retain(|stage| stage.first_epoch < first_epoch);
-        self.stages.push(Stage { first_epoch, method });
-        self.settings.method = method;
-        (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);
-        self.validation_failures = 0;
-        let all_run = self.latest().epoch >= self.settings.stopping.epochs;
-        self.stop_reason = all_run.then_some(StopReason::EpochsReached);
-        self.elapsed += begun.elapsed();
-        Ok(())
-    }
-
-    /// Changes when to stop. A training that these rules would not have ended where it stands goes on, say with more
-    /// epochs; one that they would have ended, ends.
-    ///
-    /// # Errors
-    /// A setting out of range; then nothing has changed.
-    pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        stopping.check()?;
-        if stopping == self.settings.stopping {
-            return Ok(());
-        }
-        self.settings.stopping = stopping;
-        let by_rule = !matches!(
-            self.stop_reason,
-            Some(StopReason::Stopped | StopReason::Diverged | StopReason::MuLarge)
-        );
-        if by_rule {
-            let latest = *self.latest();
-            self.stop_reason = self.reason_to_stop(&latest);
-        }
-        Ok(())
-    }
-
     fn record(&mut self, evaluation: Evaluation) {
         let Evaluation { mse, gradient_norm } = evaluation;
         let mut watch = |examples: &Option<Examples>| {
@@ -254,7 +211,7 @@ impl Trainer {
         self.stop_reason = self.reason_to_stop(&latest);
     }
 
-    fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
+    pub(super) fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
         let rules = self.settings.stopping;
         let validation_rose = self.validation_failures >= rules.max_fail;
         let mse = latest.training_mse;

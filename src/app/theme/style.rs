@@ -24,7 +24,8 @@ pub fn apply(ctx: &Context, is_dark: bool) {
 fn style(is_dark: bool) -> Style {
     let mut style = Style {
         visuals: visuals(is_dark),
-        animation_time: 0.08,
+        // Answers show at once.
+        animation_time: 0.0,
         ..Style::default()
     };
     let sizes = type_size();
