@@ -14,9 +14,7 @@ use decoupler::{
     dataset::{FoldUnit, Seed},
     evaluation::{
         Run, RunSettings,
-        experiments::{
-            Axis, Bottleneck, CrossValidation, Experiment, ExperimentResults, Trial, run_experiments,
-        },
+        experiments::{Axis, Bottleneck, CrossValidation, Experiment, ExperimentResults, Trial, run_experiments},
     },
     sensor::{ArrayScale, SensorModel},
     training::Method,
@@ -61,9 +59,14 @@ fn threads(count: usize) -> NonZero<usize> {
 
 fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
     let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
-    run_experiments(experiments, threads(thread_count), || false, |finished| {
-        results[finished.experiment].record(finished.cell, finished.outcome);
-    })
+    run_experiments(
+        experiments,
+        threads(thread_count),
+        || false,
+        |finished| {
+            results[finished.experiment].record(finished.cell, finished.outcome);
+        },
+    )
     .unwrap();
     results
 }
@@ -173,7 +176,10 @@ fn cancelling_keeps_what_is_finished() {
     for (kept, whole) in kept.iter().zip(&whole) {
         assert!(kept.iter().all(|trial| whole.contains(trial)));
     }
-    assert!(kept.iter().all(|trials| !trials.is_empty()), "every cell is tried once before any twice");
+    assert!(
+        kept.iter().all(|trials| !trials.is_empty()),
+        "every cell is tried once before any twice"
+    );
 }
 
 #[test]
@@ -223,13 +229,21 @@ fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
             settings.validation_samples = 0;
             settings.training.stopping.epochs = 200;
             let (split, _) = Run::draw(&settings).unwrap();
-            let least = Bottleneck::fit(split.training.coordinates_mm.view(), hidden).unwrap().least_mse();
+            let least = Bottleneck::fit(split.training.coordinates_mm.view(), hidden)
+                .unwrap()
+                .least_mse();
             let mut run = Run::prepare(settings).unwrap();
             while run.step().is_none() {}
             let reached = run.leader().best_mse();
-            assert!(reached >= least * (1.0 - 1e-9), "{hidden} hidden: {reached} below {least}");
+            assert!(
+                reached >= least * (1.0 - 1e-9),
+                "{hidden} hidden: {reached} below {least}"
+            );
             if hidden < 4 {
-                assert!(reached < 1.2 * least, "{hidden} hidden: the bound {least} is far below {reached}");
+                assert!(
+                    reached < 1.2 * least,
+                    "{hidden} hidden: the bound {least} is far below {reached}"
+                );
             }
         }
     }
@@ -257,7 +271,10 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
                 let [min, median, max] = ["min", "median", "max"].map(|name| z[name].as_f64().unwrap());
                 assert!(min <= median && median <= max);
             }
-            cells.iter().map(|cell| cell["z_percent"]["published"].as_f64()).collect()
+            cells
+                .iter()
+                .map(|cell| cell["z_percent"]["published"].as_f64())
+                .collect()
         })
         .collect();
     assert_eq!(
@@ -268,7 +285,10 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
             vec![Some(1.41), Some(1.63), Some(2.28)]
         ]
     );
-    assert_eq!(tables[1]["cells"][0]["z_percent"]["values"].as_array().unwrap().len(), 4);
+    assert_eq!(
+        tables[1]["cells"][0]["z_percent"]["values"].as_array().unwrap().len(),
+        4
+    );
     for number in 1..=3 {
         let file = |name: &str| fs::read_to_string(folder.path().join("tables/new").join(name)).unwrap();
         let cells = tables[number - 1]["cells"].as_array().unwrap();
@@ -278,7 +298,10 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
         let column = heading.iter().position(|name| *name == "z_percent_median").unwrap();
         assert_eq!(first[column].parse().ok(), cells[0]["z_percent"]["median"].as_f64());
         let trials: u64 = cells.iter().map(|cell| cell["trials"].as_u64().unwrap()).sum();
-        assert_eq!(file(&format!("table_{number}_trials.csv")).lines().count() as u64, 1 + trials);
+        assert_eq!(
+            file(&format!("table_{number}_trials.csv")).lines().count() as u64,
+            1 + trials
+        );
         assert!(file(&format!("table_{number}.md")).contains("| Z % publ. |"));
     }
 }
@@ -286,10 +309,15 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
 #[test]
 fn with_training_enough_smaller_arrays_are_decoupled_better() {
     let folder = tempfile::tempdir().unwrap();
-    let output = decoupler("reproduce --table 3 --seeds 1 --epochs 60 --starts 1 --json", folder.path());
+    let output = decoupler(
+        "reproduce --table 3 --seeds 1 --epochs 60 --starts 1 --json",
+        folder.path(),
+    );
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let verdicts = report["tables"][0]["verdicts"].as_array().unwrap();
-    let verdict = verdicts.iter().find(|verdict| verdict["claim"].as_str().unwrap().contains("Smaller arrays"));
+    let verdict = verdicts
+        .iter()
+        .find(|verdict| verdict["claim"].as_str().unwrap().contains("Smaller arrays"));
     assert_eq!(verdict.unwrap()["standing"], "holds");
     let first = &report["tables"][0]["cells"][0];
     assert_eq!(first["array"], ArrayScale::PRESETS[0].to_string());
@@ -311,7 +339,10 @@ fn what_cannot_be_reproduced_is_refused_in_a_line() {
         let output = decoupler(&format!("reproduce {arguments}"), folder.path());
         let text = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(status), "{arguments}: {text}");
-        assert!(text.contains(expected) && text.lines().count() == 1, "{arguments}: {text}");
+        assert!(
+            text.contains(expected) && text.lines().count() == 1,
+            "{arguments}: {text}"
+        );
         assert!(output.stdout.is_empty());
     }
 }

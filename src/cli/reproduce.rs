@@ -19,7 +19,9 @@ use crate::{
         MOST_STARTS,
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
-    export::{WriteError, atomic_write, check_writable, format_duration, write_cells, write_experiment_markdown, write_trials},
+    export::{
+        WriteError, atomic_write, check_writable, format_duration, write_cells, write_experiment_markdown, write_trials,
+    },
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
     training::StoppingRules,
@@ -104,18 +106,27 @@ impl Reproduce {
         }
         let begun = Instant::now();
         let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
-        let trials = results.iter().flat_map(|results| &results.cells).map(|cell| cell.expected).sum();
+        let trials = results
+            .iter()
+            .flat_map(|results| &results.cells)
+            .map(|cell| cell.expected)
+            .sum();
         let bar = self.progress_bar(trials);
         let graceful = Graceful::begin();
         let mut done = 0;
-        run_experiments(&experiments, worker_threads(false), || graceful.is_end_requested(), |finished| {
-            results[finished.experiment].record(finished.cell, finished.outcome);
-            done = finished.done;
-            bar.set_position(done as u64);
-            if let Some(time) = finished.time_left {
-                bar.set_message(format!("about {} left", format_duration(time)));
-            }
-        })?;
+        run_experiments(
+            &experiments,
+            worker_threads(false),
+            || graceful.is_end_requested(),
+            |finished| {
+                results[finished.experiment].record(finished.cell, finished.outcome);
+                done = finished.done;
+                bar.set_position(done as u64);
+                if let Some(time) = finished.time_left {
+                    bar.set_message(format!("about {} left", format_duration(time)));
+                }
+            },
+        )?;
         bar.finish_and_clear();
         drop(graceful);
         let reproduced: Vec<Reproduced> = tables
@@ -192,7 +203,12 @@ impl Reproduce {
 /// The files of a table: its cells, every trial, and all of it for reading.
 fn files(folder: &Path, table: PaperTable) -> [PathBuf; 3] {
     let number = table.number();
-    [format!("table_{number}.csv"), format!("table_{number}_trials.csv"), format!("table_{number}.md")].map(|name| folder.join(name))
+    [
+        format!("table_{number}.csv"),
+        format!("table_{number}_trials.csv"),
+        format!("table_{number}.md"),
+    ]
+    .map(|name| folder.join(name))
 }
 
 /// Makes the folder and sees that everything can be written, before the work.

@@ -111,7 +111,12 @@ fn write_aligned(table: &ExperimentTable, out: &mut impl Write) -> io::Result<()
         let cells = table.rows.iter().map(|row| row[column].chars().count());
         cells.max().unwrap_or(0).max(heading.chars().count())
     };
-    let widths: Vec<_> = table.headings.iter().enumerate().map(|(column, heading)| width(column, heading)).collect();
+    let widths: Vec<_> = table
+        .headings
+        .iter()
+        .enumerate()
+        .map(|(column, heading)| width(column, heading))
+        .collect();
     let line = |cells: &mut dyn Iterator<Item = &str>| {
         let padded = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
         padded.collect::<Vec<_>>().join("  ")
@@ -143,7 +148,11 @@ pub(super) fn conditions(experiment: &Experiment) -> String {
         1 => "one start".to_owned(),
         starts => format!("best of {starts} starts by validation error"),
     });
-    said.push(format!("seeds {} to {}", base.seed, base.seed.0.wrapping_add(experiment.seeds as u64 - 1)));
+    said.push(format!(
+        "seeds {} to {}",
+        base.seed,
+        base.seed.0.wrapping_add(experiment.seeds as u64 - 1)
+    ));
     said.push(match experiment.cross_validation {
         None => format!(
             "{} training samples, {} more for validation, {} for test",
@@ -172,7 +181,9 @@ pub(super) fn conditions(experiment: &Experiment) -> String {
 fn failures(results: &ExperimentResults) -> Vec<String> {
     let of_cell = |cell| {
         let label = results.cell_labels(cell).join(", ");
-        cell.failures.iter().map(move |failure| format!("Failed at {label}, {failure}"))
+        cell.failures
+            .iter()
+            .map(move |failure| format!("Failed at {label}, {failure}"))
     };
     results.cells.iter().flat_map(of_cell).collect()
 }

@@ -65,7 +65,9 @@ impl Folds {
         let deal = |fold: usize| {
             let mut dealt: Vec<usize> = order.iter().copied().skip(fold).step_by(folds).collect();
             dealt.sort_unstable();
-            let samples = dealt.iter().flat_map(|unit| unit * samples_per_unit..(unit + 1) * samples_per_unit);
+            let samples = dealt
+                .iter()
+                .flat_map(|unit| unit * samples_per_unit..(unit + 1) * samples_per_unit);
             samples.collect()
         };
         Ok(Self {
@@ -113,7 +115,12 @@ mod tests {
     #[test]
     fn every_sample_is_in_exactly_one_test_fold_and_never_in_its_own_training() {
         let set = set(130);
-        for (folds, unit) in [(10, FoldUnit::Sample), (7, FoldUnit::Sample), (4, FoldUnit::Snapshot), (13, FoldUnit::Snapshot)] {
+        for (folds, unit) in [
+            (10, FoldUnit::Sample),
+            (7, FoldUnit::Sample),
+            (4, FoldUnit::Snapshot),
+            (13, FoldUnit::Snapshot),
+        ] {
             let dealt = deal(&set, folds, unit, 1);
             let mut tested = vec![0; set.samples()];
             for fold in 0..dealt.count() {
@@ -142,7 +149,11 @@ mod tests {
             }
         }
         let by_sample = deal(&set, 5, FoldUnit::Sample, 2);
-        let splits = |samples: &[usize]| samples.iter().any(|sample| sample % 10 != 0 && !samples.contains(&(sample - 1)));
+        let splits = |samples: &[usize]| {
+            samples
+                .iter()
+                .any(|sample| sample % 10 != 0 && !samples.contains(&(sample - 1)))
+        };
         assert!(splits(by_sample.test(0)), "folds by sample do split snapshots");
     }
 
@@ -158,7 +169,12 @@ mod tests {
     #[test]
     fn folds_that_cannot_be_filled_are_refused() {
         let set = set(100);
-        for (folds, unit) in [(0, FoldUnit::Sample), (1, FoldUnit::Sample), (101, FoldUnit::Sample), (11, FoldUnit::Snapshot)] {
+        for (folds, unit) in [
+            (0, FoldUnit::Sample),
+            (1, FoldUnit::Sample),
+            (101, FoldUnit::Sample),
+            (11, FoldUnit::Snapshot),
+        ] {
             let error = Folds::deal(&set, folds, unit, &mut Seed(0).rng(Stream::Split)).unwrap_err();
             assert!(error.to_string().contains(&folds.to_string()), "{error}");
         }

@@ -2,7 +2,7 @@ use thiserror::Error;
 
 use super::CountError;
 use crate::{
-    dataset::DatasetError, FoldsError,
+    dataset::{DatasetError, FoldsError},
     network::ScalingError,
     scene::SceneError,
     sensor::SensorError,

@@ -21,11 +21,18 @@ impl ExperimentTable {
         let summaries = results.summaries();
         let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
         let mut headings: Vec<_> = results.experiment.axes().map(|axis| axis.name()).collect();
-        headings.extend(Self::figures(None, has_published).into_iter().map(|(heading, _)| heading));
+        headings.extend(
+            Self::figures(None, has_published)
+                .into_iter()
+                .map(|(heading, _)| heading),
+        );
         let row = |(cell, summary): (_, &CellSummary)| {
             let labels = results.cell_labels(cell);
             let figures = Self::figures(Some(summary), has_published);
-            labels.into_iter().chain(figures.into_iter().map(|(_, text)| text)).collect()
+            labels
+                .into_iter()
+                .chain(figures.into_iter().map(|(_, text)| text))
+                .collect()
         };
         Self {
             rows: results.cells.iter().zip(&summaries).map(row).collect(),

@@ -2,12 +2,7 @@ use std::mem::discriminant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    dataset::Seed,
-    evaluation::RunSettings,
-    sensor::ArrayScale,
-    training::Method,
-};
+use crate::{dataset::Seed, evaluation::RunSettings, sensor::ArrayScale, training::Method};
 
 /// What an experiment varies, and over which values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -70,7 +70,10 @@ mod tests {
 
     /// Corners of a cube: every direction varies equally, and min-max scaling leaves them as they are.
     fn cube() -> Array2<f64> {
-        Array2::from_shape_fn((8, 3), |(corner, axis)| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 })
+        Array2::from_shape_fn(
+            (8, 3),
+            |(corner, axis)| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 },
+        )
     }
 
     #[test]

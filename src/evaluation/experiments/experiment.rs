@@ -141,12 +141,14 @@ impl Experiment {
 
     /// How often each seed is tried.
     pub(super) fn repeats(&self) -> usize {
-        self.cross_validation.map_or(1, |cross_validation| cross_validation.repeats)
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.repeats)
     }
 
     /// Networks that each trial trains, each from as many starts as the settings say.
     pub(super) fn folds(&self) -> usize {
-        self.cross_validation.map_or(1, |cross_validation| cross_validation.folds)
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.folds)
     }
 
     /// Checks everything that can be known before a sample is drawn.
@@ -157,7 +159,11 @@ impl Experiment {
         if let Some(empty) = self.axes().find(|axis| axis.is_empty()) {
             return Err(ExperimentError::Empty(empty.name()));
         }
-        if self.second_axis.as_ref().is_some_and(|second| second.is_same_kind(&self.axis)) {
+        if self
+            .second_axis
+            .as_ref()
+            .is_some_and(|second| second.is_same_kind(&self.axis))
+        {
             return Err(ExperimentError::SameAxes(self.axis.name()));
         }
         for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
@@ -166,7 +172,9 @@ impl Experiment {
                 return Err(CountError { what, count, allowed }.into());
             }
         }
-        let cells = self.axes().fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
+        let cells = self
+            .axes()
+            .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
         let factors = [self.seeds, self.repeats(), self.folds(), self.base.starts];
         let trainings = factors.into_iter().fold(cells, usize::saturating_mul);
         if trainings > MOST_TRAININGS {
@@ -306,7 +314,10 @@ mod tests {
         let cases = [
             (table(|e| e.axis = Axis::Hidden(vec![])), "no values for hidden nodes"),
             (table(|e| e.axis = Axis::Hidden(vec![6, 0])), "hidden nodes: 0"),
-            (table(|e| e.second_axis = Some(Axis::Samples(vec![10]))), "both axes vary samples"),
+            (
+                table(|e| e.second_axis = Some(Axis::Samples(vec![10]))),
+                "both axes vary samples",
+            ),
             (table(|e| e.seeds = 0), "seeds: 0"),
             (table(|e| e.base.starts = 0), "starts: 0"),
             (table(|e| e.base.training.stopping.epochs = 0), "epochs"),

@@ -59,7 +59,9 @@ fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     };
     let (mean_x, mean_y) = (mean(|point| point.0), mean(|point| point.1));
     let deviations = points.clone().map(|(x, y)| (x - mean_x, y - mean_y));
-    let (above, below) = deviations.clone().fold((0.0, 0.0), |(above, below), (x, y)| (above + x * y, below + x * x));
+    let (above, below) = deviations
+        .clone()
+        .fold((0.0, 0.0), |(above, below), (x, y)| (above + x * y, below + x * x));
     let slope = above / below;
     let (squares, count) = deviations.fold((0.0, 0.0), |(squares, count), (x, y)| {
         (squares + (y - slope * x).powi(2), count + 1.0)

@@ -61,7 +61,10 @@ impl ExperimentResults {
     /// The values of a cell on each axis, in words.
     pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
         let places = [cell.cell.column, cell.cell.row].into_iter();
-        places.zip(self.experiment.axes()).map(|(place, axis)| axis.label(place)).collect()
+        places
+            .zip(self.experiment.axes())
+            .map(|(place, axis)| axis.label(place))
+            .collect()
     }
 
     /// Whether every trial has come to something.
@@ -88,7 +91,11 @@ impl CellResults {
 
     /// The trial of median AveZerr (the lower one of two), whose network may stand for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
-        let mut trials: Vec<&Trial> = self.trials.iter().filter(|trial| trial.errors.z_percent.is_some()).collect();
+        let mut trials: Vec<&Trial> = self
+            .trials
+            .iter()
+            .filter(|trial| trial.errors.z_percent.is_some())
+            .collect();
         trials.sort_by(|one, other| one.errors.z_mm.total_cmp(&other.errors.z_mm));
         let middle = trials.len().checked_sub(1)? / 2;
         trials.get(middle).copied()
@@ -149,7 +156,10 @@ pub(super) mod tests {
         assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
         assert!(!forwards.cells[2].is_complete());
         let z = forwards.cells[2].summary().z_percent;
-        assert_eq!([z.published, z.min, z.median, z.max], [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]);
+        assert_eq!(
+            [z.published, z.min, z.median, z.max],
+            [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]
+        );
         assert_eq!(forwards.cells[1].median_trial(), None);
     }
 }

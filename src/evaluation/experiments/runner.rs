@@ -60,7 +60,12 @@ pub fn run_experiments(
     let threads = threads.get().min(jobs.len());
     // A pool of one thread for each worker: what a training divides among threads stays on its own, so that its time
     // is its own, too.
-    let pool = |_| ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "experiment".to_owned()).build();
+    let pool = |_| {
+        ThreadPoolBuilder::new()
+            .num_threads(1)
+            .thread_name(|_| "experiment".to_owned())
+            .build()
+    };
     let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
     let pools = pools.map_err(|error| ExperimentError::Threads(error.to_string()))?;
     let next = AtomicUsize::new(0);

@@ -106,11 +106,7 @@ impl CellResults {
         }
     }
 
-    fn figure(
-        &self,
-        published: fn(&PublishedErrors) -> f64,
-        measured: fn(&super::Trial) -> Option<f64>,
-    ) -> Figure {
+    fn figure(&self, published: fn(&PublishedErrors) -> f64, measured: fn(&super::Trial) -> Option<f64>) -> Figure {
         let spread: Option<Spread> = self.spread(measured);
         Figure {
             published: self.cell.published.as_ref().map(published),

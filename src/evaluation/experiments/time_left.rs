@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Experiment, Cell};
+use super::{Cell, Experiment};
 use crate::training::Method;
 
 /// How long the rest takes, from what the finished jobs took. Jobs of a cell that has finished ones count as their

@@ -59,7 +59,10 @@ impl Trial {
     }
 
     /// Trains on sets drawn with the seed of `settings` and tests on the test set. `None` if cancelled.
-    pub(super) fn on_drawn_sets(settings: RunSettings, is_cancelled: impl Fn() -> bool) -> Result<Option<Self>, RunError> {
+    pub(super) fn on_drawn_sets(
+        settings: RunSettings,
+        is_cancelled: impl Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
         let (split, test) = Run::draw(&settings)?;
         let bottleneck = Bottleneck::fit(split.training.coordinates_mm.view(), settings.hidden)?;
         let reconstructed = bottleneck.reconstruct(test.coordinates_mm.view());

@@ -158,7 +158,9 @@ fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
             continue;
         }
         let bound = cell.bound.filter(|bound| *bound > 0.5 * published);
-        let bound = bound.map_or(String::new(), |bound| format!("; its hidden nodes can carry {}", number(bound)));
+        let bound = bound.map_or(String::new(), |bound| {
+            format!("; its hidden nodes can carry {}", number(bound))
+        });
         let excess = number(100.0 * (median / published - 1.0));
         missed.push(format!("{label} ({against}, {excess} % more{bound})"));
     }
@@ -168,7 +170,9 @@ fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
     let standing = share(met.len(), met.len() + missed.len());
     let parts = [("Met or beaten at", met), ("missed at", missed)];
     let parts = parts.into_iter().filter(|(_, cells)| !cells.is_empty());
-    let parts: Vec<_> = parts.map(|(what, cells)| format!("{what} {}", cells.join(", "))).collect();
+    let parts: Vec<_> = parts
+        .map(|(what, cells)| format!("{what} {}", cells.join(", ")))
+        .collect();
     Some(Verdict {
         claim: "The published Z error is reached",
         standing,
@@ -186,20 +190,32 @@ fn sentence(text: &str) -> String {
 /// Looks for the least error among `cells`, which come by number of hidden nodes.
 fn optimum_exists(cells: Vec<Measured>) -> Verdict {
     let claim = "There is an optimal number of hidden nodes";
-    let best = cells.iter().enumerate().min_by(|one, other| one.1.z.median.total_cmp(&other.1.z.median));
+    let best = cells
+        .iter()
+        .enumerate()
+        .min_by(|one, other| one.1.z.median.total_cmp(&other.1.z.median));
     let (Some((place, best)), Some(last), true) = (best, cells.last(), cells.len() >= 3) else {
         return missing(claim);
     };
     let beyond = &cells[place + 1..];
-    let worst = beyond.iter().max_by(|one, other| one.z.median.total_cmp(&other.z.median));
+    let worst = beyond
+        .iter()
+        .max_by(|one, other| one.z.median.total_cmp(&other.z.median));
     let (standing, finding) = match worst {
         None => (
             Standing::Fails,
-            format!("the error still falls at the most, {}; with this training more nodes only help", last.figures()),
+            format!(
+                "the error still falls at the most, {}; with this training more nodes only help",
+                last.figures()
+            ),
         ),
         Some(worst) if place == 0 => (
             Standing::Fails,
-            format!("the error is least at the fewest, {}, and rises to {}", best.figures(), worst.figures()),
+            format!(
+                "the error is least at the fewest, {}, and rises to {}",
+                best.figures(),
+                worst.figures()
+            ),
         ),
         Some(worst) if worst.z.median > best.z.largest => (
             Standing::Holds,
@@ -215,7 +231,11 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
         ),
     };
     let finding = sentence(&finding);
-    Verdict { claim, standing, finding }
+    Verdict {
+        claim,
+        standing,
+        finding,
+    }
 }
 
 /// Whether the errors rise along `measured`.
@@ -261,7 +281,9 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         GrowthLaw::Exponential => Standing::Fails,
     };
     let off = |residual: f64| number(100.0 * residual.exp_m1());
-    let times = points.iter().map(|(x, seconds)| format!("{x}: {} ms", number(1e3 * seconds)));
+    let times = points
+        .iter()
+        .map(|(x, seconds)| format!("{x}: {} ms", number(1e3 * seconds)));
     let finding = format!(
         "Time of an epoch by {what}: {}. As a power it grows with exponent {} (fit off by {} %); as an exponential by \
          {} % with each of them (fit off by {} %).",
@@ -271,7 +293,11 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         number(100.0 * (growth.factor_per_unit - 1.0)),
         off(growth.exponential_residual),
     );
-    Verdict { claim, standing, finding }
+    Verdict {
+        claim,
+        standing,
+        finding,
+    }
 }
 
 fn linear_map_is_beaten(measured: &[Measured]) -> Verdict {
@@ -323,8 +349,14 @@ mod tests {
     #[test]
     fn an_optimum_needs_a_rise_beyond_the_spread() {
         let cases: [(&[&[f64]], Standing); 5] = [
-            (&[&[4.0], &[3.0], &[2.0], &[1.7, 1.8], &[1.7, 1.8], &[2.0]], Standing::Holds),
-            (&[&[4.0], &[3.0], &[2.0], &[1.7, 1.9], &[1.7, 2.9], &[1.9]], Standing::Holds),
+            (
+                &[&[4.0], &[3.0], &[2.0], &[1.7, 1.8], &[1.7, 1.8], &[2.0]],
+                Standing::Holds,
+            ),
+            (
+                &[&[4.0], &[3.0], &[2.0], &[1.7, 1.9], &[1.7, 2.9], &[1.9]],
+                Standing::Holds,
+            ),
             (&[&[4.0], &[3.0], &[2.0], &[1.6, 1.7, 2.9], &[1.8]], Standing::Undecided),
             (&[&[4.0], &[3.0], &[2.0], &[1.0]], Standing::Fails),
             (&[&[1.0], &[3.0], &[4.0], &[5.0]], Standing::Fails),
@@ -352,7 +384,10 @@ mod tests {
         }
         // The large dataset is the first cell.
         let sizes = |cells| judged(PaperTable::CrossValidation, cells, |_, _| {});
-        assert_eq!(standing(&sizes(&[&[1.0, 1.1], &[3.0, 3.3]]), "larger dataset"), Standing::Holds);
+        assert_eq!(
+            standing(&sizes(&[&[1.0, 1.1], &[3.0, 3.3]]), "larger dataset"),
+            Standing::Holds
+        );
         assert_eq!(standing(&sizes(&[&[3.0], &[1.0]]), "larger dataset"), Standing::Fails);
     }
 
@@ -362,12 +397,18 @@ mod tests {
         let good = of([&[0.1], &[0.2], &[0.3]]);
         let mixed = of([&[1.0], &[1.7], &[2.0]]);
         let bad = of([&[3.0], &[3.0], &[3.0]]);
-        for (claim, mixed_standing) in [("published", Standing::HoldsInPart), ("linear map", Standing::HoldsInPart)] {
+        for (claim, mixed_standing) in [
+            ("published", Standing::HoldsInPart),
+            ("linear map", Standing::HoldsInPart),
+        ] {
             assert_eq!(standing(&good, claim), Standing::Holds);
             assert_eq!(standing(&mixed, claim), mixed_standing);
             assert_eq!(standing(&bad, claim), Standing::Fails);
         }
-        let published = mixed.iter().find(|verdict| verdict.claim.contains("published")).unwrap();
+        let published = mixed
+            .iter()
+            .find(|verdict| verdict.claim.contains("published"))
+            .unwrap();
         assert_eq!(
             published.finding,
             "Met or beaten at 10×6_3×18 (1.00 against 1.41), 10×10_5×30 (2.00 against 2.28); missed at 10×8_4×24 (1.70 \
@@ -380,7 +421,9 @@ mod tests {
         let hidden = [6.0, 8.0, 10.0, 12.0, 14.0, 16.0_f64];
         let cells: [&[f64]; 6] = [&[1.0]; 6];
         let judge = |law: &dyn Fn(f64) -> f64| {
-            let verdicts = judged(PaperTable::HiddenNodes, &cells, |cell, trial| trial.seconds = law(hidden[cell]));
+            let verdicts = judged(PaperTable::HiddenNodes, &cells, |cell, trial| {
+                trial.seconds = law(hidden[cell])
+            });
             standing(&verdicts, "time")
         };
         assert_eq!(judge(&|h| 0.01 * h * h), Standing::Holds);
@@ -392,7 +435,10 @@ mod tests {
         for table in PaperTable::ALL {
             let verdicts = judged(table, &[], |_, _| {});
             assert!(!verdicts.is_empty());
-            assert!(verdicts.iter().all(|verdict| verdict.standing == Standing::Undecided), "{verdicts:?}");
+            assert!(
+                verdicts.iter().all(|verdict| verdict.standing == Standing::Undecided),
+                "{verdicts:?}"
+            );
         }
     }
 }
