@@ -77,6 +77,7 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let trials = cells.map(|cell| {
         let timeless = |trial: &Trial| Trial {
             seconds: 0.0,
+            least_epoch_seconds: 0.0,
             ..trial.clone()
         };
         cell.trials.iter().map(timeless).collect()

@@ -143,16 +143,15 @@ pub(super) fn conditions(experiment: &Experiment) -> String {
     if !matches!(experiment.axis, Axis::Hidden(_)) {
         said.push(format!("{} hidden nodes", base.hidden));
     }
-    said.push(format!("at most {} epochs", base.training.stopping.epochs));
+    said.push(format!("{} epochs", base.training.stopping.epochs));
     said.push(match base.starts {
         1 => "one start".to_owned(),
         starts => format!("best of {starts} starts by validation error"),
     });
-    said.push(format!(
-        "seeds {} to {}",
-        base.seed,
-        base.seed.0.wrapping_add(experiment.seeds as u64 - 1)
-    ));
+    said.push(match experiment.seeds {
+        1 => format!("seed {}", base.seed),
+        seeds => format!("{seeds} seeds from {}", base.seed),
+    });
     said.push(match experiment.cross_validation {
         None => format!(
             "{} training samples, {} more for validation, {} for test",

@@ -89,6 +89,12 @@ impl CellResults {
         self.spread(|trial| trial.errors.z_percent)
     }
 
+    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    pub fn least_epoch_seconds(&self) -> Option<f64> {
+        self.spread(|trial| Some(trial.least_epoch_seconds))
+            .map(|spread| spread.smallest)
+    }
+
     /// The trial of median AveZerr (the lower one of two), whose network may stand for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let mut trials: Vec<&Trial> = self
@@ -136,6 +142,7 @@ pub(super) mod tests {
             networks: 1,
             epochs: 10,
             seconds: 10.0,
+            least_epoch_seconds: 1.0,
             network: None,
         }
     }

@@ -47,7 +47,7 @@ pub struct CellSummary {
     pub epochs_run: Option<f64>,
     /// Training time of a network, all its starts together.
     pub training_seconds: Option<f64>,
-    /// Time of an epoch.
+    /// Time of the quickest epoch, which other work on the machine has disturbed least.
     pub epoch_ms: Option<f64>,
 }
 
@@ -99,10 +99,10 @@ impl CellResults {
             },
             mean_z_percent: median(|trial| trial.baselines.mean.z_percent),
             linear_z_percent: median(|trial| trial.baselines.linear.z_percent),
-            bound_z_percent: median(|trial| trial.bottleneck.z_percent),
+            bound_z_percent: median(|trial| trial.bottleneck.z_percent).map(without_rounding),
             epochs_run: epochs_run.map(|spread| spread.median),
             training_seconds: median(|trial| Some(trial.seconds_per_network())),
-            epoch_ms: median(|trial| Some(1e3 * trial.seconds_per_epoch())),
+            epoch_ms: self.least_epoch_seconds().map(|seconds| 1e3 * seconds),
         }
     }
 
@@ -116,4 +116,9 @@ impl CellResults {
             values: self.trials.iter().map(measured).collect(),
         }
     }
+}
+
+/// Zero for what only rounding has left.
+fn without_rounding(percent: f64) -> f64 {
+    if percent < 1e-9 { 0.0 } else { percent }
 }

@@ -1,3 +1,5 @@
+use std::time::Instant;
+
 use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
@@ -31,6 +33,8 @@ pub struct Trial {
     pub epochs: usize,
     /// Time spent on them.
     pub seconds: f64,
+    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    pub least_epoch_seconds: f64,
     /// The network; none from a cross-validation, which has one for each fold.
     pub network: Option<DecouplingNetwork>,
 }
@@ -53,11 +57,6 @@ impl Trial {
         self.seconds / self.networks.max(1) as f64
     }
 
-    /// Mean time of an epoch of one start.
-    pub fn seconds_per_epoch(&self) -> f64 {
-        self.seconds / self.epochs.max(1) as f64
-    }
-
     /// Trains on sets drawn with the seed of `settings` and tests on the test set. `None` if cancelled.
     pub(super) fn on_drawn_sets(
         settings: RunSettings,
@@ -68,10 +67,9 @@ impl Trial {
         let reconstructed = bottleneck.reconstruct(test.coordinates_mm.view());
         let bottleneck = Errors::measure(&test, &reconstructed, settings.stroke_mm());
         let mut run = Run::on_sets(settings, split, test)?;
-        if !train(&mut run, &is_cancelled) {
+        let Some(spent) = train(&mut run, &is_cancelled) else {
             return Ok(None);
-        }
-        let spent = Spent::on(&run);
+        };
         Ok(Some(Self {
             seed: settings.seed,
             repeat: 0,
@@ -81,6 +79,7 @@ impl Trial {
             networks: 1,
             epochs: spent.epochs,
             seconds: spent.seconds,
+            least_epoch_seconds: spent.least_epoch_seconds,
             network: Some(run.network()),
         }))
     }
@@ -106,11 +105,11 @@ impl Trial {
                 ..settings
             };
             let mut run = Run::on_sets(settings, split, test)?;
-            if !train(&mut run, &is_cancelled) {
+            let Some(of_fold) = train(&mut run, &is_cancelled) else {
                 return Ok(None);
-            }
+            };
             scatter(&mut pooled.network, folds.test(fold), &run.decouple_test().0);
-            spent.add(Spent::on(&run));
+            spent.add(of_fold);
         }
         let errors = |decoupled_mm| Errors::measure(&set, decoupled_mm, settings.stroke_mm());
         Ok(Some(Self {
@@ -125,20 +124,30 @@ impl Trial {
             networks: folds.count(),
             epochs: spent.epochs,
             seconds: spent.seconds,
+            least_epoch_seconds: spent.least_epoch_seconds,
             network: None,
         }))
     }
 }
 
-/// Steps to the end; false if cancelled before.
-fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> bool {
+/// Steps to the end and tells what that took; `None` if cancelled before.
+fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Spent> {
+    let mut spent = Spent::default();
     while run.stop_reason().is_none() {
         if is_cancelled() {
-            return false;
+            return None;
         }
+        let at_work = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_none());
+        let at_work = at_work.count() as f64;
+        let begun = Instant::now();
         run.step();
+        spent.least_epoch_seconds = spent.least_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
     }
-    true
+    for trainer in run.trainers() {
+        spent.epochs += trainer.latest().epoch;
+        spent.seconds += trainer.elapsed().as_secs_f64();
+    }
+    Some(spent)
 }
 
 fn draw(settings: &RunSettings) -> Result<Dataset, RunError> {
@@ -216,23 +225,26 @@ fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
 }
 
 /// Epochs and the time for them.
-#[derive(Clone, Copy, Default)]
 struct Spent {
     epochs: usize,
     seconds: f64,
+    least_epoch_seconds: f64,
+}
+
+impl Default for Spent {
+    fn default() -> Self {
+        Self {
+            epochs: 0,
+            seconds: 0.0,
+            least_epoch_seconds: f64::INFINITY,
+        }
+    }
 }
 
 impl Spent {
-    fn on(run: &Run) -> Self {
-        let trainers = run.trainers().iter();
-        Self {
-            epochs: trainers.clone().map(|trainer| trainer.latest().epoch).sum(),
-            seconds: trainers.map(|trainer| trainer.elapsed().as_secs_f64()).sum(),
-        }
-    }
-
     fn add(&mut self, other: Self) {
         self.epochs += other.epochs;
         self.seconds += other.seconds;
+        self.least_epoch_seconds = self.least_epoch_seconds.min(other.least_epoch_seconds);
     }
 }
