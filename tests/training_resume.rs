@@ -87,9 +87,7 @@ fn a_damaged_or_foreign_state_is_refused() {
     let damaged = |error| matches!(error, ResumeError::Damaged(_));
     assert!(damaged(edited(|value| value["shape"]["hidden"] = 7.into())), "layers");
     let gap = text.replacen("\"epoch\":[0,1,", "\"epoch\":[0,5,", 1);
-    let error = serde_json::from_str::<TrainerState>(&gap)
-        .err()
-        .expect("a gap is noticed");
+    let error = serde_json::from_str::<TrainerState>(&gap).expect_err("a gap is noticed");
     assert!(error.to_string().contains("epoch 1 is missing"), "{error}");
     assert!(damaged(edited(|value| value["best_epoch"] = 4.into())), "best epoch");
     assert!(

@@ -20,8 +20,8 @@ pub struct State {
     pub draft: RunSettings,
     /// What the worker is doing.
     pub phase: Phase,
-    /// The draft's test set, before it is trained on.
-    pub preview: Option<TestView>,
+    /// What is known about the draft before it is trained.
+    pub preview: Option<Preview>,
     /// The present or last training.
     pub run: Option<RunView>,
     /// How it is looked at.
@@ -60,6 +60,17 @@ impl Phase {
     }
 }
 
+/// What is known about settings before a training.
+#[derive(Debug)]
+pub struct Preview {
+    /// The settings.
+    pub settings: RunSettings,
+    /// Their test set.
+    pub test: TestView,
+    /// What will stand beside the network, once it is measured.
+    pub baselines: Option<Baselines>,
+}
+
 /// A training as far as the window knows it.
 #[derive(Debug)]
 pub struct RunView {
@@ -75,6 +86,8 @@ pub struct RunView {
     pub history: Vec<EpochRecord>,
     /// What the best network makes of the test set, and what that is worth.
     pub result: Option<RunResult>,
+    /// Why it ended, if it has.
+    pub stop_reason: Option<StopReason>,
 }
 
 /// What the best network so far makes of the test set.
@@ -107,6 +120,7 @@ impl RunView {
             baselines,
             history: Vec::new(),
             result: None,
+            stop_reason: None,
         }
     }
 
@@ -119,8 +133,9 @@ impl RunView {
             best_epoch,
             elapsed,
             frame_time,
-            stop_reason: _,
+            stop_reason,
         } = progress;
+        self.stop_reason = stop_reason;
         self.history.extend(epochs);
         self.result = Some(RunResult {
             decoupled_mm,
@@ -235,7 +250,10 @@ impl State {
 
     /// The test set on show: the training's, or the draft's if that has moved on.
     pub fn test(&self) -> Option<&TestView> {
-        self.preview.as_ref().or(self.run.as_ref().map(|run| &run.test))
+        match &self.preview {
+            Some(preview) => Some(&preview.test),
+            None => self.run.as_ref().map(|run| &run.test),
+        }
     }
 
     /// The training on show: none if the draft has moved on to another test set.
@@ -245,6 +263,12 @@ impl State {
         } else {
             self.run.as_ref()
         }
+    }
+
+    /// What the worker is doing while it does nothing: it waits after the last training, or for the first.
+    pub fn phase_at_rest(&self) -> Phase {
+        let ended = self.run.as_ref().and_then(|run| run.stop_reason);
+        ended.map_or(Phase::Idle, Phase::Ended)
     }
 
     /// The result on show.

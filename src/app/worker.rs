@@ -2,6 +2,7 @@
 //! event wakes the window.
 
 use std::{
+    collections::VecDeque,
     path::PathBuf,
     sync::{
         Arc,
@@ -20,7 +21,7 @@ use super::{
 };
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings},
-    training::{EpochRecord, StopReason},
+    training::{EpochRecord, GradientDescentSettings, Method, StopReason, TrainingSettings},
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
@@ -32,6 +33,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(66);
 pub enum Request {
     /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
     Preview(Box<RunSettings>),
+    /// Measure what will stand beside the network of these settings. Only the newest one counts.
+    Baselines(Box<RunSettings>),
     /// Begin a training; one in progress is dropped.
     Train(Box<RunSettings>),
     /// Step no further until told to resume.
@@ -49,6 +52,9 @@ pub enum Request {
 pub enum Event {
     /// The test set of these settings.
     Previewed(Box<RunSettings>, Result<TestView, TestViewError>),
+    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
+    /// training would explain.
+    Compared(Box<RunSettings>, Option<Baselines>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
     /// News of the training.
@@ -115,6 +121,15 @@ impl Worker {
             Labour::new(report).run(&incoming);
         })?;
         Ok(Self { requests, events })
+    }
+
+    /// A worker that has died.
+    #[cfg(test)]
+    pub fn dead() -> Self {
+        Self {
+            requests: channel().0,
+            events: channel().1,
+        }
     }
 
     /// Asks for something. A worker that died is told by [`Self::next_event`].
@@ -188,21 +203,23 @@ impl Labour {
     }
 
     fn run(&mut self, requests: &Receiver<Request>) {
+        let mut queue = VecDeque::new();
         loop {
-            let request = if self.is_training() {
-                match requests.try_recv() {
-                    Ok(request) => Some(request),
-                    Err(TryRecvError::Empty) => None,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            } else {
+            if queue.is_empty() && !self.is_training() {
                 match requests.recv() {
-                    Ok(request) => Some(request),
+                    Ok(request) => enqueue(&mut queue, request),
                     Err(_) => return,
                 }
+            }
+            let is_window_closed = loop {
+                match requests.try_recv() {
+                    Ok(request) => enqueue(&mut queue, request),
+                    Err(reason) => break reason == TryRecvError::Disconnected,
+                }
             };
-            match request {
-                Some(request) => self.answer(request, requests),
+            match queue.pop_front() {
+                Some(request) => self.answer(request),
+                None if is_window_closed => return,
                 None => self.train_one_epoch(),
             }
         }
@@ -213,25 +230,15 @@ impl Labour {
         unfinished && !self.is_paused
     }
 
-    fn answer(&mut self, request: Request, requests: &Receiver<Request>) {
+    fn answer(&mut self, request: Request) {
         match request {
-            Request::Preview(mut settings) => {
-                // While a slider is dragged many previews queue up; draw only the newest.
-                let mut other = None;
-                while let Ok(next) = requests.try_recv() {
-                    match next {
-                        Request::Preview(newer) => settings = newer,
-                        next => {
-                            other = Some(next);
-                            break;
-                        }
-                    }
-                }
+            Request::Preview(settings) => {
                 let drawn = TestView::draw(&settings);
                 self.report.send(Event::Previewed(settings, drawn));
-                if let Some(next) = other {
-                    self.answer(next, requests);
-                }
+            }
+            Request::Baselines(settings) => {
+                let baselines = baselines(&settings);
+                self.report.send(Event::Compared(settings, baselines));
             }
             Request::Train(settings) => self.begin(*settings),
             Request::Pause => {
@@ -248,33 +255,27 @@ impl Labour {
             Request::Export(kind, path) => {
                 let result = match &self.run {
                     Some(run) => kind.write(run, &path).map(|()| path).map_err(|error| error.to_string()),
-                    None => Err("there is no training to export: train first".to_owned()),
+                    // The window offers no export before a training, so there was one.
+                    None => Err("the network was lost when the training thread ended: train again".to_owned()),
                 };
                 self.report.send(Event::Exported(result));
             }
         }
     }
 
+    /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
     fn begin(&mut self, settings: RunSettings) {
-        self.run = None;
-        self.is_paused = false;
-        self.epochs_reported = 0;
-        self.next_report = Instant::now();
-        let prepared = self.prepare(settings);
-        self.report.send(Event::Began(prepared));
-        self.report_progress();
-    }
-
-    fn prepare(&mut self, settings: RunSettings) -> Result<Box<Began>, TestViewError> {
-        let run = Run::prepare(settings)?;
-        let test = TestView::of(&settings, run.test().clone())?;
-        let baselines = *run.baselines();
-        self.run = Some(run);
-        Ok(Box::new(Began {
-            settings,
-            test,
-            baselines,
-        }))
+        match prepare(settings) {
+            Ok((run, began)) => {
+                self.run = Some(run);
+                self.is_paused = false;
+                self.epochs_reported = 0;
+                self.next_report = Instant::now();
+                self.report.send(Event::Began(Ok(began)));
+                self.report_progress();
+            }
+            Err(error) => self.report.send(Event::Began(Err(error))),
+        }
     }
 
     fn train_one_epoch(&mut self) {
@@ -309,4 +310,51 @@ impl Labour {
         // A large test set takes long to decouple; let it take at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
     }
+}
+
+fn prepare(settings: RunSettings) -> Result<(Run, Box<Began>), TestViewError> {
+    let run = Run::prepare(settings)?;
+    let test = TestView::of(&settings, run.test().clone())?;
+    let baselines = *run.baselines();
+    let began = Began {
+        settings,
+        test,
+        baselines,
+    };
+    Ok((run, Box::new(began)))
+}
+
+/// Puts a request at the end of the queue. While a slider is dragged many pictures are asked for; only the newest
+/// counts.
+fn enqueue(queue: &mut VecDeque<Request>, request: Request) {
+    match request {
+        Request::Preview(_) => queue.retain(|older| !matches!(older, Request::Preview(_) | Request::Baselines(_))),
+        Request::Baselines(_) => queue.retain(|older| !matches!(older, Request::Baselines(_))),
+        _ => {}
+    }
+    queue.push_back(request);
+}
+
+/// What stands beside the network, without one; nothing where it would keep the next request waiting.
+fn baselines(settings: &RunSettings) -> Option<Baselines> {
+    /// About a tenth of a second.
+    const MOST_TERMS: usize = 50_000_000;
+    let scale = settings.sensor.scale;
+    let samples = settings.samples + settings.validation_samples + settings.test_samples;
+    let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
+    let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
+    if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
+        return None;
+    }
+    // They depend on neither the network nor its method, so the cheapest ones do.
+    let training = TrainingSettings {
+        method: Method::GradientDescent(GradientDescentSettings::default()),
+        ..TrainingSettings::default()
+    };
+    let cheapest = RunSettings {
+        hidden: 1,
+        training,
+        ..*settings
+    };
+    Run::prepare(cheapest).ok().map(|run| *run.baselines())
 }

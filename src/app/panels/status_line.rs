@@ -7,7 +7,7 @@ use crate::{
         state::{Phase, RunView, State},
         theme::{Theme, space, type_size},
     },
-    export::{format_duration, format_number},
+    export::{format_duration, format_number, format_percent},
     training::StopReason,
 };
 
@@ -57,6 +57,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     let epochs = run.settings.training.stopping.epochs;
     let mut parts = vec![
         format!("Epoch {} of {epochs}", latest.epoch),
+        format!("z error {}", format_percent(result.errors.z_percent)),
         format!("mse {}", format_number(latest.training_mse)),
         format!(
             "{} {}",
