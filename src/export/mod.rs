@@ -1,14 +1,17 @@
-//! Files for later and for other programs: the network file, CSV tables, and the one way in which anything is written.
+//! Files for later and for other programs: the network file, CSV tables, figures, and the one way in which anything is
+//! written.
 
 mod atomic;
 mod checkpoint_file;
 mod experiment_tables;
+pub mod figures;
 mod format;
 mod heading;
 mod network_file;
 mod samples;
 mod soundness;
 mod tables;
+pub(crate) mod ticks;
 mod unfinished;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
