@@ -20,6 +20,8 @@ pub enum Stream {
     Start,
     /// Which samples are held out for validation.
     Split,
+    /// Which samples are in which fold of a cross-validation.
+    Folds,
 }
 
 /// Streams from here on are those of the starts after the first.

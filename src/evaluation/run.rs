@@ -48,7 +48,16 @@ impl Run {
     /// # Errors
     /// Settings that are impossible, with the reason.
     pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
-        Self::with_trainers(settings, |problem, shape| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::on_sets(settings, split, test)
+    }
+
+    /// As [`Self::prepare`], on sets that come from elsewhere, such as the folds of a cross-validation.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        Self::with_sets(settings, split, test, |problem, shape| {
             let start = |number| nguyen_widrow(shape, &mut settings.seed.start_rng(number));
             let trainers = (0..settings.starts).into_par_iter().map(|number| {
                 let trainer = Trainer::new(start(number), problem.clone(), settings.training);
@@ -69,7 +78,8 @@ impl Run {
                 expected: settings.starts,
             });
         }
-        Self::with_trainers(settings, |problem, shape| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::with_sets(settings, split, test, |problem, shape| {
             let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
                 let refused = |source| RunError::Resume { start, source };
                 let trainer = Trainer::resume(state, problem.clone()).map_err(refused)?;
@@ -82,22 +92,22 @@ impl Run {
         })
     }
 
-    fn with_trainers(
-        settings: RunSettings,
-        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
-    ) -> Result<Self, RunError> {
+    /// The training and validation set of these settings, and their test set.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn draw(settings: &RunSettings) -> Result<(Split, Dataset), RunError> {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
-        let test = Self::test_set(&settings)?;
+        let test = Self::test_set(settings)?;
         let RunSettings {
             sensor, scene, seed, ..
         } = settings;
         let rows = sensor.scale.rows();
         let held_out = settings.validation_samples.div_ceil(rows);
         let drawn = (settings.samples.div_ceil(rows) + held_out) * rows;
-        let drawn = Dataset::simulate(&sensor, &scene, drawn, &mut seed.rng(Stream::Training))?;
-        let split = hold_out(drawn, held_out, &mut seed.rng(Stream::Split));
-        Self::with_sets(settings, split, test, trainers)
+        let drawn = Dataset::simulate(sensor, scene, drawn, &mut seed.rng(Stream::Training))?;
+        Ok((hold_out(drawn, held_out, &mut seed.rng(Stream::Split)), test))
     }
 
     /// The test set of these settings: what the window shows before anything is trained.
@@ -122,6 +132,7 @@ impl Run {
         test: Dataset,
         trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
     ) -> Result<Self, RunError> {
+        settings.check_counts()?;
         let Split { training, validation } = split;
         let stroke_mm = settings.stroke_mm();
         let score = |decoupler: &dyn Decoupler| {
