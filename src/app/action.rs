@@ -1,8 +1,9 @@
 use std::path::PathBuf;
 
 use super::{
-    export_kind::ExportKind,
-    state::{BottomTab, RightCard},
+    experiments::ExperimentAction,
+    file_kind::FileKind,
+    state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
 };
 use crate::evaluation::{NodeAddress, RunSettings};
@@ -34,16 +35,20 @@ pub enum Action {
     GoTo(NodeAddress),
     /// Show this chart.
     ShowTab(BottomTab),
+    /// Show this view.
+    ShowView(View),
+    /// Do this in the Experiments view.
+    Experiments(ExperimentAction),
     /// Dark or light.
     SetDark(bool),
     /// Ask where to write a file.
-    ChooseFile(ExportKind),
+    ChooseFile(FileKind),
     /// Ask for the path in the window itself.
-    TypePath(ExportKind),
+    TypePath(FileKind),
     /// Change the path being typed.
     EditPath(String),
     /// Write the file.
-    Export(ExportKind, PathBuf),
+    Export(FileKind, PathBuf),
     /// Close the question for a path.
     CancelSave,
     /// Close the notice.

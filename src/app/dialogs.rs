@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::export_kind::ExportKind;
+use super::file_kind::FileKind;
 
 /// An answer sooner than this was no person's: the desktop has no dialog to show.
 const NO_PERSON: Duration = Duration::from_millis(250);
@@ -16,11 +16,11 @@ const NO_PERSON: Duration = Duration::from_millis(250);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// The user chose this file.
-    Chosen(ExportKind, PathBuf),
+    Chosen(FileKind, PathBuf),
     /// The user thought better of it.
     Cancelled,
     /// There is no dialog here; ask in the window.
-    NoDialog(ExportKind),
+    NoDialog(FileKind),
 }
 
 /// Where questions for a path go.
@@ -53,7 +53,7 @@ impl Dialogs {
 
     /// Asks where to write a file; `wake` is called when the answer is there. Must run on the window's thread, which
     /// some desktops require.
-    pub fn ask(&self, kind: ExportKind, suggestion: &std::path::Path, wake: impl FnOnce() + Send + 'static) {
+    pub fn ask(&self, kind: FileKind, suggestion: &std::path::Path, wake: impl FnOnce() + Send + 'static) {
         let send = self.outgoing.clone();
         let no_dialog = Answer::NoDialog(kind);
         if self.kind == DialogKind::None {

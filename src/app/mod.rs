@@ -7,7 +7,9 @@
 mod action;
 mod charts;
 mod dialogs;
+mod experiments;
 mod export_kind;
+mod file_kind;
 mod open;
 mod panels;
 mod shortcuts;
@@ -21,8 +23,13 @@ mod worker;
 
 pub use action::Action;
 pub use dialogs::DialogKind;
+pub use experiments::{
+    AxisForm, AxisKind, Ending, ExperimentAction, ExperimentFile, ExperimentsState, Form, FormError, ListError,
+    Outcome, Running, SortBy, Topic,
+};
 pub use export_kind::ExportKind;
+pub use file_kind::FileKind;
 pub use open::{OpenError, open};
-pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State};
+pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
 pub use test_view::{Frame, TestView};
 pub use window::DecouplerWindow;

@@ -3,7 +3,8 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use ndarray::Array2;
 
 use super::{
-    export_kind::ExportKind,
+    experiments::ExperimentsState,
+    file_kind::FileKind,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
     worker::{Began, Progress},
@@ -16,6 +17,10 @@ use crate::{
 /// Everything the panels read.
 #[derive(Debug)]
 pub struct State {
+    /// What the window shows.
+    pub view: View,
+    /// The Experiments view.
+    pub experiments: ExperimentsState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -34,6 +39,16 @@ pub struct State {
     pub saving: Option<Saving>,
     /// The path last typed, offered again for the same kind of file.
     pub typed: Option<Saving>,
+}
+
+/// What the window shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    /// One training and what it makes of the sensor.
+    #[default]
+    Train,
+    /// The paper's tables and sweeps.
+    Experiments,
 }
 
 /// What the worker is doing.
@@ -219,7 +234,7 @@ pub enum Notice {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Saving {
     /// What to write.
-    pub kind: ExportKind,
+    pub kind: FileKind,
     /// The path typed so far.
     pub path: String,
 }
@@ -228,6 +243,8 @@ impl State {
     /// The state in which the window opens.
     pub fn new(is_dark: bool) -> Self {
         Self {
+            view: View::default(),
+            experiments: ExperimentsState::new(),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,
@@ -294,11 +311,13 @@ impl State {
     }
 
     /// Where a file goes unless the user says otherwise.
-    pub fn suggested_path(&self, kind: ExportKind) -> PathBuf {
+    pub fn suggested_path(&self, kind: FileKind) -> PathBuf {
         let settings = self.run.as_ref().map_or(&self.draft, |run| &run.settings);
-        std::env::current_dir()
-            .unwrap_or_default()
-            .join(kind.file_name(settings))
+        let name = match kind {
+            FileKind::Training(kind) => kind.file_name(settings),
+            FileKind::Experiment(topic, file) => ExperimentsState::file_name(topic, file),
+        };
+        std::env::current_dir().unwrap_or_default().join(name)
     }
 }
 

@@ -3,6 +3,7 @@
 mod atomic;
 mod checkpoint_file;
 mod experiment_tables;
+mod experiment_words;
 mod format;
 mod heading;
 mod network_file;
@@ -14,6 +15,7 @@ mod unfinished;
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
+pub use experiment_words::{describe_conditions, describe_failures};
 pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
 pub use samples::{write_coordinates_header, write_numbers, write_samples, write_samples_header};

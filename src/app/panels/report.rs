@@ -212,14 +212,14 @@ fn export_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
             let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
             let button = ghost_button(theme, kind.name()).min_size([width, space(7)].into());
             if ui.add(button).on_hover_text(kind.description()).clicked() {
-                actions.push(Action::ChooseFile(kind));
+                actions.push(Action::ChooseFile(kind.into()));
             }
             let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
             path.widget_info(|| {
                 WidgetInfo::labeled(Role::Button, true, format!("Type a path for the {}", kind.file_kind()))
             });
             if path.on_hover_text("Type the path instead of choosing it").clicked() {
-                actions.push(Action::TypePath(kind));
+                actions.push(Action::TypePath(kind.into()));
             }
         });
     }
