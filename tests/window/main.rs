@@ -4,6 +4,7 @@
 
 mod configuring;
 mod driver;
+mod experiments;
 mod exporting;
 mod extremes;
 mod looking;

@@ -84,7 +84,7 @@ impl ExperimentWorker {
                 || is_cancelled.load(Ordering::Relaxed),
                 |finished| ending.report.send(ExperimentEvent::Finished(Box::new(finished))),
             );
-            ending.result = result.map_err(|error| error.to_string());
+            ending.replace(result.map_err(|error| error.to_string()));
         })?;
         Ok(())
     }
@@ -131,6 +131,12 @@ impl fmt::Debug for ExperimentWorker {
 struct EndingReport {
     report: Report,
     result: Result<(), String>,
+}
+
+impl EndingReport {
+    fn replace(&mut self, result: Result<(), String>) {
+        self.result = result;
+    }
 }
 
 impl Drop for EndingReport {
