@@ -30,6 +30,15 @@ fn command(arguments: &str, folder: &Path) -> Command {
     command
 }
 
+/// The same heeding Ctrl-C, also where the tests run in the background, which begins with ignoring it.
+#[cfg(target_os = "linux")]
+fn interruptible(arguments: &str, folder: &Path) -> Command {
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT", env!("CARGO_BIN_EXE_decoupler")]);
+    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+}
+
 fn run(arguments: &str, folder: &Path) -> Output {
     command(arguments, folder).output().unwrap()
 }
@@ -72,9 +81,8 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// Starts a training and waits until its checkpoint is some epochs along.
-fn begun(arguments: &str, folder: &Path) -> Child {
+fn begun(mut command: Command, folder: &Path) -> Child {
     let checkpoint = folder.join("run.checkpoint");
-    let mut command = command(arguments, folder);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let epochs = || {
         let file = CheckpointFile::load(&checkpoint).ok()?;
@@ -92,7 +100,7 @@ fn a_killed_training_goes_on_with_the_same_bits() {
     let folder = folder.path();
     let arguments =
         format!("train {LONG} 1000000 --checkpoint run.checkpoint --checkpoint-interval 0 --out killed.json");
-    let mut child = begun(&arguments, folder);
+    let mut child = begun(command(&arguments, folder), folder);
     child.kill().unwrap();
     assert!(!child.wait().unwrap().success());
     let checkpoint = CheckpointFile::load(&folder.join("run.checkpoint")).unwrap();
@@ -108,20 +116,20 @@ fn a_killed_training_goes_on_with_the_same_bits() {
     assert!(whole.training.starts.iter().all(|start| start.epochs == epochs));
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 fn interrupt(child: &Child) {
     let kill = format!("kill -INT {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let arguments =
         format!("train {LONG} 1000000 --checkpoint run.checkpoint --checkpoint-interval 0.1 --out part.json --json");
-    let child = begun(&arguments, folder);
+    let child = begun(interruptible(&arguments, folder), folder);
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8(output.stderr).unwrap();
@@ -147,13 +155,13 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     assert_eq!(network(&folder.join("part.json")), network(&folder.join("whole.json")));
 }
 
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
     let folder = tempfile::tempdir().unwrap();
     let interrupted_after = |seconds| {
         let arguments = "train --epochs 1000000 --max-fail 1000000 --min-gradient 0 --out n.json";
-        let mut command = command(arguments, folder.path());
+        let mut command = interruptible(arguments, folder.path());
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         thread::sleep(Duration::from_secs(seconds));
         interrupt(&child);
@@ -174,7 +182,7 @@ fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
 }
 
 /// An input that never comes, so that the output is begun and not ended.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_decoding_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -187,7 +195,7 @@ fn an_interrupted_decoding_leaves_nothing() {
             .unwrap()
             .success()
     );
-    let mut command = command("decode --network network.json --input input --output out.csv", folder);
+    let mut command = interruptible("decode --network network.json --input input --output out.csv", folder);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut input = fs::File::options().write(true).open(folder.join("input")).unwrap();
     std::io::Write::write_all(&mut input, format!("{}\n", ["600"; 18].join(",")).as_bytes()).unwrap();

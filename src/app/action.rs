@@ -2,7 +2,8 @@ use std::path::PathBuf;
 
 use super::{
     experiments::ExperimentAction,
-    file_kind::FileKind,
+    export_kind::ExportKind,
+    file_task::FileTask,
     state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
 };
@@ -41,14 +42,18 @@ pub enum Action {
     Experiments(ExperimentAction),
     /// Dark or light.
     SetDark(bool),
-    /// Ask where to write a file.
-    ChooseFile(FileKind),
+    /// Go on from the present weights with the method and the epochs of the settings.
+    Continue,
+    /// Ask for the path of a file.
+    ChooseFile(FileTask),
     /// Ask for the path in the window itself.
-    TypePath(FileKind),
+    TypePath(FileTask),
     /// Change the path being typed.
     EditPath(String),
     /// Write the file.
-    Export(FileKind, PathBuf),
+    Export(ExportKind, PathBuf),
+    /// Take up the training saved in this file.
+    OpenCheckpoint(PathBuf),
     /// Close the question for a path.
     CancelSave,
     /// Close the notice.

@@ -6,10 +6,11 @@
 
 mod action;
 mod charts;
+mod continuation;
 mod dialogs;
 mod experiments;
 mod export_kind;
-mod file_kind;
+mod file_task;
 mod open;
 mod panels;
 mod shortcuts;
@@ -28,7 +29,7 @@ pub use experiments::{
     Outcome, Running, SortBy, Topic,
 };
 pub use export_kind::ExportKind;
-pub use file_kind::FileKind;
+pub use file_task::FileTask;
 pub use open::{OpenError, open};
 pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
 pub use test_view::{Frame, TestView};

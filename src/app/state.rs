@@ -4,14 +4,15 @@ use ndarray::Array2;
 
 use super::{
     experiments::ExperimentsState,
-    file_kind::FileKind,
+    export_kind::ExportKind,
+    file_task::FileTask,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
     worker::{Began, Progress},
 };
 use crate::{
-    evaluation::{Baselines, Errors, PublishedErrors, RunSettings},
-    training::{EpochRecord, StopReason},
+    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord},
+    training::{EpochRecord, Stage, StopReason},
 };
 
 /// Everything the panels read.
@@ -37,7 +38,7 @@ pub struct State {
     pub notice: Option<Notice>,
     /// A file waiting for its path.
     pub saving: Option<Saving>,
-    /// The path last typed, offered again for the same kind of file.
+    /// The path last typed, offered again for the same task.
     pub typed: Option<Saving>,
 }
 
@@ -89,16 +90,25 @@ pub struct Preview {
 /// A training as far as the window knows it.
 #[derive(Debug)]
 pub struct RunView {
-    /// What was asked for.
+    /// What it is trained with.
     pub settings: RunSettings,
+    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
+    /// for from where it stood.
+    pub asked: RunSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
     /// Its test set.
     pub test: TestView,
     /// What stands beside the network.
     pub baselines: Baselines,
     /// What the paper reports for this configuration.
     pub published: Option<PublishedErrors>,
-    /// Every epoch so far.
+    /// Every epoch of the leader so far.
     pub history: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stood when last looked at; empty where there is one only.
+    pub starts: Vec<StartRecord>,
     /// What the best network makes of the test set, and what that is worth.
     pub result: Option<RunResult>,
     /// Why it ended, if it has.
@@ -114,6 +124,10 @@ pub struct RunResult {
     pub errors: Errors,
     /// The epoch of the network.
     pub best_epoch: usize,
+    /// Epochs run by the start that is furthest.
+    pub epochs_run: usize,
+    /// How many starts have ended.
+    pub starts_ended: usize,
     /// Time spent in training.
     pub elapsed: Duration,
     /// Time to decouple one snapshot.
@@ -125,15 +139,20 @@ impl RunView {
     pub fn new(began: Began) -> Self {
         let Began {
             settings,
+            weights,
             test,
             baselines,
         } = began;
         Self {
             published: PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples),
             settings,
+            asked: settings,
+            weights,
             test,
             baselines,
             history: Vec::new(),
+            stages: Vec::new(),
+            starts: Vec::new(),
             result: None,
             stop_reason: None,
         }
@@ -143,19 +162,33 @@ impl RunView {
     pub fn progress(&mut self, progress: Progress) {
         let Progress {
             epochs,
+            stages,
+            starts,
             decoupled_mm,
             errors,
             best_epoch,
+            epochs_run,
+            starts_ended,
             elapsed,
             frame_time,
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
+        // Another start may lead now; then all its epochs come.
+        if let Some(first) = epochs.first() {
+            self.history.truncate(first.epoch);
+        }
         self.history.extend(epochs);
+        self.stages = stages;
+        if let Some(starts) = starts {
+            self.starts = starts;
+        }
         self.result = Some(RunResult {
             decoupled_mm,
             errors,
             best_epoch,
+            epochs_run,
+            starts_ended,
             elapsed,
             frame_time,
         });
@@ -233,8 +266,8 @@ pub enum Notice {
 /// A file waiting for its path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Saving {
-    /// What to write.
-    pub kind: FileKind,
+    /// What to do with it.
+    pub task: FileTask,
     /// The path typed so far.
     pub path: String,
 }
@@ -288,6 +321,22 @@ impl State {
         ended.map_or(Phase::Idle, Phase::Ended)
     }
 
+    /// Whether the training on show can go on from its present weights as the settings say: only what its sets and
+    /// networks are made of must be as it was. What is held goes on by itself unless the method or the stopping change.
+    pub fn can_continue(&self) -> bool {
+        let Some(run) = self.shown_run() else { return false };
+        let may_go_on = match self.phase {
+            Phase::Paused => self.draft.training != run.asked.training,
+            Phase::Ended(reason) => reason != StopReason::Diverged,
+            _ => false,
+        };
+        let fixed = RunSettings {
+            training: run.asked.training,
+            ..self.draft
+        };
+        may_go_on && fixed == run.asked
+    }
+
     /// The result on show.
     pub fn result(&self) -> Option<&RunResult> {
         self.shown_run().and_then(|run| run.result.as_ref())
@@ -311,11 +360,12 @@ impl State {
     }
 
     /// Where a file goes unless the user says otherwise.
-    pub fn suggested_path(&self, kind: FileKind) -> PathBuf {
+    pub fn suggested_path(&self, task: FileTask) -> PathBuf {
         let settings = self.run.as_ref().map_or(&self.draft, |run| &run.settings);
-        let name = match kind {
-            FileKind::Training(kind) => kind.file_name(settings),
-            FileKind::Experiment(topic, file) => ExperimentsState::file_name(topic, file),
+        let name = match task {
+            FileTask::Save(kind) => kind.file_name(settings),
+            FileTask::SaveExperiment(topic, file) => ExperimentsState::file_name(topic, file),
+            FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
         };
         std::env::current_dir().unwrap_or_default().join(name)
     }

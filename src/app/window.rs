@@ -6,7 +6,6 @@ use super::{
     action::Action,
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
-    file_kind::FileKind,
     panels,
     shortcuts::pressed_shortcuts,
     state::{Notice, Phase, Preview, RunView, Saving, State, View},
@@ -71,8 +70,8 @@ impl DecouplerWindow {
         experiments::take_news(&mut self.state, &self.experiments);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(kind, path) => self.apply(Action::Export(kind, path)),
-                Answer::NoDialog(kind) => self.apply(Action::TypePath(kind)),
+                Answer::Chosen(task, path) => self.apply(task.at(path)),
+                Answer::NoDialog(task) => self.apply(Action::TypePath(task)),
                 Answer::Cancelled => {}
             }
         }
@@ -112,6 +111,37 @@ impl DecouplerWindow {
                 state.phase = state.phase_at_rest();
                 state.notice = Some(Notice::Failed(error.to_string()));
             }
+            Event::Opened(Ok(began)) => {
+                state.draft = began.settings;
+                state.preview = None;
+                state.run = Some(RunView::new(*began));
+                state.typed = None;
+                // If it has ended, the news of it say so.
+                state.phase = Phase::Paused;
+                state.refresh_frames();
+            }
+            Event::Opened(Err(error)) => {
+                state.phase = state.phase_at_rest();
+                state.notice = Some(Notice::Failed(error));
+            }
+            Event::Continued(Ok(settings)) => {
+                if let Some(run) = &mut state.run {
+                    run.asked = RunSettings {
+                        training: state.draft.training,
+                        ..run.asked
+                    };
+                    run.settings = *settings;
+                    run.stop_reason = None;
+                }
+                state.phase = Phase::Training;
+            }
+            Event::Continued(Err(error)) => {
+                state.phase = match state.phase_at_rest() {
+                    Phase::Idle => Phase::Paused,
+                    ended => ended,
+                };
+                state.notice = Some(Notice::Failed(error));
+            }
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     state.phase = Phase::Ended(reason);
@@ -144,9 +174,19 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Pause);
             }
             Action::Resume => {
+                // The settings on the left are always those that are trained with.
+                if let Some(run) = &state.run {
+                    state.draft.training = run.asked.training;
+                }
                 state.phase = Phase::Training;
                 self.worker.ask(Request::Resume);
             }
+            Action::Continue if state.can_continue() => {
+                state.phase = Phase::Training;
+                state.notice = None;
+                self.worker.ask(Request::Continue(state.draft.training));
+            }
+            Action::Continue => {}
             Action::Stop => self.worker.ask(Request::Stop),
             Action::ShowSnapshot(snapshot) => {
                 state.look.snapshot = snapshot;
@@ -167,16 +207,16 @@ impl DecouplerWindow {
                 state.look.is_dark = is_dark;
                 theme::apply(&self.ctx, is_dark);
             }
-            Action::ChooseFile(kind) => {
+            Action::ChooseFile(task) => {
                 let ctx = self.ctx.clone();
                 self.dialogs
-                    .ask(kind, &state.suggested_path(kind), move || ctx.request_repaint());
+                    .ask(task, &state.suggested_path(task), move || ctx.request_repaint());
             }
-            Action::TypePath(kind) => {
-                let typed = state.typed.clone().filter(|typed| typed.kind == kind);
-                let suggested = || state.suggested_path(kind).display().to_string();
+            Action::TypePath(task) => {
+                let typed = state.typed.clone().filter(|typed| typed.task == task);
+                let suggested = || state.suggested_path(task).display().to_string();
                 state.saving = Some(typed.unwrap_or_else(|| Saving {
-                    kind,
+                    task,
                     path: suggested(),
                 }));
             }
@@ -187,17 +227,19 @@ impl DecouplerWindow {
             }
             Action::Export(kind, path) => {
                 state.typed = state.saving.take();
-                match kind {
-                    FileKind::Training(kind) => self.worker.ask(Request::Export(kind, path)),
-                    FileKind::Experiment(topic, file) => {
-                        if let Some(outcome) = state.experiments.outcome_of(topic) {
-                            self.experiments.write(topic, file, Arc::clone(&outcome.results), path);
-                        }
-                    }
-                }
+                self.worker.ask(Request::Export(kind, path));
             }
             Action::ShowView(view) => state.view = view,
             Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
+            Action::OpenCheckpoint(path) => {
+                state.typed = state.saving.take();
+                // A training may have begun while the desktop's dialog was open.
+                if !state.phase.is_busy() {
+                    state.phase = Phase::Preparing;
+                    state.notice = None;
+                    self.worker.ask(Request::Open(path));
+                }
+            }
             Action::CancelSave => state.saving = None,
             Action::DismissNotice => state.notice = None,
             Action::RestartWorker => match start_worker(&self.ctx) {
@@ -386,6 +428,11 @@ mod tests {
         wait(&mut window, |state| state.notice.is_some());
         let lost = "the network was lost when the training thread ended: train again";
         assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        window.apply(Action::DismissNotice);
+        window.apply(Action::Continue);
+        wait(&mut window, |state| state.notice.is_some());
+        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        assert_eq!(window.state.phase, ended);
         window.apply(Action::Train);
         wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
     }

@@ -10,8 +10,8 @@ use crate::{
     decoupling::{Decoupler, LinearMap, TrainingMean},
     network::{DecouplingNetwork, MinMax, Shape, nguyen_widrow},
     training::{
-        Examples, Method, NormalEquations, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer,
-        TrainerState, TrainingError,
+        Examples, Method, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState,
+        TrainingError,
     },
 };
 
@@ -153,12 +153,19 @@ impl Run {
             validation: validation.as_ref().map(examples),
             test: Some(examples(&test)),
         };
+        // They are in `problem`, scaled: large sets need not be held twice.
+        drop((training, validation));
         let shape = Shape {
             inputs: problem.training.inputs(),
             hidden: settings.hidden,
             outputs: problem.training.outputs(),
         };
-        check_memory(&settings.training.method, shape, settings.starts)?;
+        check_memory(
+            &settings.training.method,
+            shape,
+            problem.training.samples(),
+            settings.starts,
+        )?;
         let trainers = trainers(&problem, shape)?;
         Ok(Self {
             settings,
@@ -211,7 +218,8 @@ impl Run {
     /// # Errors
     /// A setting out of range, or networks too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
-        check_memory(&method, self.leader().present().shape(), self.trainers.len())?;
+        let shape = self.leader().present().shape();
+        check_memory(&method, shape, self.settings.samples, self.trainers.len())?;
         // The starts have the same shape, so the first is refused or none.
         for trainer in &mut self.trainers {
             trainer.continue_with(method)?;
@@ -300,9 +308,9 @@ impl Run {
 }
 
 /// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.
-fn check_memory(method: &Method, shape: Shape, starts: usize) -> Result<(), RunError> {
-    let bytes = NormalEquations::bytes(shape).saturating_mul(starts);
-    if starts > 1 && method.has_normal_equations() && bytes > LARGEST_EQUATIONS_BYTES {
+fn check_memory(method: &Method, shape: Shape, samples: usize, starts: usize) -> Result<(), RunError> {
+    let bytes = method.equations_bytes(shape, samples).saturating_mul(starts);
+    if starts > 1 && bytes > LARGEST_EQUATIONS_BYTES {
         return Err(RunError::TooManyStarts { starts, bytes });
     }
     Ok(())

@@ -4,11 +4,12 @@ use egui_plot::{HoverPosition, Line, PlotPoints, VLine};
 use super::{
     legend::{Key, Mark},
     plot_style::{log_marks, log_text, plot, thinned},
+    stages::stage_marks_ui,
 };
 use crate::{
     app::theme::{Palette, Theme},
     export::format_number,
-    training::EpochRecord,
+    training::{EpochRecord, Stage},
 };
 
 /// Picks one of an epoch's errors.
@@ -39,10 +40,11 @@ pub fn loss_keys(palette: &Palette, history: &[EpochRecord]) -> Vec<Key> {
     curves.chain([best]).collect()
 }
 
-/// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights.
-pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
+/// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights,
+/// a thin one each change of method.
+pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage], best_epoch: usize) {
     let palette = Theme::of(ui).palette;
-    plot(ui, "loss", "epoch", "mse (scaled)")
+    let shown = plot(ui, "loss", "epoch", "mse (scaled)")
         .y_grid_spacer(log_marks)
         .y_axis_formatter(|mark, _| log_text(mark.value))
         .label_formatter(hover_text)
@@ -61,6 +63,7 @@ pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
                 .width(1.0);
             plot_ui.vline(best.style(egui_plot::LineStyle::dashed_dense()));
         });
+    stage_marks_ui(ui, &shown, stages);
 }
 
 fn hover_text(position: &HoverPosition<'_>) -> Option<String> {

@@ -6,6 +6,8 @@ mod loss;
 mod nodes;
 pub(super) mod plot_style;
 mod regression;
+mod stages;
+mod strip;
 mod test_pairs;
 mod training_state;
 
@@ -14,4 +16,6 @@ pub use legend::{Key, Mark, legend_ui, legend_width};
 pub use loss::{loss_keys, loss_ui};
 pub use nodes::{nodes_keys, nodes_ui};
 pub use regression::{regression_keys, regression_ui};
+pub use stages::parameter_name;
+pub use strip::{StripChart, strip_ui};
 pub use training_state::{training_state_keys, training_state_ui};

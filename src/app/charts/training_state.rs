@@ -4,10 +4,11 @@ use egui_plot::{Line, PlotPoints};
 use super::{
     legend::{Key, Mark},
     plot_style::{log_marks, log_text, plot, thinned, whole_marks},
+    stages::{parameter_name, stage_marks_ui},
 };
 use crate::{
     app::theme::{Palette, Theme},
-    training::EpochRecord,
+    training::{EpochRecord, Stage},
 };
 
 /// Picks one of an epoch's quantities.
@@ -34,12 +35,13 @@ pub fn training_state_keys(palette: &Palette, parameter_name: &'static str) -> V
 }
 
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
-pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &'static str) {
+pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage]) {
+    let parameter_name = parameter_name(stages);
     let palette = Theme::of(ui).palette;
     let half = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
     let height = ui.available_height();
     ui.horizontal(|ui| {
-        plot(ui, "training state", "epoch", &format!("gradient, {parameter_name}"))
+        let shown = plot(ui, "training state", "epoch", &format!("gradient, {parameter_name}"))
             .width(half)
             .height(height)
             .y_grid_spacer(log_marks)
@@ -51,6 +53,7 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], parameter_name: &
                     plot_ui.line(Line::new(name, PlotPoints::from(points)).color(colour).width(1.8));
                 }
             });
+        stage_marks_ui(ui, &shown, stages);
         plot(ui, "validation failures", "epoch", "validation failures")
             .width(half)
             .height(height)

@@ -1,4 +1,6 @@
-use super::{Form, SortBy, Topic};
+use std::path::PathBuf;
+
+use super::{ExperimentFile, Form, SortBy, Topic};
 
 /// What the user meant in the Experiments view.
 #[derive(Clone, Debug)]
@@ -15,6 +17,8 @@ pub enum ExperimentAction {
     Mark(usize),
     /// Order the table so.
     Sort(SortBy),
+    /// Write a file about the results.
+    Save(Topic, ExperimentFile, PathBuf),
 }
 
 impl From<ExperimentAction> for crate::app::Action {

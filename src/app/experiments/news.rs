@@ -1,6 +1,6 @@
 //! The one place that changes the state of the Experiments view.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
@@ -50,6 +50,12 @@ pub fn apply(action: ExperimentAction, state: &mut State, worker: &mut Experimen
         }
         ExperimentAction::Mark(cell) => experiments.marked = Some(cell),
         ExperimentAction::Sort(sort) => experiments.sort = sort,
+        ExperimentAction::Save(topic, file, path) => {
+            state.typed = state.saving.take();
+            if let Some(outcome) = state.experiments.outcome_of(topic) {
+                worker.write(topic, file, Arc::clone(&outcome.results), path);
+            }
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::{ExperimentFile, Outcome, table::table_ui};
 use crate::{
     app::{
         Action,
-        file_kind::FileKind,
+        file_task::FileTask,
         state::{State, View},
         theme::{Theme, ghost_button, semibold, type_size},
     },
@@ -24,7 +24,7 @@ pub fn results_card_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Act
             for file in ExperimentFile::ALL.into_iter().rev() {
                 let button = ui.add(ghost_button(theme, file.name()));
                 if button.on_hover_text(file.description()).clicked() {
-                    actions.push(Action::ChooseFile(FileKind::Experiment(topic, file)));
+                    actions.push(Action::ChooseFile(FileTask::SaveExperiment(topic, file)));
                 }
             }
             use_settings_ui(ui, state, outcome, &mut actions);

@@ -42,9 +42,9 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             charts::nodes_ui(ui, &state.frames, nodes_per_row);
         }
         (tab, None) => placeholder_ui(ui, what_comes(tab)),
-        (BottomTab::Loss, Some((run, result))) => charts::loss_ui(ui, &run.history, result.best_epoch),
+        (BottomTab::Loss, Some((run, result))) => charts::loss_ui(ui, &run.history, &run.stages, result.best_epoch),
         (BottomTab::TrainingState, Some((run, _))) => {
-            charts::training_state_ui(ui, &run.history, run.settings.training.method.parameter_name());
+            charts::training_state_ui(ui, &run.history, &run.stages);
         }
         (BottomTab::ErrorHistogram, Some((run, result))) => {
             charts::error_histogram_ui(ui, &run.test.set, &result.decoupled_mm);
@@ -67,7 +67,7 @@ fn keys(ui: &Ui, state: &State) -> Vec<Key> {
         (BottomTab::Nodes, _) => charts::nodes_keys(palette, &state.frames),
         (BottomTab::Loss, Some((run, _))) => charts::loss_keys(palette, &run.history),
         (BottomTab::TrainingState, Some((run, _))) => {
-            charts::training_state_keys(palette, run.settings.training.method.parameter_name())
+            charts::training_state_keys(palette, charts::parameter_name(&run.stages))
         }
         (BottomTab::Regression, Some(_)) => charts::regression_keys(palette),
         (BottomTab::ErrorHistogram, Some(_)) | (_, None) => Vec::new(),

@@ -7,11 +7,11 @@ use super::{
 use crate::{
     app::{
         action::Action,
-        state::State,
+        state::{Phase, State},
         theme::{Theme, scrolled_ui, section_heading_ui, slider_style, space, type_size},
     },
     dataset::LARGEST_SAMPLES,
-    evaluation::RunSettings,
+    evaluation::{MOST_STARTS, RunSettings},
     network::{HiddenSuggestions, LARGEST_HIDDEN, Shape},
     training::{Method, StoppingRules},
 };
@@ -20,11 +20,17 @@ use crate::{
 pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut draft = state.draft;
     scrolled_ui(ui, "configuration", |ui| {
-        ui.add_enabled_ui(!state.phase.is_busy(), |ui| {
+        let is_busy = state.phase.is_busy();
+        ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);
             scene_section_ui(ui, &mut draft);
             network_section_ui(ui, &mut draft);
-            training_section_ui(ui, &mut draft);
+        });
+        // What is held can be continued with another method.
+        ui.add_enabled_ui(!is_busy || state.phase == Phase::Paused, |ui| {
+            training_section_ui(ui, &mut draft, !is_busy);
+        });
+        ui.add_enabled_ui(!is_busy, |ui| {
             ui.add_space(space(4));
             let is_default = draft == RunSettings::default();
             let reset = ui.add_enabled(!is_default, eframe::egui::Button::new("Back to the paper's settings"));
@@ -129,8 +135,13 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
     ui.add_space(space(1));
 }
 
-fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings, is_new: bool) {
     section_heading_ui(ui, "Training");
+    let hint = "Trainings from different random weights, side by side; the best by validation error is kept. One run of \
+                a random start proves little: several show how the results spread. Seeds are derived. Default 1.";
+    ui.add_enabled_ui(is_new, |ui| {
+        count_ui(ui, "Starts", hint, &mut draft.starts, 1..=MOST_STARTS)
+    });
     let method = &mut draft.training.method;
     // The longest names fill a line.
     let label = ui.label("Method").on_hover_text("How the weights are improved.");
@@ -157,7 +168,8 @@ fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
     }
     let stopping = &mut draft.training.stopping;
-    let hint = "The most epochs: passes over the training set.";
+    let hint = "The most epochs, passes over the training set: Train counts them from the start, Continue from where the \
+                training stands.";
     count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
     CollapsingHeader::new("When to stop earlier")
         .id_salt("stopping")

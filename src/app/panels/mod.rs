@@ -7,6 +7,7 @@ mod notice;
 mod report;
 mod save_form;
 mod sensor_section;
+mod spread;
 mod status_line;
 mod surfaces;
 mod table;

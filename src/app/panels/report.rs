@@ -2,12 +2,16 @@ use std::time::Duration;
 
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
-use super::table::{Column, Row, table_ui};
+use super::{
+    spread::spread_ui,
+    table::{Column, Row, table_ui},
+};
 use crate::{
     app::{
         action::Action,
         export_kind::ExportKind,
-        state::{RunResult, RunView, State},
+        file_task::FileTask,
+        state::{Phase, RunResult, RunView, State},
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
     evaluation::{ErrorRow, Errors, PublishedErrors, error_rows},
@@ -25,11 +29,21 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             error_table_ui(ui, &error_rows(&result.errors, &run.baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
             worst_node_ui(ui, result, &mut actions);
+            effective_parameters_ui(ui, run, result);
+            spread_ui(ui, &run.starts);
         } else {
             expectation_ui(ui, state);
         }
         section_heading_ui(ui, "Export");
-        ui.add_enabled_ui(shown.is_some(), |ui| export_ui(ui, &mut actions));
+        for kind in ExportKind::ALL {
+            // A training under way is held first.
+            let is_standing = kind != ExportKind::Checkpoint || matches!(state.phase, Phase::Paused | Phase::Ended(_));
+            let can_save = shown.is_some() && is_standing;
+            ui.add_enabled_ui(can_save, |ui| file_ui(ui, FileTask::Save(kind), &mut actions));
+        }
+        section_heading_ui(ui, "Open");
+        let can_open = !state.phase.is_busy() && state.phase != Phase::Died;
+        ui.add_enabled_ui(can_open, |ui| file_ui(ui, FileTask::OpenCheckpoint, &mut actions));
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, result);
@@ -132,7 +146,7 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
         dim_ui(ui, &format!("On z {times} times as accurate as the linear map."));
     }
-    if run.settings != state.draft {
+    if run.asked != state.draft {
         dim_ui(ui, "The settings have changed since this training.");
     }
 }
@@ -178,9 +192,31 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
     });
 }
 
+/// How many weights the data determine, where the method estimates it.
+fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let best = run.history.get(result.best_epoch);
+    let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
+        return;
+    };
+    let text = format!(
+        "Effective parameters {} of {} weights",
+        format_number(effective),
+        run.weights
+    );
+    ui.label(RichText::new(text).size(type_size().note)).on_hover_text(
+        "How many weights the data determine, as Bayesian regularisation estimates it. Near the number of weights: more \
+         hidden nodes may help; far below: fewer would do.",
+    );
+}
+
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let epochs = run.latest().map_or(0, |latest| latest.epoch);
-    let mut rows = vec![("Training", format_duration(result.elapsed))];
+    let epochs = result.epochs_run;
+    let training = if run.settings.starts > 1 {
+        "Training, all starts"
+    } else {
+        "Training"
+    };
+    let mut rows = vec![(training, format_duration(result.elapsed))];
     if epochs > 0 {
         rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
     }
@@ -203,24 +239,21 @@ fn format_short_time(time: Duration) -> String {
     }
 }
 
-const PATH_BUTTON_WIDTH: f32 = space(22);
+const PATH_BUTTON_WIDTH: f32 = space(24);
 
-fn export_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
     let theme = Theme::of(ui);
-    for kind in ExportKind::ALL {
-        ui.horizontal(|ui| {
-            let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-            let button = ghost_button(theme, kind.name()).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(kind.description()).clicked() {
-                actions.push(Action::ChooseFile(kind.into()));
-            }
-            let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
-            path.widget_info(|| {
-                WidgetInfo::labeled(Role::Button, true, format!("Type a path for the {}", kind.file_kind()))
-            });
-            if path.on_hover_text("Type the path instead of choosing it").clicked() {
-                actions.push(Action::TypePath(kind.into()));
-            }
-        });
-    }
+    ui.horizontal(|ui| {
+        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
+        let button = ghost_button(theme, task.name()).min_size([width, space(7)].into());
+        if ui.add(button).on_hover_text(task.description()).clicked() {
+            actions.push(Action::ChooseFile(task));
+        }
+        let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let is_enabled = path.enabled();
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, task.path_name()));
+        if path.on_hover_text("Type the path instead of choosing it").clicked() {
+            actions.push(Action::TypePath(task));
+        }
+    });
 }

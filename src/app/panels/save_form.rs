@@ -20,9 +20,12 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         .frame(form_frame(ui))
         .show(ui.ctx(), |ui| {
             ui.set_width(space(110));
-            ui.label(RichText::new(format!("Save {}", saving.kind.file_kind())).font(semibold(type_size().title)));
             ui.label(
-                RichText::new(saving.kind.description())
+                RichText::new(format!("{} {}", saving.task.verb(), saving.task.file_kind()))
+                    .font(semibold(type_size().title)),
+            );
+            ui.label(
+                RichText::new(saving.task.description())
                     .size(type_size().note)
                     .color(Theme::of(ui).palette.dim),
             );
@@ -40,8 +43,12 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let theme = Theme::of(ui);
                 let is_named = !path.trim().is_empty();
-                if ui.add_enabled(is_named, primary_button(theme, "Save")).clicked() || (entered && is_named) {
-                    actions.push(Action::Export(saving.kind, PathBuf::from(path.trim())));
+                if ui
+                    .add_enabled(is_named, primary_button(theme, saving.task.verb()))
+                    .clicked()
+                    || (entered && is_named)
+                {
+                    actions.push(saving.task.at(PathBuf::from(path.trim())));
                 }
                 if ui.add(ghost_button(theme, "Cancel")).clicked() {
                     actions.push(Action::CancelSave);

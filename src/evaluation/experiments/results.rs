@@ -97,14 +97,14 @@ impl CellResults {
 
     /// The trial of median AveZerr (the lower one of two), whose network may stand for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
-        let mut trials: Vec<&Trial> = self
+        let with_errors = self
             .trials
             .iter()
-            .filter(|trial| trial.errors.z_percent.is_some())
-            .collect();
-        trials.sort_by(|one, other| one.errors.z_mm.total_cmp(&other.errors.z_mm));
+            .filter_map(|trial| Some((trial, trial.errors.z_percent?)));
+        let mut trials: Vec<_> = with_errors.collect();
+        trials.sort_by(|(_, one), (_, other)| one.total_cmp(other));
         let middle = trials.len().checked_sub(1)? / 2;
-        trials.get(middle).copied()
+        Some(trials[middle].0)
     }
 }
 
