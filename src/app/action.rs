@@ -1,9 +1,10 @@
 use std::path::PathBuf;
 
 use super::{
+    experiments::ExperimentAction,
     export_kind::ExportKind,
     file_task::FileTask,
-    state::{BottomTab, RightCard},
+    state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
 };
 use crate::evaluation::{NodeAddress, RunSettings};
@@ -35,6 +36,10 @@ pub enum Action {
     GoTo(NodeAddress),
     /// Show this chart.
     ShowTab(BottomTab),
+    /// Show this view.
+    ShowView(View),
+    /// Do this in the Experiments view.
+    Experiments(ExperimentAction),
     /// Dark or light.
     SetDark(bool),
     /// Go on from the present weights with the method and the epochs of the settings.

@@ -64,16 +64,16 @@ impl Dialogs {
             let _ = send.send(no_dialog);
             return;
         }
-        let extension = task.kind().extension();
+        let extension = task.extension();
         let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title(format!("{} {}", task.verb(), task.kind().file_kind()))
+            .set_title(format!("{} {}", task.verb(), task.file_kind()))
             .add_filter(extension.to_uppercase(), &[extension]);
         if let Some(folder) = suggestion.parent() {
             dialog = dialog.set_directory(folder);
         }
         let asked = Instant::now();
         let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match task {
-            FileTask::Save(_) => {
+            FileTask::Save(_) | FileTask::SaveExperiment(..) => {
                 if let Some(name) = suggestion.file_name() {
                     dialog = dialog.set_file_name(name.to_string_lossy());
                 }

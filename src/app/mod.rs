@@ -8,6 +8,7 @@ mod action;
 mod charts;
 mod continuation;
 mod dialogs;
+mod experiments;
 mod export_kind;
 mod file_task;
 mod open;
@@ -24,9 +25,13 @@ use crate::export::ticks;
 
 pub use action::Action;
 pub use dialogs::DialogKind;
+pub use experiments::{
+    AxisForm, AxisKind, Ending, ExperimentAction, ExperimentFile, ExperimentsState, Form, FormError, ListError,
+    Outcome, Running, SortBy, Topic,
+};
 pub use export_kind::ExportKind;
 pub use file_task::FileTask;
 pub use open::{OpenError, open};
-pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State};
+pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
 pub use test_view::{Frame, TestView};
 pub use window::DecouplerWindow;

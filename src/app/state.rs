@@ -3,6 +3,8 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use ndarray::Array2;
 
 use super::{
+    experiments::ExperimentsState,
+    export_kind::ExportKind,
     file_task::FileTask,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
@@ -16,6 +18,10 @@ use crate::{
 /// Everything the panels read.
 #[derive(Debug)]
 pub struct State {
+    /// What the window shows.
+    pub view: View,
+    /// The Experiments view.
+    pub experiments: ExperimentsState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -34,6 +40,16 @@ pub struct State {
     pub saving: Option<Saving>,
     /// The path last typed, offered again for the same task.
     pub typed: Option<Saving>,
+}
+
+/// What the window shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    /// One training and what it makes of the sensor.
+    #[default]
+    Train,
+    /// The paper's tables and sweeps.
+    Experiments,
 }
 
 /// What the worker is doing.
@@ -260,6 +276,8 @@ impl State {
     /// The state in which the window opens.
     pub fn new(is_dark: bool) -> Self {
         Self {
+            view: View::default(),
+            experiments: ExperimentsState::new(),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,
@@ -344,9 +362,12 @@ impl State {
     /// Where a file goes unless the user says otherwise.
     pub fn suggested_path(&self, task: FileTask) -> PathBuf {
         let settings = self.run.as_ref().map_or(&self.draft, |run| &run.settings);
-        std::env::current_dir()
-            .unwrap_or_default()
-            .join(task.kind().file_name(settings))
+        let name = match task {
+            FileTask::Save(kind) => kind.file_name(settings),
+            FileTask::SaveExperiment(topic, file) => ExperimentsState::file_name(topic, file),
+            FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
+        };
+        std::env::current_dir().unwrap_or_default().join(name)
     }
 }
 

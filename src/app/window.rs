@@ -5,10 +5,10 @@ use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 use super::{
     action::Action,
     dialogs::{Answer, DialogKind, Dialogs},
-    file_task::FileTask,
+    experiments::{self, ExperimentWorker},
     panels,
     shortcuts::pressed_shortcuts,
-    state::{Notice, Phase, Preview, RunView, Saving, State},
+    state::{Notice, Phase, Preview, RunView, Saving, State, View},
     theme::{self, Theme, space},
     worker::{Event, Request, Worker},
 };
@@ -19,6 +19,7 @@ use crate::evaluation::RunSettings;
 pub struct DecouplerWindow {
     state: State,
     worker: Worker,
+    experiments: ExperimentWorker,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -34,6 +35,10 @@ impl DecouplerWindow {
         let window = Self {
             state: State::new(is_dark),
             worker: start_worker(ctx)?,
+            experiments: {
+                let ctx = ctx.clone();
+                ExperimentWorker::new(move || ctx.request_repaint())
+            },
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
@@ -62,10 +67,10 @@ impl DecouplerWindow {
                 }
             }
         }
+        experiments::take_news(&mut self.state, &self.experiments);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(FileTask::Save(kind), path) => self.apply(Action::Export(kind, path)),
-                Answer::Chosen(FileTask::OpenCheckpoint, path) => self.apply(Action::OpenCheckpoint(path)),
+                Answer::Chosen(task, path) => self.apply(task.at(path)),
                 Answer::NoDialog(task) => self.apply(Action::TypePath(task)),
                 Answer::Cancelled => {}
             }
@@ -224,6 +229,8 @@ impl DecouplerWindow {
                 state.typed = state.saving.take();
                 self.worker.ask(Request::Export(kind, path));
             }
+            Action::ShowView(view) => state.view = view,
+            Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
             Action::OpenCheckpoint(path) => {
                 state.typed = state.saving.take();
                 // A training may have begun while the desktop's dialog was open.
@@ -277,7 +284,12 @@ impl DecouplerWindow {
     /// Lays out the window and applies what the user did.
     pub fn show_ui(&mut self, ui: &mut Ui) {
         let state = &self.state;
-        let mut actions = pressed_shortcuts(ui.ctx(), state);
+        let is_training_view = state.view == View::Train;
+        let mut actions = if is_training_view {
+            pressed_shortcuts(ui.ctx(), state)
+        } else {
+            experiments::pressed_shortcuts(ui.ctx(), state)
+        };
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         let layout = panels::WorkbenchLayout::of_width(ui.available_width());
@@ -297,13 +309,25 @@ impl DecouplerWindow {
         Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
-            .show(ui, |ui| panels::status_line_ui(ui, state));
+            .show(ui, |ui| {
+                if is_training_view {
+                    panels::status_line_ui(ui, state);
+                } else {
+                    experiments::status_ui(ui, &state.experiments);
+                }
+            });
         Panel::left("configuration")
             .exact_size(left)
             .resizable(false)
             .frame(panel(side))
-            .show(ui, |ui| actions.extend(panels::configuration_ui(ui, state)));
-        if has_report_beside {
+            .show(ui, |ui| {
+                actions.extend(if is_training_view {
+                    panels::configuration_ui(ui, state)
+                } else {
+                    experiments::form_ui(ui, state)
+                });
+            });
+        if has_report_beside && is_training_view {
             Panel::right("report")
                 .exact_size(space(96))
                 .resizable(false)
@@ -313,7 +337,11 @@ impl DecouplerWindow {
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         egui::CentralPanel::default().frame(background).show(ui, |ui| {
             actions.extend(panels::notice_ui(ui, state));
-            actions.extend(panels::workbench_ui(ui, state, layout));
+            actions.extend(if is_training_view {
+                panels::workbench_ui(ui, state, layout)
+            } else {
+                experiments::experiments_ui(ui, state)
+            });
         });
         actions.extend(panels::save_form_ui(ui, state));
         for action in actions {
@@ -393,7 +421,10 @@ mod tests {
         assert_eq!((window.state.phase, &window.state.notice), (ended, &None));
         assert!(window.state.result().is_some() && window.state.frames.decoupled.is_some());
 
-        window.apply(Action::Export(super::super::ExportKind::Errors, "errors.csv".into()));
+        window.apply(Action::Export(
+            super::super::ExportKind::Errors.into(),
+            "errors.csv".into(),
+        ));
         wait(&mut window, |state| state.notice.is_some());
         let lost = "the network was lost when the training thread ended: train again";
         assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
@@ -436,7 +467,7 @@ mod tests {
         assert!(window.state.result().is_some());
 
         window.apply(Action::DismissNotice);
-        window.apply(Action::Export(super::super::ExportKind::Network, path.clone()));
+        window.apply(Action::Export(super::super::ExportKind::Network.into(), path.clone()));
         wait(&mut window, |state| state.notice.is_some());
         assert_eq!(
             window.state.notice,

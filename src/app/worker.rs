@@ -176,7 +176,7 @@ impl Worker {
 
 /// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about three times its
 /// share, and training is not starved by other programs.
-fn yield_to_window() {
+pub(super) fn yield_to_window() {
     /// Of 0 to 99, where about 50 is normal.
     const BELOW_NORMAL: u8 = 37;
     if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {

@@ -11,7 +11,7 @@ use super::{
     arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
-    reproduce_report::{Reproduced, conditions, heading, print_json, print_text},
+    reproduce_report::{Reproduced, print_json, print_text},
 };
 use crate::{
     dataset::{FoldUnit, Seed},
@@ -20,7 +20,8 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        WriteError, atomic_write, check_writable, format_duration, write_cells, write_experiment_markdown, write_trials,
+        WriteError, atomic_write, check_writable, describe_conditions, format_duration, write_cells,
+        write_experiment_markdown, write_trials,
     },
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
@@ -231,7 +232,7 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), WriteError>
     atomic_write(&cells, |writer| write_cells(results, writer))?;
     atomic_write(&trials, |writer| write_trials(results, writer))?;
     atomic_write(&markdown, |writer| {
-        let (title, conditions) = (heading(*table), conditions(&results.experiment));
+        let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
         write_experiment_markdown(&title, &conditions, results, verdicts, writer)
     })
 }

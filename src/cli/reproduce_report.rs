@@ -7,9 +7,8 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use crate::{
-    evaluation::experiments::{Axis, CellSummary, CrossValidation, Experiment, ExperimentResults, PaperTable, Verdict},
-    export::{ExperimentTable, format_duration},
-    network::HiddenSuggestions,
+    evaluation::experiments::{CellSummary, CrossValidation, ExperimentResults, PaperTable, Verdict},
+    export::{ExperimentTable, describe_conditions, describe_failures, format_duration},
     sensor::Geometry,
 };
 
@@ -52,12 +51,12 @@ pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<()
         TableReport {
             table: table.number(),
             title: table.title(),
-            conditions: conditions(&results.experiment),
+            conditions: describe_conditions(&results.experiment),
             seeds: results.experiment.seeds,
             cross_validation: results.experiment.cross_validation,
             is_complete: results.is_complete(),
             cells: results.summaries(),
-            failures: failures(results),
+            failures: describe_failures(results),
             verdicts,
         }
     };
@@ -85,7 +84,12 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         verdicts,
     } in reproduced
     {
-        writeln!(out, "{}\n{}\n", heading(*table), conditions(&results.experiment))?;
+        writeln!(
+            out,
+            "{}\n{}\n",
+            table.heading(),
+            describe_conditions(&results.experiment)
+        )?;
         write_aligned(&ExperimentTable::new(results), out)?;
         writeln!(out)?;
         for Verdict {
@@ -96,7 +100,7 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         {
             writeln!(out, "{claim}: {standing}. {finding}")?;
         }
-        for failure in failures(results) {
+        for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;
         }
         writeln!(out)?;
@@ -126,63 +130,4 @@ fn write_aligned(table: &ExperimentTable, out: &mut impl Write) -> io::Result<()
         writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
     }
     Ok(())
-}
-
-/// The title of a table.
-pub(super) fn heading(table: PaperTable) -> String {
-    format!("Table {}: {}", table.number(), table.title())
-}
-
-/// How an experiment is carried out, for its reader.
-pub(super) fn conditions(experiment: &Experiment) -> String {
-    let base = &experiment.base;
-    let mut said = vec![base.training.method.name().to_owned()];
-    if !matches!(experiment.axis, Axis::Array(_)) {
-        said.push(base.sensor.scale.to_string());
-    }
-    if !matches!(experiment.axis, Axis::Hidden(_)) {
-        said.push(format!("{} hidden nodes", base.hidden));
-    }
-    said.push(format!("{} epochs", base.training.stopping.epochs));
-    said.push(match base.starts {
-        1 => "one start".to_owned(),
-        starts => format!("best of {starts} starts by validation error"),
-    });
-    said.push(match experiment.seeds {
-        1 => format!("seed {}", base.seed),
-        seeds => format!("{seeds} seeds from {}", base.seed),
-    });
-    said.push(match experiment.cross_validation {
-        None => format!(
-            "{} training samples, {} more for validation, {} for test",
-            base.samples, base.validation_samples, base.test_samples
-        ),
-        Some(CrossValidation { folds, repeats, unit }) => {
-            let validation = match folds {
-                2 => "nothing held out for validation",
-                _ => "of the folds not tested one is held out for validation",
-            };
-            format!("{folds} folds by {unit}, {validation}, {repeats} repeats")
-        }
-    });
-    let mut conditions = said.join(", ");
-    if matches!(experiment.axis, Axis::Hidden(_)) {
-        let scale = base.sensor.scale;
-        let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
-        let (root, logarithm) = (suggested.square_root, suggested.logarithm);
-        let (fewest, most) = (root.start(), root.end());
-        conditions += &format!(". Eq. (12) suggests {fewest} to {most} hidden nodes, Eq. (13) {logarithm}");
-    }
-    conditions
-}
-
-/// What could not be carried out, a sentence each.
-fn failures(results: &ExperimentResults) -> Vec<String> {
-    let of_cell = |cell| {
-        let label = results.cell_labels(cell).join(", ");
-        cell.failures
-            .iter()
-            .map(move |failure| format!("Failed at {label}, {failure}"))
-    };
-    results.cells.iter().flat_map(of_cell).collect()
 }

@@ -4,7 +4,7 @@ use std::{
 };
 
 use super::{format_duration, format_number};
-use crate::evaluation::experiments::{CellSummary, ExperimentResults, Figure, Verdict};
+use crate::evaluation::experiments::{CellResults, CellSummary, ExperimentResults, Figure, Verdict};
 
 /// The results of an experiment for reading: the same columns in the terminal, in files and in the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +13,8 @@ pub struct ExperimentTable {
     pub headings: Vec<&'static str>,
     /// Cells of the experiment, row by row.
     pub rows: Vec<Vec<String>>,
+    /// The numbers behind the texts, to order by; of an axis, the place of the value in its list.
+    pub values: Vec<Vec<Option<f64>>>,
 }
 
 impl ExperimentTable {
@@ -24,50 +26,54 @@ impl ExperimentTable {
         headings.extend(
             Self::figures(None, has_published)
                 .into_iter()
-                .map(|(heading, _)| heading),
+                .map(|(heading, _, _)| heading),
         );
-        let row = |(cell, summary): (_, &CellSummary)| {
-            let labels = results.cell_labels(cell);
-            let figures = Self::figures(Some(summary), has_published);
-            labels
-                .into_iter()
-                .chain(figures.into_iter().map(|(_, text)| text))
-                .collect()
+        let row = |(cell, summary): (&CellResults, &CellSummary)| {
+            let places = [cell.cell.column, cell.cell.row].map(|place| Some(place as f64));
+            let labels = places.into_iter().zip(results.cell_labels(cell));
+            let figures = Self::figures(Some(summary), has_published).into_iter();
+            labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
         };
-        Self {
-            rows: results.cells.iter().zip(&summaries).map(row).collect(),
-            headings,
-        }
+        let (values, rows) = results.cells.iter().zip(&summaries).map(row).unzip();
+        Self { headings, rows, values }
     }
 
     /// Headings with the figures of a cell.
-    fn figures(summary: Option<&CellSummary>, has_published: bool) -> Vec<(&'static str, String)> {
-        let number = |figure: fn(&CellSummary) -> Option<f64>| format_number(summary.and_then(figure));
+    fn figures(summary: Option<&CellSummary>, has_published: bool) -> Vec<(&'static str, Option<f64>, String)> {
+        let number = |heading, figure: fn(&CellSummary) -> Option<f64>| {
+            let value = summary.and_then(figure);
+            (heading, value, format_number(value))
+        };
         let mut figures = Vec::new();
         let published = |heading, figure: fn(&CellSummary) -> Option<f64>| {
             if has_published {
-                vec![(heading, number(figure))]
+                vec![number(heading, figure)]
             } else {
                 Vec::new()
             }
         };
         figures.extend(published("Z % publ.", |cell| cell.z_percent.published));
         figures.extend([
-            ("Z % median", number(|cell| cell.z_percent.median)),
-            ("min", number(|cell| cell.z_percent.min)),
-            ("max", number(|cell| cell.z_percent.max)),
+            number("Z % median", |cell| cell.z_percent.median),
+            number("min", |cell| cell.z_percent.min),
+            number("max", |cell| cell.z_percent.max),
         ]);
         figures.extend(published("X % publ.", |cell| cell.x_percent.published));
-        figures.push(("X % median", number(|cell| cell.x_percent.median)));
+        figures.push(number("X % median", |cell| cell.x_percent.median));
         figures.extend(published("Y % publ.", |cell| cell.y_percent.published));
-        figures.push(("Y % median", number(|cell| cell.y_percent.median)));
-        let time = summary.and_then(|summary| Duration::try_from_secs_f64(summary.training_seconds?).ok());
+        figures.push(number("Y % median", |cell| cell.y_percent.median));
+        let seconds = summary.and_then(|summary| summary.training_seconds);
+        let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         figures.extend([
-            ("mean Z %", number(|cell| cell.mean_z_percent)),
-            ("linear Z %", number(|cell| cell.linear_z_percent)),
-            ("bound Z %", number(|cell| cell.bound_z_percent)),
-            ("epochs", number(|cell| cell.epochs_run)),
-            ("training", time.map_or_else(|| format_number(None), format_duration)),
+            number("mean Z %", |cell| cell.mean_z_percent),
+            number("linear Z %", |cell| cell.linear_z_percent),
+            number("bound Z %", |cell| cell.bound_z_percent),
+            number("epochs", |cell| cell.epochs_run),
+            (
+                "training",
+                seconds,
+                time.map_or_else(|| format_number(None), format_duration),
+            ),
         ]);
         figures
     }

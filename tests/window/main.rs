@@ -5,6 +5,7 @@
 mod configuring;
 mod continuing;
 mod driver;
+mod experiments;
 mod exporting;
 mod extremes;
 mod looking;

@@ -4,7 +4,7 @@ mod error_histogram;
 mod legend;
 mod loss;
 mod nodes;
-mod plot_style;
+pub(super) mod plot_style;
 mod regression;
 mod stages;
 mod strip;
@@ -12,7 +12,7 @@ mod test_pairs;
 mod training_state;
 
 pub use error_histogram::error_histogram_ui;
-pub use legend::{Key, legend_ui, legend_width};
+pub use legend::{Key, Mark, legend_ui, legend_width};
 pub use loss::{loss_keys, loss_ui};
 pub use nodes::{nodes_keys, nodes_ui};
 pub use regression::{regression_keys, regression_ui};

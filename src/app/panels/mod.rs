@@ -2,7 +2,7 @@
 
 mod charts_card;
 mod configuration;
-mod fields;
+pub(super) mod fields;
 mod notice;
 mod report;
 mod save_form;

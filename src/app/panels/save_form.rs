@@ -4,7 +4,6 @@ use eframe::egui::{Align, Frame, Id, Layout, Margin, Modal, RichText, TextEdit, 
 
 use crate::app::{
     action::Action,
-    file_task::FileTask,
     state::State,
     theme::{Theme, ghost_button, primary_button, semibold, space, type_size},
 };
@@ -22,7 +21,7 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         .show(ui.ctx(), |ui| {
             ui.set_width(space(110));
             ui.label(
-                RichText::new(format!("{} {}", saving.task.verb(), saving.task.kind().file_kind()))
+                RichText::new(format!("{} {}", saving.task.verb(), saving.task.file_kind()))
                     .font(semibold(type_size().title)),
             );
             ui.label(
@@ -49,11 +48,7 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                     .clicked()
                     || (entered && is_named)
                 {
-                    let path = PathBuf::from(path.trim());
-                    actions.push(match saving.task {
-                        FileTask::Save(kind) => Action::Export(kind, path),
-                        FileTask::OpenCheckpoint => Action::OpenCheckpoint(path),
-                    });
+                    actions.push(saving.task.at(PathBuf::from(path.trim())));
                 }
                 if ui.add(ghost_button(theme, "Cancel")).clicked() {
                     actions.push(Action::CancelSave);

@@ -4,8 +4,8 @@ use eframe::egui::{
 
 use crate::app::{
     action::Action,
-    state::{Phase, State},
-    theme::{Theme, ghost_button, primary_button, semibold, space, type_size},
+    state::{Phase, State, View},
+    theme::{Theme, ghost_button, primary_button, segmented_ui, semibold, space, type_size},
 };
 
 /// Name, snapshot, and the buttons that run the training.
@@ -15,9 +15,17 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         ui.add_space(space(1));
         mark_ui(ui);
         ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
+        ui.add_space(space(4));
+        let views = [(View::Train, "Train"), (View::Experiments, "Experiments")];
+        if let Some(view) = segmented_ui(ui, "View", &views, state.view, false) {
+            actions.push(Action::ShowView(view));
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add_space(space(1));
             theme_ui(ui, state, &mut actions);
+            if state.view == View::Experiments {
+                return;
+            }
             run_buttons_ui(ui, state, &mut actions);
             ui.add_space(space(4));
             snapshot_ui(ui, state, &mut actions);

@@ -240,6 +240,11 @@ impl PaperTable {
         }
     }
 
+    /// Number and title.
+    pub fn heading(self) -> String {
+        format!("Table {}: {}", self.number(), self.title())
+    }
+
     /// The experiment that redoes it. The paper does not say how long it trained: epochs and starts are those that
     /// redo all tables in about a minute on two cores. All epochs are run; the validation set only chooses the weights.
     pub fn experiment(self) -> Experiment {

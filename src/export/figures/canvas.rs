@@ -12,6 +12,9 @@ pub(super) const TEXT: f64 = 8.0;
 /// The average width of a character of this size: enough to leave room for a text.
 pub(super) const CHARACTER: f64 = 0.56 * TEXT;
 
+/// How far blocks reach under their neighbours, in points: one pixel in print.
+const OVERLAP: f64 = 0.25;
+
 pub(super) type At = [f64; 2];
 
 /// How a line is drawn.
@@ -109,7 +112,8 @@ impl Canvas {
         ));
     }
 
-    /// A filled rectangle with sharp edges, so that neighbours leave no seam.
+    /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
+    /// be drawn later, so that there is no seam between them.
     pub fn block(&mut self, area: Area, fill: Rgb) {
         let Area {
             left,
@@ -117,7 +121,7 @@ impl Canvas {
             width,
             height,
         } = area;
-        let [left, top, width, height] = [left, top, width, height].map(number);
+        let [left, top, width, height] = [left, top, width + OVERLAP, height + OVERLAP].map(number);
         let fill = hex(fill);
         self.put(format_args!(
             r#"<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="{fill}" shape-rendering="crispEdges"/>"#

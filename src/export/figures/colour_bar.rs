@@ -35,7 +35,7 @@ pub(super) fn draw_colour_bar(
         height,
     };
     let step = height / STEPS as f64;
-    for at in 0..STEPS {
+    for at in (0..STEPS).rev() {
         let block = Area {
             top: bar.bottom() - step * (at + 1) as f64,
             height: step,

@@ -23,7 +23,7 @@ const TALL: f64 = 0.5;
 /// The shorter side of the box at least.
 const NARROWEST: f64 = 0.6;
 /// Room for ticks and names around the box.
-const MARGIN: [f64; 2] = [30.0, 26.0];
+const MARGIN: [f64; 2] = [36.0, 24.0];
 
 /// Millimetres to places on the canvas.
 pub(super) struct Relief {
@@ -126,7 +126,7 @@ impl Relief {
         );
         for (at, text) in x_ticks {
             let [x, y] = self.unit_at(corner(at, 0.0, 0.0));
-            canvas.text([x - 3.0, y + 8.0], Anchor::End, INK, &text);
+            canvas.text([x - 2.0, y + 9.0], Anchor::End, INK, &text);
         }
         for (at, text) in y_ticks {
             let [x, y] = self.unit_at(corner(1.0, at, 0.0));
@@ -137,7 +137,7 @@ impl Relief {
             canvas.text([x - 4.0, y], Anchor::End, INK, &text);
         }
         let [x, y] = self.unit_at(corner(0.45, 0.0, 0.0));
-        canvas.text([x - 14.0, y + 22.0], Anchor::End, INK, "x (mm)");
+        canvas.text([x - 12.0, y + 24.0], Anchor::End, INK, "x (mm)");
         let [x, y] = self.unit_at(corner(1.0, 0.55, 0.0));
         canvas.text([x + 20.0, y + 18.0], Anchor::Start, INK, "y (mm)");
         let [x, y] = self.unit_at(corner(0.0, 0.0, 0.5));

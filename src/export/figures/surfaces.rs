@@ -68,10 +68,10 @@ impl SurfaceFigure {
                 width,
                 height: Self::HEIGHT - 20.0,
             };
-            canvas.title([card.left + 0.5 * width, 11.0], &panel.title);
             match self.look {
                 SurfaceLook::Top => self.draw_map(&mut canvas, card, panel, &points),
                 SurfaceLook::ThreeD => {
+                    canvas.title([card.centre()[0], 11.0], &panel.title);
                     let [x, y] = self.sides(&points);
                     let relief = Relief::new(card, &x, &y, &self.range_mm);
                     relief.draw_box(&mut canvas, "z (mm)");
@@ -102,7 +102,7 @@ impl SurfaceFigure {
         };
         let [across, up] = [&x, &y].map(|side| side.end() - side.start());
         let scale = (room.width / across).min(room.height / up);
-        let width = (across * scale).max(0.5 * room.width).min(room.width);
+        let width = (across * scale).max(0.6 * room.width).min(room.width);
         let height = (up * scale).max(0.5 * room.height).min(room.height);
         let area = Area {
             left: room.left + 0.5 * (room.width - width),
@@ -115,11 +115,12 @@ impl SurfaceFigure {
             x: (&x_axis, x),
             y: (&y_axis, y),
         };
+        canvas.title([area.centre()[0], 11.0], &panel.title);
         frame.draw(canvas);
         let [columns, rows] = points;
         canvas.clipped(area, |canvas| {
             for ix in columns.windows(2) {
-                for iy in rows.windows(2) {
+                for iy in rows.windows(2).rev() {
                     let corners = [(ix[0], iy[0]), (ix[1], iy[0]), (ix[0], iy[1]), (ix[1], iy[1])];
                     let sum: f64 = corners
                         .iter()

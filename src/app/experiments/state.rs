@@ -1,0 +1,270 @@
+use std::{
+    collections::HashMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use super::{ExperimentFile, Form};
+use crate::{
+    evaluation::experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Verdict, verdicts},
+    export::ExperimentTable,
+};
+
+/// What the Experiments view is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// A table of the paper.
+    Table(PaperTable),
+    /// Two axes of one's own.
+    Sweep,
+}
+
+impl Topic {
+    /// In the order offered.
+    pub const ALL: [Self; 4] = [
+        Self::Table(PaperTable::HiddenNodes),
+        Self::Table(PaperTable::CrossValidation),
+        Self::Table(PaperTable::ArrayScales),
+        Self::Sweep,
+    ];
+
+    /// In a word or two.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table(PaperTable::HiddenNodes) => "Table 1",
+            Self::Table(PaperTable::CrossValidation) => "Table 2",
+            Self::Table(PaperTable::ArrayScales) => "Table 3",
+            Self::Sweep => "Sweep",
+        }
+    }
+
+    /// The title of its results.
+    pub fn heading(self) -> String {
+        match self {
+            Self::Table(table) => table.heading(),
+            Self::Sweep => "Sweep over two axes".to_owned(),
+        }
+    }
+}
+
+/// What the Experiments view knows.
+#[derive(Debug)]
+pub struct ExperimentsState {
+    /// What is looked at.
+    pub topic: Topic,
+    /// The cell marked in table and picture.
+    pub marked: Option<usize>,
+    /// The order of the table.
+    pub sort: SortBy,
+    /// What runs.
+    pub running: Option<Running>,
+    forms: HashMap<Topic, CheckedForm>,
+    outcomes: HashMap<Topic, Outcome>,
+}
+
+#[derive(Debug)]
+struct CheckedForm {
+    form: Form,
+    /// How many trials it has, or why it is no experiment.
+    checked: Result<usize, String>,
+}
+
+/// The order of a table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SortBy {
+    /// By this column; none for the order of the cells.
+    pub column: Option<usize>,
+    /// The largest first.
+    pub is_descending: bool,
+}
+
+/// An experiment under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Running {
+    /// Which.
+    pub topic: Topic,
+    /// Trials finished.
+    pub done: usize,
+    /// Trials there are.
+    pub trials: usize,
+    /// How long the others take, once that can be told.
+    pub time_left: Option<Duration>,
+    /// When it began.
+    pub begun: Instant,
+    /// Whether it has been told to end.
+    pub is_cancelled: bool,
+}
+
+/// How an experiment ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Every trial has come to something.
+    Complete,
+    /// By the user, or by an accident that was told.
+    Cut,
+}
+
+/// What is known of an experiment, as it is shown.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Everything; shared with a file being written.
+    pub results: Arc<ExperimentResults>,
+    /// For reading.
+    pub table: ExperimentTable,
+    /// The figures behind it.
+    pub summaries: Vec<CellSummary>,
+    /// What they say about the paper's claims.
+    pub verdicts: Vec<Verdict>,
+    /// Whether it has ended, and how.
+    pub ending: Option<Ending>,
+    /// How long it took, once it has ended.
+    pub took: Option<Duration>,
+}
+
+impl Outcome {
+    fn new(experiment: Experiment) -> Self {
+        let results = ExperimentResults::new(experiment);
+        Self {
+            table: ExperimentTable::new(&results),
+            summaries: results.summaries(),
+            verdicts: Vec::new(),
+            results: Arc::new(results),
+            ending: None,
+            took: None,
+        }
+    }
+
+    /// Trials finished and trials asked for.
+    pub fn trials(&self) -> (usize, usize) {
+        let cells = self.results.cells.iter();
+        cells.fold((0, 0), |(done, all), cell| {
+            (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
+        })
+    }
+
+    fn refresh(&mut self) {
+        self.table = ExperimentTable::new(&self.results);
+        self.summaries = self.results.summaries();
+        self.verdicts = verdicts(&self.results);
+    }
+}
+
+impl ExperimentsState {
+    /// Every form as the paper has it, nothing run.
+    pub fn new() -> Self {
+        let mut state = Self {
+            topic: Topic::ALL[0],
+            marked: None,
+            sort: SortBy::default(),
+            running: None,
+            forms: HashMap::new(),
+            outcomes: HashMap::new(),
+        };
+        for topic in Topic::ALL {
+            state.topic = topic;
+            state.edit(Form::new(topic));
+        }
+        state.topic = Topic::ALL[0];
+        state
+    }
+
+    /// Looks at another experiment.
+    pub fn choose(&mut self, topic: Topic) {
+        self.topic = topic;
+        self.marked = None;
+        self.sort = SortBy::default();
+    }
+
+    /// The form of what is looked at.
+    pub fn form(&self) -> &Form {
+        &self.forms[&self.topic].form
+    }
+
+    /// How many trials the form has, or why it cannot be run.
+    pub fn checked(&self) -> &Result<usize, String> {
+        &self.forms[&self.topic].checked
+    }
+
+    /// Takes a changed form of what is looked at.
+    pub fn edit(&mut self, form: Form) {
+        let trials = |experiment| {
+            let results = ExperimentResults::new(experiment);
+            results.cells.iter().map(|cell| cell.expected).sum()
+        };
+        let checked = form.experiment().map(trials).map_err(|error| error.to_string());
+        self.forms.insert(self.topic, CheckedForm { form, checked });
+    }
+
+    /// Whether what is looked at can be run now.
+    pub fn can_run(&self) -> bool {
+        self.running.is_none() && self.checked().is_ok()
+    }
+
+    /// Makes room for the results of `experiment`.
+    pub fn begin(&mut self, experiment: Experiment) {
+        let outcome = Outcome::new(experiment);
+        self.running = Some(Running {
+            topic: self.topic,
+            done: 0,
+            trials: outcome.trials().1,
+            time_left: None,
+            begun: Instant::now(),
+            is_cancelled: false,
+        });
+        self.marked = None;
+        self.sort = SortBy::default();
+        self.outcomes.insert(self.topic, outcome);
+    }
+
+    /// Adds trials that have come to something.
+    pub fn record(&mut self, finished: Vec<Finished>) {
+        let Some(running) = &mut self.running else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        let results = Arc::make_mut(&mut outcome.results);
+        for finished in finished {
+            running.done = finished.done;
+            running.time_left = finished.time_left;
+            results.record(finished.cell, finished.outcome);
+        }
+        outcome.refresh();
+    }
+
+    /// The one that ran has ended.
+    pub fn end(&mut self, at: Instant) {
+        let Some(running) = self.running.take() else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        outcome.refresh();
+        outcome.took = Some(at - running.begun);
+        outcome.ending = Some(if outcome.results.is_complete() {
+            Ending::Complete
+        } else {
+            Ending::Cut
+        });
+    }
+
+    /// What is known of the experiment looked at.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome_of(self.topic)
+    }
+
+    /// What is known of an experiment.
+    pub fn outcome_of(&self, topic: Topic) -> Option<&Outcome> {
+        self.outcomes.get(&topic)
+    }
+
+    /// The name of a file about an experiment, unless the user says otherwise.
+    pub fn file_name(topic: Topic, file: ExperimentFile) -> String {
+        let name = topic.name().to_lowercase().replace(' ', "_");
+        format!("{name}{}", file.ending())
+    }
+}
+
+impl Default for ExperimentsState {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,39 @@
+use eframe::egui::{RichText, Sense, Ui, Vec2};
+
+use super::{Ending, ExperimentsState};
+use crate::{
+    app::theme::{Theme, space, type_size},
+    export::format_duration,
+};
+
+/// What is going on, in the line at the bottom.
+pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsState) {
+    let palette = Theme::of(ui).palette;
+    let (colour, text) = match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) => {
+            let word = if running.is_cancelled { "Ending" } else { "Running" };
+            (palette.accent, format!("{word} {}", running.topic.name()))
+        }
+        (None, Some(outcome)) => {
+            let (done, all) = outcome.trials();
+            let took = outcome
+                .took
+                .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
+            let name = experiments.topic.name();
+            match outcome.ending {
+                Some(Ending::Complete) => (palette.good, format!("{name} finished: {all} trials{took}")),
+                _ => (
+                    palette.warning,
+                    format!("{name} ended early: {done} of {all} trials{took}"),
+                ),
+            }
+        }
+        (None, None) => (palette.dim, "Ready: press Run".to_owned()),
+    };
+    ui.horizontal_centered(|ui| {
+        ui.spacing_mut().item_spacing.x = space(4);
+        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+        ui.painter().circle_filled(dot.center(), 4.0, colour);
+        ui.label(RichText::new(text).size(type_size().note));
+    });
+}

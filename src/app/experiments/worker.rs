@@ -1,0 +1,147 @@
+//! The threads of an experiment: one that hands over what is finished, and as many that train as there are cores but
+//! one. All of them yield to the window.
+
+use std::{
+    fmt,
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{Receiver, Sender, channel},
+    },
+    thread,
+};
+
+use super::{ExperimentFile, Topic};
+use crate::{
+    app::worker::yield_to_window,
+    evaluation::experiments::{Experiment, ExperimentResults, Finished, run_experiments, worker_threads},
+};
+
+/// What the threads tell the window.
+#[derive(Debug)]
+pub enum ExperimentEvent {
+    /// A trial has come to something.
+    Finished(Box<Finished>),
+    /// The experiment has ended, or why it could not go on.
+    Ended(Result<(), String>),
+    /// A file was written, or why not.
+    Written(Result<PathBuf, String>),
+}
+
+/// The window's end of the threads.
+pub struct ExperimentWorker {
+    report: Report,
+    events: Receiver<ExperimentEvent>,
+    is_cancelled: Arc<AtomicBool>,
+}
+
+#[derive(Clone)]
+struct Report {
+    outgoing: Sender<ExperimentEvent>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl Report {
+    fn send(&self, event: ExperimentEvent) {
+        // Without a window there is nobody to tell.
+        let _ = self.outgoing.send(event);
+        (self.wake)();
+    }
+}
+
+impl ExperimentWorker {
+    /// No thread yet. `wake` is called after each event.
+    pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+        let (outgoing, events) = channel();
+        Self {
+            report: Report {
+                outgoing,
+                wake: Arc::new(wake),
+            },
+            events,
+            is_cancelled: Arc::default(),
+        }
+    }
+
+    /// Runs `experiment`; one that still runs is cancelled.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn run(&mut self, experiment: Experiment) -> std::io::Result<()> {
+        self.cancel();
+        self.is_cancelled = Arc::default();
+        let is_cancelled = Arc::clone(&self.is_cancelled);
+        let mut ending = EndingReport {
+            report: self.report.clone(),
+            result: Err("The experiment ended unexpectedly; what is finished stays.".to_owned()),
+        };
+        thread::Builder::new().name("experiments".to_owned()).spawn(move || {
+            yield_to_window();
+            let result = run_experiments(
+                &[experiment],
+                worker_threads(true),
+                || is_cancelled.load(Ordering::Relaxed),
+                |finished| ending.report.send(ExperimentEvent::Finished(Box::new(finished))),
+            );
+            ending.replace(result.map_err(|error| error.to_string()));
+        })?;
+        Ok(())
+    }
+
+    /// Ends the experiment after the epochs in progress.
+    pub fn cancel(&self) {
+        self.is_cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Writes a file on a thread of its own.
+    pub fn write(&self, topic: Topic, file: ExperimentFile, results: Arc<ExperimentResults>, path: PathBuf) {
+        let report = self.report.clone();
+        let write = move || {
+            let written = file.write(topic, &results, &path);
+            report.send(ExperimentEvent::Written(
+                written.map(|()| path).map_err(|error| error.to_string()),
+            ));
+        };
+        if let Err(error) = thread::Builder::new().name("experiment file".to_owned()).spawn(write) {
+            let reason = format!("No thread could be started to write the file: {error}");
+            self.report.send(ExperimentEvent::Written(Err(reason)));
+        }
+    }
+
+    /// The next event, if one has come.
+    pub fn next_event(&self) -> Option<ExperimentEvent> {
+        self.events.try_recv().ok()
+    }
+}
+
+impl Drop for ExperimentWorker {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
+
+impl fmt::Debug for ExperimentWorker {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ExperimentWorker").finish_non_exhaustive()
+    }
+}
+
+/// Tells the end when dropped, also by a panic.
+struct EndingReport {
+    report: Report,
+    result: Result<(), String>,
+}
+
+impl EndingReport {
+    fn replace(&mut self, result: Result<(), String>) {
+        self.result = result;
+    }
+}
+
+impl Drop for EndingReport {
+    fn drop(&mut self) {
+        let result = std::mem::replace(&mut self.result, Ok(()));
+        self.report.send(ExperimentEvent::Ended(result));
+    }
+}

@@ -1,0 +1,60 @@
+//! What stands around the table of an experiment, in words.
+
+use crate::{
+    evaluation::experiments::{Axis, CrossValidation, Experiment, ExperimentResults},
+    network::HiddenSuggestions,
+};
+
+/// How an experiment is carried out, for its reader.
+pub fn describe_conditions(experiment: &Experiment) -> String {
+    let base = &experiment.base;
+    let mut said = vec![base.training.method.name().to_owned()];
+    if !matches!(experiment.axis, Axis::Array(_)) {
+        said.push(base.sensor.scale.to_string());
+    }
+    if !matches!(experiment.axis, Axis::Hidden(_)) {
+        said.push(format!("{} hidden nodes", base.hidden));
+    }
+    said.push(format!("{} epochs", base.training.stopping.epochs));
+    said.push(match base.starts {
+        1 => "one start".to_owned(),
+        starts => format!("best of {starts} starts by validation error"),
+    });
+    said.push(match experiment.seeds {
+        1 => format!("seed {}", base.seed),
+        seeds => format!("{seeds} seeds from {}", base.seed),
+    });
+    said.push(match experiment.cross_validation {
+        None => format!(
+            "{} training samples, {} more for validation, {} for test",
+            base.samples, base.validation_samples, base.test_samples
+        ),
+        Some(CrossValidation { folds, repeats, unit }) => {
+            let validation = match folds {
+                2 => "nothing held out for validation",
+                _ => "of the folds not tested one is held out for validation",
+            };
+            format!("{folds} folds by {unit}, {validation}, {repeats} repeats")
+        }
+    });
+    let mut conditions = said.join(", ");
+    if matches!(experiment.axis, Axis::Hidden(_)) {
+        let scale = base.sensor.scale;
+        let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
+        let (root, logarithm) = (suggested.square_root, suggested.logarithm);
+        let (fewest, most) = (root.start(), root.end());
+        conditions += &format!(". Eq. (12) suggests {fewest} to {most} hidden nodes, Eq. (13) {logarithm}");
+    }
+    conditions
+}
+
+/// What could not be carried out, a sentence each.
+pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
+    let of_cell = |cell| {
+        let label = results.cell_labels(cell).join(", ");
+        cell.failures
+            .iter()
+            .map(move |failure| format!("Failed at {label}, {failure}"))
+    };
+    results.cells.iter().flat_map(of_cell).collect()
+}

@@ -1,0 +1,205 @@
+//! The paper's experiments and sweeps, set up, run, cancelled and taken away.
+
+use std::{fs, num::NonZero};
+
+use decoupler::{
+    app::{Phase, View},
+    evaluation::experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts},
+    export::ExperimentTable,
+};
+
+use crate::driver::Driver;
+
+fn open() -> Driver {
+    let mut driver = Driver::open();
+    driver.click_button("Experiments");
+    driver
+}
+
+/// Table 1 with two sizes, one seed and few epochs, typed in.
+fn tiny(driver: &mut Driver) -> Experiment {
+    driver.type_into("Hidden nodes", "2, 4");
+    driver.enter("Seeds", "1");
+    driver.enter("Epochs", "3");
+    driver.enter("Starts", "1");
+    let mut wanted = PaperTable::HiddenNodes.experiment();
+    wanted.axis = Axis::Hidden(vec![2, 4]);
+    (wanted.seeds, wanted.base.starts) = (1, 1);
+    wanted.base.training.stopping.epochs = 3;
+    let typed = driver.state().experiments.form().experiment();
+    assert_eq!(typed.as_ref(), Ok(&wanted), "typing the values gives the experiment");
+    wanted
+}
+
+fn run_to_the_end(driver: &mut Driver) {
+    driver.click("▶ Run");
+    driver.wait("the end of the experiment", |driver| {
+        driver.state().experiments.running.is_none()
+    });
+}
+
+/// What the library makes of `experiment` by itself.
+fn by_library(experiment: &Experiment) -> ExperimentResults {
+    let mut results = ExperimentResults::new(experiment.clone());
+    let record = |finished: decoupler::evaluation::experiments::Finished| {
+        results.record(finished.cell, finished.outcome);
+    };
+    run_experiments(
+        std::slice::from_ref(experiment),
+        NonZero::<usize>::MIN,
+        || false,
+        record,
+    )
+    .unwrap();
+    results
+}
+
+/// Columns that tell how long something took differ from run to run.
+const TIMES: [&str; 1] = ["training"];
+
+#[test]
+fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
+    let mut driver = open();
+    let experiment = tiny(&mut driver);
+    run_to_the_end(&mut driver);
+    assert!(driver.says("Table 1 finished: 2 trials"), "{:#?}", driver.texts());
+    let results = by_library(&experiment);
+    let table = ExperimentTable::new(&results);
+    let mut compared = 0;
+    for row in &table.rows {
+        for (heading, text) in table.headings.iter().zip(row).skip(1) {
+            if !TIMES.contains(heading) {
+                let shown = format!("{}, {heading}: {text}", row[0]);
+                assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
+                compared += 1;
+            }
+        }
+    }
+    assert_eq!(compared, 2 * 9, "nothing is published for these sizes");
+    for verdict in verdicts(&results) {
+        assert!(driver.has(verdict.claim), "{}", verdict.claim);
+        if !verdict.claim.contains("time") {
+            assert!(driver.has(&verdict.finding), "{}", verdict.finding);
+        }
+    }
+    driver.settle();
+
+    driver.click("Order by Z % median");
+    driver.click("Order by Z % median");
+    let sort = driver.state().experiments.sort;
+    assert!(sort.is_descending && sort.column.is_some());
+
+    assert!(!driver.is_enabled("Use these settings"), "no cell is marked");
+    driver.click("Cell 4");
+    driver.click("Use these settings");
+    assert_eq!(driver.state().view, View::Train);
+    assert_eq!(driver.state().draft, experiment.cells()[1].settings);
+    let z = results.cells[1].trials[0].errors.z_percent;
+    driver.click("▶ Train");
+    driver.wait("the end of the training", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_))
+    });
+    let trained = driver.state().result().unwrap().errors.z_percent;
+    assert_eq!(
+        trained.map(f64::to_bits),
+        z.map(f64::to_bits),
+        "training a cell again gives its network"
+    );
+}
+
+#[test]
+fn a_cancelled_experiment_keeps_what_is_finished() {
+    let mut driver = open();
+    tiny(&mut driver);
+    driver.enter("Seeds", "400");
+    driver.click("▶ Run");
+    driver.wait("a finished trial", |driver| {
+        driver
+            .state()
+            .experiments
+            .running
+            .is_some_and(|running| running.done >= 2)
+    });
+    assert!(!driver.is_enabled("▶ Run"), "one experiment at a time");
+    driver.click("■ Cancel");
+    driver.wait("the end of the experiment", |driver| {
+        driver.state().experiments.running.is_none()
+    });
+    let outcome = driver.state().experiments.outcome().unwrap();
+    let (done, all) = outcome.trials();
+    assert_eq!(all, 800);
+    assert!((2..800).contains(&done), "{done} trials");
+    assert!(driver.says(&format!("Table 1 ended early: {done} of 800 trials")));
+    driver.settle();
+    // The other experiments have nothing to show, and this one still has.
+    driver.click("Table 3");
+    assert!(driver.says("Press Run"));
+    driver.click("Table 1");
+    assert_eq!(driver.state().experiments.outcome().unwrap().trials().0, done);
+}
+
+#[test]
+fn lists_that_cannot_be_run_say_why_until_mended() {
+    let mut driver = open();
+    for (list, reason) in [
+        (
+            "6, eight",
+            "Hidden nodes: 'eight' is not a whole number; write a list such as 6, 8, 10, 12",
+        ),
+        ("0", "hidden nodes: 0 is not possible, give from 1 to 512"),
+        (" ", "there are no values for hidden nodes: give at least one"),
+    ] {
+        driver.type_into("Hidden nodes", list);
+        assert!(driver.has(reason), "{:#?}", driver.texts());
+        assert!(!driver.is_enabled("▶ Run"));
+    }
+    driver.click("Table 3");
+    driver.type_into("Array scales", "10x6");
+    assert!(driver.says("'10x6' is not an array scale"));
+    driver.click("Table 2");
+    driver.enter("Folds", "500");
+    assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
+    driver.click("Back to the paper's values");
+    assert!(driver.is_enabled("▶ Run"));
+    driver.click("Table 1");
+    driver.click("Back to the paper's values");
+    assert!(driver.is_enabled("▶ Run"));
+}
+
+#[test]
+fn a_sweep_is_shown_as_a_map_and_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open();
+    driver.click("Sweep");
+    driver.type_into("Values across", "2 3");
+    driver.type_into("Values down", "50 100");
+    driver.enter("Epochs", "3");
+    run_to_the_end(&mut driver);
+    let outcome = driver.state().experiments.outcome().unwrap();
+    let results = by_library(&outcome.results.experiment);
+    for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
+        let percent = decoupler::export::format_percent(cell.z_percent().map(|spread| spread.median));
+        let label = format!("{z}: median Z error {percent}");
+        assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
+    }
+    driver.settle();
+    for (button, name, expected) in [
+        ("CSV…", "cells.csv", "array,hidden,samples"),
+        ("Trials…", "trials.csv", "array,hidden,samples"),
+        ("Markdown…", "table.md", "## Sweep over two axes"),
+    ] {
+        let path = folder.path().join(name);
+        driver.click(button);
+        driver.type_into("File", &path.display().to_string());
+        driver.click_button("Save");
+        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.click("Dismiss");
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with(expected), "{text}");
+    }
+    let rows = fs::read_to_string(folder.path().join("cells.csv"))
+        .unwrap()
+        .lines()
+        .count();
+    assert_eq!(rows, 5, "a heading and four cells");
+}
