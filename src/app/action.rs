@@ -4,6 +4,9 @@ use super::{
     experiments::ExperimentAction,
     export_kind::ExportKind,
     file_task::FileTask,
+    paper_figure::PaperFigure,
+    runs::RunsAction,
+    shown_figure::ShownPicture,
     state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
 };
@@ -40,6 +43,10 @@ pub enum Action {
     ShowView(View),
     /// Do this in the Experiments view.
     Experiments(ExperimentAction),
+    /// Whether each decoupled node has an error bar.
+    ShowErrorBars(bool),
+    /// Train what this figure of the paper shows, unless it is there, and look at it so.
+    ShowPaperFigure(PaperFigure),
     /// Dark or light.
     SetDark(bool),
     /// Go on from the present weights with the method and the epochs of the settings.
@@ -52,8 +59,12 @@ pub enum Action {
     EditPath(String),
     /// Write the file.
     Export(ExportKind, PathBuf),
+    /// Write a picture in view as SVG or PNG, as the path ends.
+    ExportPicture(ShownPicture, PathBuf),
     /// Take up the training saved in this file.
     OpenCheckpoint(PathBuf),
+    /// Do this with the run list.
+    Runs(RunsAction),
     /// Close the question for a path.
     CancelSave,
     /// Close the notice.

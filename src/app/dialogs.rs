@@ -11,6 +11,7 @@ use std::{
 use rfd::FileHandle;
 
 use super::file_task::FileTask;
+use crate::export::figures::PictureFormat;
 
 /// An answer sooner than this was no person's: the desktop has no dialog to show.
 const NO_PERSON: Duration = Duration::from_millis(250);
@@ -71,9 +72,12 @@ impl Dialogs {
         if let Some(folder) = suggestion.parent() {
             dialog = dialog.set_directory(folder);
         }
+        if let FileTask::SavePicture(_) = task {
+            dialog = dialog.add_filter("SVG", &[PictureFormat::Svg.extension()]);
+        }
         let asked = Instant::now();
         let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match task {
-            FileTask::Save(_) | FileTask::SaveExperiment(..) => {
+            FileTask::Save(_) | FileTask::SaveExperiment(..) | FileTask::SavePicture(_) => {
                 if let Some(name) = suggestion.file_name() {
                     dialog = dialog.set_file_name(name.to_string_lossy());
                 }

@@ -93,17 +93,7 @@ impl ExportKind {
             Self::LossCurves => "loss",
             Self::Checkpoint => "training",
         };
-        let array = settings.sensor.scale.to_string().replace('×', "x");
-        let (hidden, method) = (settings.hidden, settings.training.method.short_name());
-        let starts = match settings.starts {
-            1 => String::new(),
-            starts => format!("-starts{starts}"),
-        };
-        format!(
-            "{what}-{array}-h{hidden}-{method}{starts}-seed{}.{}",
-            settings.seed,
-            self.extension()
-        )
+        file_name(what, self.extension(), settings)
     }
 
     /// Writes the file.
@@ -125,4 +115,18 @@ impl ExportKind {
         }
         Ok(())
     }
+}
+
+/// A name that tells the files of different runs apart: what the file holds, and of which run.
+pub fn file_name(what: &str, extension: &str, settings: &RunSettings) -> String {
+    let array = settings.sensor.scale.to_string().replace('×', "x");
+    let (hidden, method) = (settings.hidden, settings.training.method.short_name());
+    let starts = match settings.starts {
+        1 => String::new(),
+        starts => format!("-starts{starts}"),
+    };
+    format!(
+        "{what}-{array}-h{hidden}-{method}{starts}-seed{}.{}",
+        settings.seed, extension
+    )
 }

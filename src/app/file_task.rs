@@ -4,7 +4,9 @@ use super::{
     action::Action,
     experiments::{ExperimentAction, ExperimentFile, Topic},
     export_kind::ExportKind,
+    shown_figure::ShownPicture,
 };
+use crate::export::figures::PictureFormat;
 
 /// What is to be done with a file once its path is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +15,8 @@ pub enum FileTask {
     Save(ExportKind),
     /// Write it about the results of an experiment.
     SaveExperiment(Topic, ExperimentFile),
+    /// Write this picture in view to it.
+    SavePicture(ShownPicture),
     /// Go on from the training saved in it.
     OpenCheckpoint,
 }
@@ -21,7 +25,7 @@ impl FileTask {
     /// The word for it.
     pub fn verb(self) -> &'static str {
         match self {
-            Self::Save(_) | Self::SaveExperiment(..) => "Save",
+            Self::Save(_) | Self::SaveExperiment(..) | Self::SavePicture(_) => "Save",
             Self::OpenCheckpoint => "Open",
         }
     }
@@ -31,6 +35,8 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.file_kind(),
             Self::SaveExperiment(_, file) => file.file_kind(),
+            Self::SavePicture(ShownPicture::Surfaces) => "picture of the surfaces",
+            Self::SavePicture(ShownPicture::Chart) => "picture of the chart",
             Self::OpenCheckpoint => ExportKind::Checkpoint.file_kind(),
         }
     }
@@ -40,6 +46,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.extension(),
             Self::SaveExperiment(_, file) => file.extension(),
+            Self::SavePicture(_) => PictureFormat::Png.extension(),
             Self::OpenCheckpoint => ExportKind::Checkpoint.extension(),
         }
     }
@@ -49,6 +56,8 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.name(),
             Self::SaveExperiment(_, file) => file.name(),
+            Self::SavePicture(ShownPicture::Surfaces) => "Surfaces, PNG or SVG…",
+            Self::SavePicture(ShownPicture::Chart) => "Chart, PNG or SVG…",
             Self::OpenCheckpoint => "Open checkpoint…",
         }
     }
@@ -57,7 +66,7 @@ impl FileTask {
     pub fn path_name(self) -> String {
         let file = self.file_kind();
         match self {
-            Self::Save(_) | Self::SaveExperiment(..) => format!("Type a path for the {file}"),
+            Self::Save(_) | Self::SaveExperiment(..) | Self::SavePicture(_) => format!("Type a path for the {file}"),
             Self::OpenCheckpoint => format!("Type the path of a {file}"),
         }
     }
@@ -67,6 +76,13 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.description(),
             Self::SaveExperiment(_, file) => file.description(),
+            Self::SavePicture(ShownPicture::Surfaces) => {
+                "Actual and decoupled surface as they are in view, for print: on a light ground, as PNG or SVG as the name \
+                 ends."
+            }
+            Self::SavePicture(ShownPicture::Chart) => {
+                "The chart in view, for print: on a light ground, as PNG or SVG as the name ends."
+            }
             Self::OpenCheckpoint => {
                 "Takes up a training saved here or by train --checkpoint in a terminal, with its settings and its whole \
                  history, and holds it there; Resume goes on with the same bits."
@@ -78,6 +94,7 @@ impl FileTask {
     pub fn at(self, path: PathBuf) -> Action {
         match self {
             Self::Save(kind) => Action::Export(kind, path),
+            Self::SavePicture(picture) => Action::ExportPicture(picture, path),
             Self::SaveExperiment(topic, file) => ExperimentAction::Save(topic, file, path).into(),
             Self::OpenCheckpoint => Action::OpenCheckpoint(path),
         }

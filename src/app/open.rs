@@ -1,3 +1,4 @@
+use directories::ProjectDirs;
 use eframe::{NativeOptions, egui};
 use thiserror::Error;
 
@@ -47,6 +48,11 @@ pub fn open() -> Result<(), OpenError> {
     };
     let create = |creation: &eframe::CreationContext<'_>| {
         let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native)?;
+        // Systems without a home folder keep no runs, which the run list says.
+        let window = match ProjectDirs::from("", "", "decoupler") {
+            Some(folders) => window.keeping_runs(folders.data_dir().join("workspace.json")),
+            None => window,
+        };
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };
     // A library that is not there makes the window system panic, with the library's name.

@@ -4,14 +4,15 @@ use ndarray::Array2;
 
 use super::{
     experiments::ExperimentsState,
-    export_kind::ExportKind,
+    export_kind::{ExportKind, file_name},
     file_task::FileTask,
+    runs::RunsState,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
     worker::{Began, Progress},
 };
 use crate::{
-    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord, node_rms_mm},
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -22,6 +23,8 @@ pub struct State {
     pub view: View,
     /// The Experiments view.
     pub experiments: ExperimentsState,
+    /// The run list and the Compare view.
+    pub runs: RunsState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -50,6 +53,8 @@ pub enum View {
     Train,
     /// The paper's tables and sweeps.
     Experiments,
+    /// Two finished trainings side by side.
+    Compare,
 }
 
 /// What the worker is doing.
@@ -215,6 +220,8 @@ pub struct Look {
     pub tab: BottomTab,
     /// The node under the pointer.
     pub node: Option<usize>,
+    /// Whether each decoupled node has a bar that tells how far it is off in general.
+    pub has_error_bars: bool,
     /// Dark or light.
     pub is_dark: bool,
 }
@@ -252,6 +259,8 @@ pub struct Frames {
     pub actual: Frame,
     /// As the network finds it, and the difference (decoupled − actual).
     pub decoupled: Option<(Frame, Frame)>,
+    /// How far each node is off in general, where that is asked for: [`node_rms_mm`].
+    pub spread_mm: Option<Vec<f64>>,
 }
 
 /// Something to tell the user, once.
@@ -278,6 +287,7 @@ impl State {
         Self {
             view: View::default(),
             experiments: ExperimentsState::new(),
+            runs: RunsState::default(),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,
@@ -289,6 +299,7 @@ impl State {
                 right: RightCard::default(),
                 tab: BottomTab::default(),
                 node: None,
+                has_error_bars: false,
                 is_dark,
             },
             frames: Frames::default(),
@@ -348,7 +359,12 @@ impl State {
         let snapshot = self.look.snapshot.min(test.set.snapshots().saturating_sub(1));
         let actual = test.frame(&test.set.coordinates_mm, snapshot);
         let decoupled = self.result().map(|result| test.frame(&result.decoupled_mm, snapshot));
+        let spread_mm = self
+            .result()
+            .filter(|_| self.look.has_error_bars)
+            .map(|result| node_rms_mm(&test.set, &result.decoupled_mm));
         self.frames = Frames {
+            spread_mm,
             decoupled: decoupled.map(|decoupled| {
                 let error = error_frame(&actual, &decoupled);
                 (decoupled, error)
@@ -365,6 +381,7 @@ impl State {
         let name = match task {
             FileTask::Save(kind) => kind.file_name(settings),
             FileTask::SaveExperiment(topic, file) => ExperimentsState::file_name(topic, file),
+            FileTask::SavePicture(picture) => file_name(picture.file_word(self), task.extension(), settings),
             FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
         };
         std::env::current_dir().unwrap_or_default().join(name)
@@ -372,7 +389,7 @@ impl State {
 }
 
 /// Decoupled − actual: z of the nodes and of the grid.
-fn error_frame(actual: &Frame, decoupled: &Frame) -> Frame {
+pub(super) fn error_frame(actual: &Frame, decoupled: &Frame) -> Frame {
     let nodes = actual.nodes_mm.iter().zip(&decoupled.nodes_mm);
     let grid = actual.grid_mm.iter().zip(&decoupled.grid_mm);
     Frame {

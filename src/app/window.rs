@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
@@ -7,12 +7,14 @@ use super::{
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
     panels,
+    paper_figure::PaperFigure,
+    runs::{self, RunsAction, RunsRequest, RunsWorker},
     shortcuts::pressed_shortcuts,
-    state::{Notice, Phase, Preview, RunView, Saving, State, View},
+    state::{Notice, Phase, Preview, RightCard, RunView, Saving, State, View},
     theme::{self, Theme, space},
     worker::{Event, Request, Worker},
 };
-use crate::evaluation::RunSettings;
+use crate::{evaluation::RunSettings, training::StopReason};
 
 /// The window: its state, the worker, and the one place where actions are applied.
 #[derive(Debug)]
@@ -20,6 +22,7 @@ pub struct DecouplerWindow {
     state: State,
     worker: Worker,
     experiments: ExperimentWorker,
+    runs: RunsWorker,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -39,11 +42,23 @@ impl DecouplerWindow {
                 let ctx = ctx.clone();
                 ExperimentWorker::new(move || ctx.request_repaint())
             },
+            runs: {
+                let ctx = ctx.clone();
+                RunsWorker::start(move || ctx.request_repaint())?
+            },
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
         window.ask_for_what_is_missing();
         Ok(window)
+    }
+
+    /// Takes up the run list in `path`, and keeps finished trainings there from now on. Without it they are gone when the
+    /// window closes.
+    #[must_use]
+    pub fn keeping_runs(self, path: PathBuf) -> Self {
+        self.runs.ask(RunsRequest::Load(path));
+        self
     }
 
     /// What the panels read.
@@ -68,6 +83,7 @@ impl DecouplerWindow {
             }
         }
         experiments::take_news(&mut self.state, &self.experiments);
+        runs::take_news(&mut self.state, &self.runs);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -151,6 +167,8 @@ impl DecouplerWindow {
                 }
                 state.refresh_frames();
             }
+            Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
+            Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
             Event::Exported(Ok(path)) => {
                 state.typed = None;
                 state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
@@ -203,6 +221,11 @@ impl DecouplerWindow {
             Action::SetRightCard(right) => state.look.right = right,
             Action::HoverNode(node) => state.look.node = node,
             Action::ShowTab(tab) => state.look.tab = tab,
+            Action::ShowErrorBars(has_error_bars) => {
+                state.look.has_error_bars = has_error_bars;
+                state.refresh_frames();
+            }
+            Action::ShowPaperFigure(figure) => self.show_paper_figure(figure),
             Action::SetDark(is_dark) => {
                 state.look.is_dark = is_dark;
                 theme::apply(&self.ctx, is_dark);
@@ -231,6 +254,19 @@ impl DecouplerWindow {
             }
             Action::ShowView(view) => state.view = view,
             Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
+            Action::ExportPicture(picture, path) => {
+                state.typed = state.saving.take();
+                if let Some(picture) = picture.of(state) {
+                    self.runs.ask(RunsRequest::Write(Box::new(picture), path));
+                }
+            }
+            Action::Runs(RunsAction::TakeSettings(id)) => {
+                if let Some(settings) = state.runs.run(id).map(|run| run.file.settings) {
+                    state.view = View::Train;
+                    self.configure(settings);
+                }
+            }
+            Action::Runs(action) => runs::apply(action, state, &self.runs),
             Action::OpenCheckpoint(path) => {
                 state.typed = state.saving.take();
                 // A training may have begun while the desktop's dialog was open.
@@ -251,6 +287,27 @@ impl DecouplerWindow {
                 }
                 Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
             },
+        }
+    }
+
+    /// Looks at a figure of the paper, and trains what it shows unless that is there.
+    fn show_paper_figure(&mut self, figure: PaperFigure) {
+        // A training may have begun since the button was drawn.
+        if self.state.phase.is_busy() {
+            return;
+        }
+        let settings = figure.settings();
+        self.configure(settings);
+        let look = &mut self.state.look;
+        look.right = RightCard::Decoupled;
+        look.mode = figure.mode().unwrap_or(look.mode);
+        look.tab = figure.tab().unwrap_or(look.tab);
+        let is_complete = |run: &RunView| {
+            let was_stopped = run.stop_reason == Some(StopReason::Stopped);
+            run.asked == settings && run.stop_reason.is_some() && !was_stopped
+        };
+        if !self.state.shown_run().is_some_and(is_complete) {
+            self.apply(Action::Train);
         }
     }
 
@@ -285,10 +342,10 @@ impl DecouplerWindow {
     pub fn show_ui(&mut self, ui: &mut Ui) {
         let state = &self.state;
         let is_training_view = state.view == View::Train;
-        let mut actions = if is_training_view {
-            pressed_shortcuts(ui.ctx(), state)
-        } else {
-            experiments::pressed_shortcuts(ui.ctx(), state)
+        let mut actions = match state.view {
+            View::Train => pressed_shortcuts(ui.ctx(), state),
+            View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
+            View::Compare => Vec::new(),
         };
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
@@ -310,21 +367,20 @@ impl DecouplerWindow {
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| {
-                if is_training_view {
-                    panels::status_line_ui(ui, state);
-                } else {
-                    experiments::status_ui(ui, &state.experiments);
-                }
+                match state.view {
+                    View::Train | View::Compare => panels::status_line_ui(ui, state),
+                    View::Experiments => experiments::status_ui(ui, &state.experiments),
+                };
             });
         Panel::left("configuration")
             .exact_size(left)
             .resizable(false)
             .frame(panel(side))
             .show(ui, |ui| {
-                actions.extend(if is_training_view {
-                    panels::configuration_ui(ui, state)
-                } else {
-                    experiments::form_ui(ui, state)
+                actions.extend(match state.view {
+                    View::Train => panels::configuration_ui(ui, state),
+                    View::Experiments => experiments::form_ui(ui, state),
+                    View::Compare => runs::run_list_ui(ui, state),
                 });
             });
         if has_report_beside && is_training_view {
@@ -337,10 +393,10 @@ impl DecouplerWindow {
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         egui::CentralPanel::default().frame(background).show(ui, |ui| {
             actions.extend(panels::notice_ui(ui, state));
-            actions.extend(if is_training_view {
-                panels::workbench_ui(ui, state, layout)
-            } else {
-                experiments::experiments_ui(ui, state)
+            actions.extend(match state.view {
+                View::Train => panels::workbench_ui(ui, state, layout),
+                View::Experiments => experiments::experiments_ui(ui, state),
+                View::Compare => runs::compare_ui(ui, state),
             });
         });
         actions.extend(panels::save_form_ui(ui, state));

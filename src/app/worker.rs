@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
-    export::CheckpointFile,
+    export::{CheckpointFile, NetworkFile},
     training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainingSettings},
 };
 
@@ -72,6 +72,8 @@ pub enum Event {
     Continued(Result<Box<RunSettings>, String>),
     /// News of the training.
     Progressed(Box<Progress>),
+    /// The training on show has ended: what is to be kept of it, or why nothing can be.
+    Finished(Result<Box<NetworkFile>, String>),
     /// A file was written, or why not.
     Exported(Result<PathBuf, String>),
 }
@@ -210,6 +212,8 @@ struct Labour {
     report: Report,
     run: Option<Run>,
     is_paused: bool,
+    /// Whether the window was told what is to be kept of the run.
+    is_kept: bool,
     /// Time spent in training, all starts side by side.
     elapsed: Duration,
     /// The start last reported, and how many of its epochs.
@@ -224,6 +228,7 @@ impl Labour {
             report,
             run: None,
             is_paused: false,
+            is_kept: false,
             elapsed: Duration::ZERO,
             reported: (0, 0),
             next_report: Instant::now(),
@@ -303,6 +308,8 @@ impl Labour {
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
     fn begin(&mut self, run: Run, is_paused: bool, event: Event) {
         self.elapsed = run.leader().elapsed();
+        // What had ended before it was saved was kept when it ended.
+        self.is_kept = run.stop_reason().is_some();
         self.run = Some(run);
         self.is_paused = is_paused;
         self.reported = (0, 0);
@@ -319,7 +326,7 @@ impl Labour {
         let has_failed = continued.is_err();
         self.report.send(Event::Continued(continued.map(Box::new)));
         if !has_failed {
-            self.is_paused = false;
+            (self.is_paused, self.is_kept) = (false, false);
             self.report_progress();
         }
     }
@@ -373,6 +380,23 @@ impl Labour {
         self.reported = (number, trainer.history().len());
         // A large test set takes long to decouple; let it take at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
+        self.report_finished();
+    }
+
+    /// Hands over, once, what is to be kept of a run that has ended.
+    fn report_finished(&mut self) {
+        let Some(run) = self.run.as_ref().filter(|run| run.stop_reason().is_some()) else {
+            return;
+        };
+        if std::mem::replace(&mut self.is_kept, true) {
+            return;
+        }
+        let file = NetworkFile::from_run(run);
+        let finished = match file.flaw() {
+            Some(flaw) => Err(format!("This training is not kept in the run list: {flaw}")),
+            None => Ok(Box::new(file)),
+        };
+        self.report.send(Event::Finished(finished));
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod errors;
 pub mod experiments;
+mod node_spread;
 mod published;
 mod run;
 mod run_error;
@@ -12,6 +13,7 @@ mod starts;
 mod table;
 
 pub use errors::{Errors, NodeAddress};
+pub use node_spread::node_rms_mm;
 pub use published::{PublishedErrors, published_errors};
 pub use run::{Baselines, Run};
 pub use run_error::RunError;

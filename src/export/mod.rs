@@ -4,8 +4,8 @@
 mod atomic;
 mod checkpoint_file;
 mod experiment_tables;
-pub mod figures;
 mod experiment_words;
+pub mod figures;
 mod format;
 mod heading;
 mod network_file;
@@ -14,6 +14,7 @@ mod soundness;
 mod tables;
 pub(crate) mod ticks;
 mod unfinished;
+mod workspace_file;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
@@ -24,3 +25,4 @@ pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
 pub use samples::{write_coordinates_header, write_numbers, write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
 pub use unfinished::exit_leaving_nothing;
+pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

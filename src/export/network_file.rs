@@ -4,6 +4,7 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
+use serde_json::value::{RawValue, to_raw_value};
 use thiserror::Error;
 
 use super::{
@@ -201,7 +202,20 @@ impl NetworkFile {
         Self::parse(path, &bytes)
     }
 
-    fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
+    /// What is wrong with it, so that it could not be read back, if anything is.
+    pub fn flaw(&self) -> Option<String> {
+        flaw(self)
+    }
+
+    /// The contents of the file, for a file that holds several; or what is wrong with it.
+    pub(super) fn to_raw(&self) -> Result<Box<RawValue>, String> {
+        match flaw(self) {
+            Some(flaw) => Err(flaw),
+            None => to_raw_value(&self.document()).map_err(|error| error.to_string()),
+        }
+    }
+
+    pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
         let path = || path.to_owned();
         let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
             NoHeading::NotJson(reason) => NetworkFileError::NotJson { path: path(), reason },

@@ -40,7 +40,7 @@ pub fn error_histogram_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64
 }
 
 /// Counts in [`BINS`] bins symmetric about 0, and the width of a bin.
-fn histogram(errors: &[f64]) -> ([usize; BINS], f64) {
+pub fn histogram(errors: &[f64]) -> ([usize; BINS], f64) {
     let finite = || errors.iter().copied().filter(|error| error.is_finite());
     let largest = finite()
         .fold(0.0_f64, |largest, error| largest.max(error.abs()))

@@ -11,11 +11,13 @@ mod strip;
 mod test_pairs;
 mod training_state;
 
-pub use error_histogram::error_histogram_ui;
+pub use error_histogram::{error_histogram_ui, histogram};
 pub use legend::{Key, Mark, legend_ui, legend_width};
 pub use loss::{loss_keys, loss_ui};
 pub use nodes::{nodes_keys, nodes_ui};
+pub use plot_style::thinned;
 pub use regression::{regression_keys, regression_ui};
 pub use stages::parameter_name;
 pub use strip::{StripChart, strip_ui};
+pub use test_pairs::z_pairs_mm;
 pub use training_state::{training_state_keys, training_state_ui};

@@ -1,5 +1,5 @@
-use eframe::egui::Ui;
-use egui_plot::{GridInput, GridMark, MarkerShape, PlotPoints, Points};
+use eframe::egui::{Color32, Stroke, Ui};
+use egui_plot::{BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, MarkerShape, PlotPoints, Points};
 use glam::DVec3;
 
 use super::{
@@ -48,10 +48,28 @@ pub fn nodes_ui(ui: &mut Ui, frames: &Frames, nodes_per_row: usize) {
                 .filled(false);
             plot_ui.points(actual.radius(ACTUAL_RADIUS).color(palette.dim));
             if let Some((decoupled, _)) = &frames.decoupled {
+                if let Some(spread_mm) = &frames.spread_mm {
+                    plot_ui.box_plot(error_bars(&decoupled.nodes_mm, spread_mm, palette.accent));
+                }
                 let discs = Points::new("decoupled", heights(&decoupled.nodes_mm)).shape(MarkerShape::Circle);
                 plot_ui.points(discs.radius(DECOUPLED_RADIUS).color(palette.accent));
             }
         });
+}
+
+/// A bar of ± the spread through each node.
+fn error_bars(nodes_mm: &[DVec3], spread_mm: &[f64], colour: Color32) -> BoxPlot {
+    const CAP: f64 = 0.5;
+    let bar = |(node, (position, spread)): (usize, (&DVec3, &f64))| {
+        let z = position.z;
+        BoxElem::new((node + 1) as f64, BoxSpread::new(z - spread, z, z, z, z + spread))
+            .whisker_width(CAP)
+            .box_width(0.0)
+            .fill(colour)
+            .stroke(Stroke::new(1.0, colour.gamma_multiply(0.7)))
+    };
+    let bars = nodes_mm.iter().zip(spread_mm).enumerate().map(bar);
+    BoxPlot::new("spread", bars.collect()).color(colour).allow_hover(false)
 }
 
 /// A mark at the last node of a row, of every row or of every so many.

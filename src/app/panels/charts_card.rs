@@ -38,6 +38,13 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     }
     match (state.look.tab, trained(state)) {
         (BottomTab::Nodes, _) => {
+            if state.result().is_some() {
+                let mut has_bars = state.look.has_error_bars;
+                let hint = "± the root mean square error of each node over all snapshots of the test set";
+                if ui.checkbox(&mut has_bars, "Error bars").on_hover_text(hint).changed() {
+                    actions.push(Action::ShowErrorBars(has_bars));
+                }
+            }
             let nodes_per_row = state.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
             charts::nodes_ui(ui, &state.frames, nodes_per_row);
         }

@@ -7,8 +7,9 @@ use super::{
 use crate::{
     app::{
         action::Action,
+        paper_figure::PaperFigure,
         state::{Phase, State},
-        theme::{Theme, scrolled_ui, section_heading_ui, slider_style, space, type_size},
+        theme::{Theme, ghost_button, scrolled_ui, section_heading_ui, slider_style, space, type_size},
     },
     dataset::LARGEST_SAMPLES,
     evaluation::{MOST_STARTS, RunSettings},
@@ -19,8 +20,12 @@ use crate::{
 /// The settings of the next training, in the order of the pipeline.
 pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut draft = state.draft;
+    let mut actions = Vec::new();
     scrolled_ui(ui, "configuration", |ui| {
         let is_busy = state.phase.is_busy();
+        ui.add_enabled_ui(!is_busy && state.phase != Phase::Died, |ui| {
+            paper_section_ui(ui, &mut actions)
+        });
         ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);
             scene_section_ui(ui, &mut draft);
@@ -43,11 +48,26 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             ui.add_space(space(4));
         });
     });
-    if draft == state.draft {
-        Vec::new()
-    } else {
-        vec![Action::Configure(Box::new(draft))]
+    if draft != state.draft {
+        actions.push(Action::Configure(Box::new(draft)));
     }
+    actions
+}
+
+/// The paper's figures of single networks, one click each.
+fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+    section_heading_ui(ui, "The paper's figures");
+    let gap = ui.spacing().item_spacing.x;
+    let count = PaperFigure::ALL.len() as f32;
+    let width = ((ui.available_width() - gap * (count - 1.0)) / count).floor();
+    ui.horizontal(|ui| {
+        for figure in PaperFigure::ALL {
+            let button = ghost_button(Theme::of(ui), figure.name()).min_size([width, space(7)].into());
+            if ui.add(button).on_hover_text(figure.description()).clicked() {
+                actions.push(Action::ShowPaperFigure(figure));
+            }
+        }
+    });
 }
 
 fn scene_section_ui(ui: &mut Ui, draft: &mut RunSettings) {

@@ -19,5 +19,7 @@ pub use notice::notice_ui;
 pub use report::report_ui;
 pub use save_form::save_form_ui;
 pub use status_line::status_line_ui;
+pub(super) use surfaces::symmetric_range_mm;
+pub(super) use table::{Column, Row, table_ui};
 pub use top_bar::top_bar_ui;
 pub use workbench::{WorkbenchLayout, workbench_ui};

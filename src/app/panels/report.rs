@@ -11,6 +11,7 @@ use crate::{
         action::Action,
         export_kind::ExportKind,
         file_task::FileTask,
+        shown_figure::ShownPicture,
         state::{Phase, RunResult, RunView, State},
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
@@ -40,6 +41,11 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             let is_standing = kind != ExportKind::Checkpoint || matches!(state.phase, Phase::Paused | Phase::Ended(_));
             let can_save = shown.is_some() && is_standing;
             ui.add_enabled_ui(can_save, |ui| file_ui(ui, FileTask::Save(kind), &mut actions));
+        }
+        for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
+            ui.add_enabled_ui(shown.is_some(), |ui| {
+                file_ui(ui, FileTask::SavePicture(picture), &mut actions)
+            });
         }
         section_heading_ui(ui, "Open");
         let can_open = !state.phase.is_busy() && state.phase != Phase::Died;

@@ -123,7 +123,7 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
 }
 
 /// ± the largest error of a node, so that zero keeps its colour.
-fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
+pub fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
     let largest = error
         .nodes_mm
         .iter()

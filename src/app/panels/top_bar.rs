@@ -4,6 +4,7 @@ use eframe::egui::{
 
 use crate::app::{
     action::Action,
+    runs::RunsAction,
     state::{Phase, State, View},
     theme::{Theme, ghost_button, primary_button, segmented_ui, semibold, space, type_size},
 };
@@ -16,19 +17,30 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         mark_ui(ui);
         ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
         ui.add_space(space(4));
-        let views = [(View::Train, "Train"), (View::Experiments, "Experiments")];
+        let views = [
+            (View::Train, "Train"),
+            (View::Experiments, "Experiments"),
+            (View::Compare, "Compare"),
+        ];
         if let Some(view) = segmented_ui(ui, "View", &views, state.view, false) {
             actions.push(Action::ShowView(view));
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add_space(space(1));
             theme_ui(ui, state, &mut actions);
-            if state.view == View::Experiments {
-                return;
+            match state.view {
+                View::Train => {
+                    run_buttons_ui(ui, state, &mut actions);
+                    ui.add_space(space(4));
+                    let snapshots = state.test().map_or(0, |test| test.set.snapshots());
+                    actions.extend(snapshot_ui(ui, state.look.snapshot, snapshots).map(Action::ShowSnapshot));
+                }
+                View::Experiments => {}
+                View::Compare => {
+                    let picked = snapshot_ui(ui, state.runs.snapshot, state.runs.snapshots());
+                    actions.extend(picked.map(|snapshot| RunsAction::ShowSnapshot(snapshot).into()));
+                }
             }
-            run_buttons_ui(ui, state, &mut actions);
-            ui.add_space(space(4));
-            snapshot_ui(ui, state, &mut actions);
         });
     });
     actions
@@ -107,16 +119,16 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     }
 }
 
-fn snapshot_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let snapshots = state.test().map_or(0, |test| test.set.snapshots());
-    let shown = state.look.snapshot;
+/// The number of the snapshot on show, and arrows to its neighbours; returns the one picked.
+fn snapshot_ui(ui: &mut Ui, shown: usize, snapshots: usize) -> Option<usize> {
+    let mut picked = None;
     // Right to left: next, number, previous.
     let next = ui.add_enabled(shown + 1 < snapshots, arrow_button("›"));
     if name(next, "Next snapshot")
         .on_hover_text("Next snapshot of the test set (Page down)")
         .clicked()
     {
-        actions.push(Action::ShowSnapshot(shown + 1));
+        picked = Some(shown + 1);
     }
     let number = if snapshots == 0 {
         "–".to_owned()
@@ -129,9 +141,10 @@ fn snapshot_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         .on_hover_text("Previous snapshot of the test set (Page up)")
         .clicked()
     {
-        actions.push(Action::ShowSnapshot(shown - 1));
+        picked = Some(shown - 1);
     }
     ui.label(RichText::new("Test snapshot").color(Theme::of(ui).palette.dim));
+    picked
 }
 
 fn arrow_button(text: &str) -> Button<'_> {

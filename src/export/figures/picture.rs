@@ -1,6 +1,6 @@
 use std::{
     io,
-    path::Path,
+    path::{Path, PathBuf},
     sync::{Arc, OnceLock},
 };
 
@@ -40,9 +40,25 @@ pub enum PictureError {
     /// The pixels cannot be made.
     #[error("the picture cannot be drawn in pixels: {0}; save it as SVG instead")]
     Pixels(String),
+    /// A name that tells no format.
+    #[error("cannot write '{}': give a name that ends in .png or .svg", .0.display())]
+    Name(PathBuf),
     /// The file.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl PictureFormat {
+    /// As the name of the file ends.
+    ///
+    /// # Errors
+    /// It ends neither in .svg nor in .png.
+    pub fn of_path(path: &Path) -> Result<Self, PictureError> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let formats = [Self::Svg, Self::Png].into_iter();
+        let mut named = formats.filter(|format| format.extension() == extension);
+        named.next().ok_or_else(|| PictureError::Name(path.to_owned()))
+    }
 }
 
 /// What journals ask for at least.

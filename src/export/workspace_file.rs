@@ -1,0 +1,237 @@
+use std::{
+    collections::HashSet,
+    fs, io,
+    io::Write as _,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+use thiserror::Error;
+
+use super::{
+    NetworkFile, WriteError, atomic_write,
+    heading::{Heading, NoHeading},
+    network_file::PROGRAM,
+};
+
+const FORMAT: &str = "decoupler workspace";
+const VERSION: u64 = 1;
+
+/// What is kept from session to session: the finished trainings, and which two are compared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Workspace {
+    /// In the order in which they were finished.
+    pub runs: Vec<KeptRun>,
+    /// [`KeptRun::id`] of the two.
+    pub pinned: [Option<u64>; 2],
+}
+
+/// A finished training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeptRun {
+    /// No other run of the workspace has it.
+    pub id: u64,
+    /// What the user calls it.
+    pub name: String,
+    /// Settings, network, training record and errors.
+    pub file: Arc<NetworkFile>,
+}
+
+/// A workspace as it was found.
+#[derive(Debug)]
+pub struct FoundWorkspace {
+    /// What could be read.
+    pub workspace: Workspace,
+    /// What could not, and where it is kept; in a sentence.
+    pub warning: Option<String>,
+}
+
+/// Why a workspace cannot be taken up. The file is left as it is then, and must not be written.
+#[derive(Debug, Error)]
+pub enum WorkspaceError {
+    /// The system refuses to read it.
+    #[error("cannot read the run list '{}': {source}; runs of this session are not kept", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A newer program wrote it.
+    #[error("the run list '{}' is of {program}, which is newer than this program: update it; until then runs are not kept", .path.display())]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Who wrote it.
+        program: String,
+    },
+    /// It is damaged, and a copy cannot be put aside.
+    #[error("the run list '{}' is damaged ({flaw}) and cannot be put aside: {source}; runs of this session are not kept", .path.display())]
+    Aside {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        flaw: String,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    format: String,
+    version: u64,
+    program: String,
+    runs: Vec<RunDocument>,
+    pinned: [Option<u64>; 2],
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunDocument {
+    id: u64,
+    name: String,
+    network: Box<RawValue>,
+}
+
+impl KeptRun {
+    fn document(&self) -> Result<RunDocument, String> {
+        Ok(RunDocument {
+            id: self.id,
+            name: self.name.clone(),
+            network: self.file.to_raw()?,
+        })
+    }
+}
+
+impl Workspace {
+    /// Writes the file whole or not at all; its folder is made if it is not there. Runs that could not be read back are
+    /// left out.
+    ///
+    /// # Errors
+    /// The path cannot be written; the old file, if there was one, is untouched then.
+    pub fn save(&self, path: &Path) -> Result<(), WriteError> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|source| WriteError::io(folder, source))?;
+        }
+        let document = Document {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            program: PROGRAM.to_owned(),
+            runs: self.runs.iter().filter_map(|run| run.document().ok()).collect(),
+            pinned: self.pinned,
+        };
+        atomic_write(path, |writer| {
+            serde_json::to_writer(&mut *writer, &document)?;
+            writeln!(writer)
+        })
+    }
+
+    /// Takes up the workspace at `path`; an empty one where there is no file. A damaged file, or one with damaged runs,
+    /// is put aside beside its place, and what can be read is taken up.
+    ///
+    /// # Errors
+    /// The file can be neither read nor put aside.
+    pub fn load(path: &Path) -> Result<FoundWorkspace, WorkspaceError> {
+        let bytes = match fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(missing) if missing.kind() == io::ErrorKind::NotFound => {
+                return Ok(FoundWorkspace {
+                    workspace: Self::default(),
+                    warning: None,
+                });
+            }
+            Err(source) => {
+                let path = path.to_owned();
+                return Err(WorkspaceError::Read { path, source });
+            }
+        };
+        if let Ok(heading) = Heading::read(&bytes)
+            && heading.format == FORMAT
+            && let Some(version) = heading.newer_than(VERSION)
+        {
+            return Err(WorkspaceError::Newer {
+                path: path.to_owned(),
+                program: format!("{}, file version {version}", heading.program()),
+            });
+        }
+        let (workspace, flaw) = match Self::parse(path, &bytes) {
+            Ok((workspace, flaws)) => (workspace, flaws.first().cloned()),
+            Err(flaw) => (Self::default(), Some(flaw)),
+        };
+        let Some(flaw) = flaw else {
+            return Ok(FoundWorkspace {
+                workspace,
+                warning: None,
+            });
+        };
+        let aside = put_aside(path, &bytes).map_err(|source| WorkspaceError::Aside {
+            path: path.to_owned(),
+            flaw: flaw.clone(),
+            source,
+        })?;
+        let kept = match workspace.runs.len() {
+            0 => "a new list was begun".to_owned(),
+            1 => "one run could be read".to_owned(),
+            count => format!("{count} runs could be read"),
+        };
+        let (path, aside) = (path.display(), aside.display());
+        Ok(FoundWorkspace {
+            workspace,
+            warning: Some(format!(
+                "The run list '{path}' is damaged ({flaw}): {kept}, and the damaged file is kept as '{aside}'."
+            )),
+        })
+    }
+
+    /// The runs that can be read, and what is wrong with the others.
+    fn parse(path: &Path, bytes: &[u8]) -> Result<(Self, Vec<String>), String> {
+        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
+            NoHeading::NotJson(reason) => reason,
+            NoHeading::CutOff { line, column } => format!("it ends after line {line}, column {column}"),
+            NoHeading::Other => "it is not a run list".to_owned(),
+        })?;
+        if heading.format != FORMAT {
+            return Err("it is not a run list".to_owned());
+        }
+        let document: Document = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+        let mut ids = HashSet::new();
+        let (mut runs, mut flaws) = (Vec::new(), Vec::new());
+        for run in document.runs {
+            let read = NetworkFile::parse(path, run.network.get().as_bytes());
+            match read {
+                Err(_) => flaws.push(format!("run '{}' cannot be read", run.name)),
+                Ok(_) if !ids.insert(run.id) => flaws.push(format!("two runs have the number {}", run.id)),
+                Ok(file) => runs.push(KeptRun {
+                    id: run.id,
+                    name: run.name,
+                    file: Arc::new(file),
+                }),
+            }
+        }
+        let pinned = document.pinned.map(|id| id.filter(|id| ids.contains(id)));
+        Ok((Self { runs, pinned }, flaws))
+    }
+}
+
+/// Copies the file beside its place, under a name that is not taken yet.
+fn put_aside(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
+    let mut number = 1;
+    loop {
+        let mut name = path.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".damaged-{number}"));
+        let aside = path.with_file_name(name);
+        match fs::File::create_new(&aside) {
+            Ok(mut file) => {
+                file.write_all(bytes)?;
+                file.sync_all()?;
+                return Ok(aside);
+            }
+            Err(taken) if taken.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
