@@ -1,6 +1,12 @@
 //! The window without a display, worked by what is written on it.
 
-use std::{cell::RefCell, rc::Rc, thread, time::Duration};
+use std::{
+    cell::RefCell,
+    path::{Path, PathBuf},
+    rc::Rc,
+    thread,
+    time::Duration,
+};
 
 use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
 use decoupler::evaluation::{Run, RunSettings, error_rows};
@@ -32,11 +38,25 @@ impl Driver {
 
     /// The window of `size` points, with the first surface drawn.
     pub(crate) fn open_sized(size: Vec2) -> Self {
+        Self::open_with(size, None)
+    }
+
+    /// The window that keeps its runs in a file.
+    pub(crate) fn open_keeping(path: &Path) -> Self {
+        Self::open_with(vec2(1440.0, 900.0), Some(path.to_owned()))
+    }
+
+    fn open_with(size: Vec2, runs: Option<PathBuf>) -> Self {
         let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
         let place = Rc::clone(&made);
         // Before the first frame, as the real window does, so that its fonts are there.
         let set_up = move |ctx: &Context| {
-            *place.borrow_mut() = Some(DecouplerWindow::new(ctx, DialogKind::None).unwrap());
+            let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
+            let window = match runs {
+                Some(path) => window.keeping_runs(path),
+                None => window,
+            };
+            *place.borrow_mut() = Some(window);
         };
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {
             let window = window.get_or_insert_with(|| made.take().unwrap());

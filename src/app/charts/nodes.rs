@@ -11,7 +11,7 @@ use crate::app::{
     theme::{Palette, Theme},
 };
 
-const ACTUAL_RADIUS: f32 = 3.5;
+const ACTUAL_RADIUS: f32 = 4.5;
 const DECOUPLED_RADIUS: f32 = 2.5;
 
 /// What is in the chart: nothing decoupled before a training.

@@ -24,6 +24,9 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             if let Some(tab) = tabs_ui(ui, "Charts", &TABS, state.look.tab) {
                 actions.push(Action::ShowTab(tab));
             }
+            if state.look.tab == BottomTab::Nodes && state.result().is_some() {
+                error_bars_ui(ui, state, &mut actions);
+            }
             let spare = ui.available_width() - ui.spacing().item_spacing.x - charts::legend_width(ui, &keys);
             let has_room = spare >= space(3);
             if has_room {
@@ -38,13 +41,6 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     }
     match (state.look.tab, trained(state)) {
         (BottomTab::Nodes, _) => {
-            if state.result().is_some() {
-                let mut has_bars = state.look.has_error_bars;
-                let hint = "± the root mean square error of each node over all snapshots of the test set";
-                if ui.checkbox(&mut has_bars, "Error bars").on_hover_text(hint).changed() {
-                    actions.push(Action::ShowErrorBars(has_bars));
-                }
-            }
             let nodes_per_row = state.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
             charts::nodes_ui(ui, &state.frames, nodes_per_row);
         }
@@ -61,6 +57,17 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         }
     }
     actions
+}
+
+/// Whether the nodes have error bars.
+fn error_bars_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+    ui.add_space(space(3));
+    let mut has_bars = state.look.has_error_bars;
+    let hint = "± the root mean square error of each node over all snapshots of the test set";
+    let checkbox = ui.checkbox(&mut has_bars, "Error bars").on_hover_text(hint);
+    if checkbox.changed() {
+        actions.push(Action::ShowErrorBars(has_bars));
+    }
 }
 
 fn trained(state: &State) -> Option<(&RunView, &RunResult)> {

@@ -1,0 +1,222 @@
+//! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
+
+use std::{fs, path::Path};
+
+use decoupler::{
+    app::{BottomTab, Phase, View, surface_view::ViewMode},
+    export::{NetworkFile, format_number},
+};
+use eframe::egui::Key;
+
+use crate::driver::{Driver, small, trained};
+
+const FIRST: &str = "10×6_3×18 h6 lm";
+const SECOND: &str = "10×6_3×18 h4 lm";
+
+fn kept(driver: &Driver) -> usize {
+    driver.state().runs.workspace.runs.len()
+}
+
+fn train_and_keep(driver: &mut Driver, count: usize) {
+    driver.train();
+    driver.wait("the run in the list", |driver| kept(driver) == count);
+}
+
+fn trained_twice(driver: &mut Driver) {
+    driver.configure_small();
+    train_and_keep(driver, 1);
+    driver.enter("Hidden nodes", "4");
+    train_and_keep(driver, 2);
+    driver.click_button("Compare");
+}
+
+fn wait_for_both(driver: &mut Driver) {
+    driver.wait("both surfaces", |driver| {
+        driver.state().runs.compared.iter().all(Option::is_some)
+    });
+}
+
+/// Waits until the file in which runs are kept was read.
+fn wait_for_file(driver: &mut Driver) {
+    driver.wait("the file", |driver| driver.state().runs.path.is_some());
+}
+
+#[test]
+fn two_runs_are_compared_and_survive_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("data").join("workspace.json");
+    let mut driver = Driver::open_keeping(&path);
+    trained_twice(&mut driver);
+    driver.click(&format!("{FIRST} as A"));
+    driver.click(&format!("{SECOND} as B"));
+    wait_for_both(&mut driver);
+    driver.enter("Name of run 1", "Six hidden nodes");
+    assert!(driver.has("Six hidden nodes as A"), "{:#?}", driver.texts());
+
+    let settings = [6, 4].map(|hidden| decoupler::evaluation::RunSettings { hidden, ..small() });
+    let runs = settings.map(trained);
+    let shown = runs.each_ref().map(NetworkFile::from_run);
+    let check = |driver: &Driver| {
+        let [a, b] = shown.each_ref().map(|file| file.errors);
+        for (letter, errors) in [("A", a), ("B", b)] {
+            let cell = format!("Z error, %, {letter}: {}", format_number(errors.z_percent));
+            assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
+            let cell = format!("worst node, mm, {letter}: {}", format_number(errors.worst_mm));
+            assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
+        }
+        assert!(driver.has("Surface of A") && driver.has("Surface of B"));
+        for (compared, run) in driver.state().runs.compared.iter().flatten().zip(&runs) {
+            assert_eq!(*compared.decoupled_mm, run.decouple_test().0, "the same bits");
+        }
+        let kept = driver.state().runs.workspace.runs.iter();
+        for (kept, file) in kept.zip(&shown) {
+            assert_eq!(kept.file.training.history, file.training.history);
+        }
+    };
+    check(&driver);
+    driver.click("Next snapshot");
+    assert_eq!(driver.state().runs.snapshot, 1);
+    driver.click_button("Error");
+    driver.settle();
+    // Closing the window waits for what is to be written.
+    drop(driver);
+
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    driver.click_button("Compare");
+    wait_for_both(&mut driver);
+    assert!(driver.has("Six hidden nodes as A") && driver.has(&format!("{SECOND} as B")));
+    check(&driver);
+    assert!(driver.harness().run() <= 2, "an idle view draws nothing");
+    driver.click("Use the settings of Six hidden nodes");
+    assert_eq!((driver.state().view, driver.state().draft), (View::Train, small()));
+}
+
+#[test]
+fn a_run_is_removed_only_when_that_is_confirmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("workspace.json");
+    let mut driver = Driver::open_keeping(&path);
+    trained_twice(&mut driver);
+    driver.click(&format!("{FIRST} as A"));
+    driver.click(&format!("Remove {FIRST}"));
+    driver.click_button("Keep");
+    assert_eq!(kept(&driver), 2);
+    driver.click(&format!("Remove {FIRST}"));
+    driver.click_button("Remove");
+    assert_eq!(kept(&driver), 1);
+    assert!(driver.state().runs.pinned(0).is_none());
+    drop(driver);
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    let names: Vec<_> = driver.state().runs.workspace.runs.iter().map(|run| &run.name).collect();
+    assert_eq!(names, [SECOND]);
+}
+
+#[test]
+fn a_damaged_list_is_told_of_and_kept_aside() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("workspace.json");
+    fs::write(&path, "{\"format\": \"decoupler workspace\", \"vers").unwrap();
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    let aside = folder.path().join("workspace.json.damaged-1");
+    assert!(driver.says(&aside.display().to_string()), "{:#?}", driver.texts());
+    assert!(aside.exists());
+    driver.click("Dismiss");
+    driver.configure_small();
+    train_and_keep(&mut driver, 1);
+    drop(driver);
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    assert_eq!(kept(&driver), 1, "the new list is kept");
+    assert!(driver.state().notice.is_none());
+}
+
+#[test]
+fn a_second_window_leaves_the_list_to_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("workspace.json");
+    let mut first = Driver::open_keeping(&path);
+    wait_for_file(&mut first);
+    let mut second = Driver::open_keeping(&path);
+    second.wait("what it is told", |driver| driver.state().notice.is_some());
+    assert!(
+        second.says("Another window keeps the run list"),
+        "{:#?}",
+        second.texts()
+    );
+    second.click_button("Compare");
+    assert!(second.has("Not kept after this session."));
+    drop(second);
+    first.configure_small();
+    train_and_keep(&mut first, 1);
+    drop(first);
+    assert!(fs::read_to_string(&path).unwrap().contains(FIRST));
+}
+
+#[test]
+fn figures_of_the_paper_are_one_click() {
+    let mut driver = Driver::open();
+    driver.click("Fig. 8");
+    let settings = driver.state().draft;
+    assert_eq!(settings.sensor.scale.to_string(), "10×6_3×18");
+    assert_eq!((settings.hidden, settings.samples), (12, 1000));
+    assert_eq!(driver.state().look.mode, ViewMode::Top);
+    driver.wait("its training", |driver| driver.state().phase == Phase::Training);
+    assert!(!driver.is_enabled("Fig. 4"), "one at a time");
+    driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
+    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    driver.click("Fig. 6");
+    assert_eq!(driver.state().look.tab, BottomTab::Nodes);
+    driver.wait("another training, for the first was stopped", |driver| {
+        driver.state().phase == Phase::Training && driver.state().result().is_some()
+    });
+    driver.click("Error bars");
+    driver.wait("the bars", |driver| driver.state().frames.spread_mm.is_some());
+    let nodes = driver.state().frames.actual.nodes_mm.len();
+    assert_eq!(driver.state().frames.spread_mm.as_ref().map(Vec::len), Some(nodes));
+    driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
+    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+}
+
+/// Types `path` into the form behind `button` and saves; waits for the answer.
+fn save(driver: &mut Driver, button: &str, path: &Path) {
+    driver.click(button);
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Save");
+    driver.wait("the answer", |driver| driver.state().notice.is_some());
+    driver.settle();
+}
+
+#[test]
+fn pictures_in_view_are_saved_as_their_names_end() {
+    const SURFACES: &str = "Type a path for the picture of the surfaces";
+    const CHART: &str = "Type a path for the picture of the chart";
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open();
+    assert!(!driver.is_enabled(SURFACES), "nothing to save yet");
+    driver.configure_small();
+    driver.train();
+    let at = |name: &str| folder.path().join(name);
+    save(&mut driver, SURFACES, &at("a.png"));
+    assert!(driver.says("Saved "), "{:#?}", driver.texts());
+    driver.click("Dismiss");
+    let tabs = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
+    let mut pictures = Vec::new();
+    for tab in tabs {
+        driver.click(tab);
+        let path = at(&format!("{tab}.svg"));
+        save(&mut driver, CHART, &path);
+        driver.click("Dismiss");
+        let svg = fs::read_to_string(path).unwrap();
+        assert!(svg.starts_with("<svg ") && !svg.contains("NaN"), "{tab}");
+        pictures.push(svg);
+    }
+    // The nodes: a square and a disc each, and one of both beside the plot.
+    assert_eq!(pictures[4].matches("<circle").count(), 60 + 1);
+    save(&mut driver, CHART, &at("nodes.bmp"));
+    assert!(driver.says("give a name that ends in .png or .svg"));
+    let png = image::open(at("a.png")).unwrap();
+    assert!(png.width() > 2000);
+}
