@@ -309,6 +309,17 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
             1 + trials
         );
         assert!(file(&format!("table_{number}.md")).contains("| Z % publ. |"));
+        let figure = file(&format!("table_{number}.svg"));
+        let names = [
+            &[">hidden nodes<", ">published<", ">Eq. (12)<"][..],
+            &[">Z, 100 samples<", ">Y, 1000 samples<"],
+            &[">10×8_4×24<", ">published<", ">linear map<"],
+        ][number - 1];
+        for name in names {
+            assert!(figure.contains(name), "{name} in the figure of table {number}");
+        }
+        let png = folder.path().join(format!("tables/new/table_{number}.png"));
+        assert!(image::open(png).unwrap().width() > 1000);
     }
 }
 

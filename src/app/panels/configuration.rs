@@ -24,7 +24,7 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     scrolled_ui(ui, "configuration", |ui| {
         let is_busy = state.phase.is_busy();
         ui.add_enabled_ui(!is_busy && state.phase != Phase::Died, |ui| {
-            paper_section_ui(ui, &mut actions)
+            paper_section_ui(ui, &mut actions);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);

@@ -44,7 +44,7 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         }
         for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
             ui.add_enabled_ui(shown.is_some(), |ui| {
-                file_ui(ui, FileTask::SavePicture(picture), &mut actions)
+                file_ui(ui, FileTask::SavePicture(picture), &mut actions);
             });
         }
         section_heading_ui(ui, "Open");

@@ -74,7 +74,7 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
             let is_pinned = state.runs.workspace.pinned[place] == Some(run.id);
             let button = Button::selectable(is_pinned, letter)
                 .frame_when_inactive(true)
-                .min_size([space(7), space(6)].into());
+                .min_size([space(6), space(6)].into());
             let response = ui.add(button);
             response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_pinned, format!("{name} as {letter}")));
             let hint = if is_pinned {
@@ -87,9 +87,9 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
             }
         }
         let can_take = !state.phase.is_busy();
-        let take = ui.add_enabled(can_take, Button::new("Use settings").min_size([0.0, space(6)].into()));
+        let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
-        if take.on_hover_text("For the next training").clicked() {
+        if take.on_hover_text("Take its settings for the next training").clicked() {
             actions.push(RunsAction::TakeSettings(run.id));
         }
         let remove = ui.add(Button::new("Remove…").min_size([0.0, space(6)].into()));
