@@ -78,6 +78,7 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
         let timeless = |trial: &Trial| Trial {
             seconds: 0.0,
             least_epoch_seconds: 0.0,
+            states: Vec::new(),
             ..trial.clone()
         };
         cell.trials.iter().map(timeless).collect()
@@ -108,16 +109,18 @@ fn a_trial_is_the_run_that_its_settings_describe() {
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
         for (trial, seed) in cell.trials.iter().zip(0..3) {
-            let mut alone = Run::prepare(RunSettings {
+            let settings = RunSettings {
                 seed: Seed(seed),
                 ..cell.cell.settings
-            })
-            .unwrap();
+            };
+            let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
             assert_eq!(trial.errors, alone.decouple_test().1);
             assert_eq!(trial.baselines, *alone.baselines());
-            assert_eq!(trial.network, Some(alone.network()));
+            let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
+            assert_eq!(taken_up.network(), alone.network());
+            assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.decouple_test().1.z_percent.unwrap());
         }
         z_percent.sort_by(f64::total_cmp);
@@ -141,7 +144,7 @@ fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
                 assert!(trial.baselines.mean.worst_mm < 1.0, "{unit}: {trial:?}");
                 assert!(trial.errors.worst_mm < 4.0, "{unit}: {trial:?}");
                 assert!(trial.bottleneck.worst_mm < 1e-12, "{unit}: {trial:?}");
-                assert_eq!((trial.networks, trial.network.is_none()), (4, true));
+                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);

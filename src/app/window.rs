@@ -169,6 +169,14 @@ impl DecouplerWindow {
                 state.notice = None;
                 self.worker.ask(Request::Train(Box::new(state.draft)));
             }
+            Action::TakeUp(settings, states) => {
+                // A training may have begun in the same frame.
+                if !state.phase.is_busy() {
+                    state.phase = Phase::Preparing;
+                    state.notice = None;
+                    self.worker.ask(Request::TakeUp(settings, states));
+                }
+            }
             Action::Pause => {
                 state.phase = Phase::Paused;
                 self.worker.ask(Request::Pause);

@@ -1,7 +1,10 @@
 //! The figures of an experiment as points of a chart. Free of the toolkit.
 
 use super::Outcome;
-use crate::evaluation::experiments::{Axis, CellSummary, Figure};
+use crate::evaluation::{
+    Errors,
+    experiments::{Axis, CellResults, CellSummary, Experiment, Figure, Trial},
+};
 
 /// A cell in a chart: where it stands and what it came to.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,11 +52,16 @@ fn point(axis: &Axis, at: usize, cell: &CellSummary) -> CellPoint {
     }
 }
 
-/// The error of each trial of a cell against its number, from 1: Fig. 5. Missing ones are left out.
-pub fn trial_points(figure: &Figure) -> Vec<[f64; 2]> {
-    let numbered = figure.values.iter().enumerate();
-    numbered
-        .filter_map(|(at, value)| Some([(at + 1) as f64, (*value)?]))
+/// An error of each trial of a cell against its number, from 1 and counted through all seeds: Fig. 5.
+pub fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Errors) -> Option<f64>) -> Vec<[f64; 2]> {
+    let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
+    let number = |trial: &Trial| {
+        let seeds_before = trial.seed.0.wrapping_sub(cell.cell.settings.seed.0) as f64;
+        seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
+    };
+    let points = cell.trials.iter();
+    points
+        .filter_map(|trial| Some([number(trial), error(&trial.errors)?]))
         .collect()
 }
 
@@ -72,18 +80,36 @@ pub fn log_share(value: f64, values: impl Iterator<Item = f64> + Clone) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::num::NonZero;
+
     use super::*;
+    use crate::{
+        dataset::{FoldUnit, Seed},
+        evaluation::experiments::{CrossValidation, ExperimentResults, Finished, PaperTable, run_experiments},
+    };
 
     #[test]
-    fn a_trial_without_a_figure_keeps_its_number() {
-        let figure = Figure {
-            published: None,
-            median: None,
-            min: None,
-            max: None,
-            values: vec![Some(2.0), None, Some(3.0)],
-        };
-        assert_eq!(trial_points(&figure), [[1.0, 2.0], [3.0, 3.0]]);
+    fn trials_keep_their_numbers_in_whichever_order_they_finish() {
+        let mut experiment = PaperTable::CrossValidation.experiment();
+        experiment.base.training.stopping.epochs = 1;
+        experiment.base.hidden = 1;
+        experiment.axis = Axis::Samples(vec![40]);
+        (experiment.seeds, experiment.base.seed) = (2, Seed(7));
+        experiment.cross_validation = Some(CrossValidation {
+            folds: 2,
+            repeats: 3,
+            unit: FoldUnit::Sample,
+        });
+        let mut results = ExperimentResults::new(experiment.clone());
+        let mut finished = Vec::new();
+        let keep = |trial: Finished| finished.push(trial);
+        run_experiments(std::slice::from_ref(&experiment), NonZero::<usize>::MIN, || false, keep).unwrap();
+        // The fourth trial is the second seed's first.
+        for trial in finished.into_iter().rev().take(3) {
+            results.record(trial.cell, trial.outcome);
+        }
+        let points = trial_points(&experiment, &results.cells[0], |errors| errors.z_percent);
+        assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
     }
 
     #[test]

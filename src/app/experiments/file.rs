@@ -21,12 +21,12 @@ impl ExperimentFile {
     /// In the order offered.
     pub const ALL: [Self; 3] = [Self::Cells, Self::Trials, Self::Markdown];
 
-    /// The word on its button.
+    /// The words on its button.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Cells => "CSV…",
-            Self::Trials => "Trials…",
-            Self::Markdown => "Markdown…",
+            Self::Cells => "Table as CSV…",
+            Self::Trials => "Every trial as CSV…",
+            Self::Markdown => "Table and verdicts as Markdown…",
         }
     }
 

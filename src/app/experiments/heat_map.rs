@@ -3,15 +3,20 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, figures::log_share};
+use super::{ExperimentAction, Outcome, figures::log_share, open_cell::open_cell};
 use crate::{
-    app::theme::{Theme, semibold, space, type_size},
+    app::{
+        Action,
+        state::State,
+        theme::{Theme, semibold, space, type_size},
+    },
     export::{format_number, format_percent},
 };
 
-/// Median Z error over both axes of a sweep: dark is small. A click marks the cell.
-pub fn heat_map_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>) -> Vec<ExperimentAction> {
+/// Median Z error over both axes of a sweep: dark is small. A click marks the cell, two open it in the Train view.
+pub fn heat_map_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
     let mut actions = Vec::new();
+    let marked = state.experiments.marked;
     let palette = Theme::of(ui).palette;
     let experiment = &outcome.results.experiment;
     let across = &experiment.axis;
@@ -48,7 +53,10 @@ pub fn heat_map_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>) -> Vec
         });
         let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(hover);
         if response.clicked() {
-            actions.push(ExperimentAction::Mark(at));
+            actions.push(ExperimentAction::Mark(at).into());
+        }
+        if response.double_clicked() {
+            actions.extend(open_cell(state, outcome, at));
         }
         let fill = value.map(|value| Theme::of(ui).heights.at(log_share(value, medians())));
         ui.painter().rect_filled(rect, 2.0, fill.unwrap_or(palette.raised));
@@ -116,7 +124,7 @@ fn scale_ui(ui: &mut Ui, outcome: &Outcome) {
             ui.painter().rect_filled(piece, 0.0, Theme::of(ui).heights.at(share));
         }
         ui.label(text(format_percent(largest)));
-        ui.label(text("by the logarithm".to_owned()));
+        ui.label(text("logarithmic".to_owned()));
     });
 }
 

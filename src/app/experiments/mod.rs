@@ -8,6 +8,7 @@ mod file;
 mod form;
 mod heat_map;
 mod news;
+mod open_cell;
 mod panel;
 mod plots;
 mod results_card;
