@@ -18,9 +18,10 @@ mod state;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
-mod ticks;
 mod window;
 mod worker;
+
+use crate::export::ticks;
 
 pub use action::Action;
 pub use dialogs::DialogKind;

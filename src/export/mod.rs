@@ -1,8 +1,10 @@
-//! Files for later and for other programs: the network file, CSV tables, and the one way in which anything is written.
+//! Files for later and for other programs: the network file, CSV tables, figures, and the one way in which anything is
+//! written.
 
 mod atomic;
 mod checkpoint_file;
 mod experiment_tables;
+pub mod figures;
 mod experiment_words;
 mod format;
 mod heading;
@@ -10,6 +12,7 @@ mod network_file;
 mod samples;
 mod soundness;
 mod tables;
+pub(crate) mod ticks;
 mod unfinished;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};

@@ -1,0 +1,242 @@
+//! The few shapes that figures are made of, written as SVG. Lengths are points (1/72 inch); y counts downwards.
+
+use std::fmt::{Display, Write as _};
+
+use super::{
+    colours::{INK, Rgb},
+    picture::Picture,
+};
+
+/// Size of all text, in points.
+pub(super) const TEXT: f64 = 8.0;
+/// The average width of a character of this size: enough to leave room for a text.
+pub(super) const CHARACTER: f64 = 0.56 * TEXT;
+
+/// How far blocks reach under their neighbours, in points: one pixel in print.
+const OVERLAP: f64 = 0.25;
+
+pub(super) type At = [f64; 2];
+
+/// How a line is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stroke {
+    pub colour: Rgb,
+    pub width: f64,
+    pub is_dashed: bool,
+}
+
+impl Stroke {
+    pub fn new(colour: Rgb, width: f64) -> Self {
+        Self {
+            colour,
+            width,
+            is_dashed: false,
+        }
+    }
+
+    pub fn dashed(self) -> Self {
+        Self {
+            is_dashed: true,
+            ..self
+        }
+    }
+}
+
+/// Which part of a text stands at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// The part of the canvas that a plot or a panel takes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Area {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl Area {
+    pub fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    pub fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+
+    pub fn centre(&self) -> At {
+        [self.left + 0.5 * self.width, self.top + 0.5 * self.height]
+    }
+}
+
+pub(super) struct Canvas {
+    width: f64,
+    height: f64,
+    body: String,
+    clips: usize,
+}
+
+impl Canvas {
+    pub fn new(width: f64, height: f64) -> Self {
+        Self {
+            width,
+            height,
+            body: String::new(),
+            clips: 0,
+        }
+    }
+
+    fn put(&mut self, element: impl Display) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.body, "{element}");
+    }
+
+    pub fn line(&mut self, from: At, to: At, stroke: Stroke) {
+        self.polyline(&[from, to], stroke);
+    }
+
+    pub fn polyline(&mut self, points: &[At], stroke: Stroke) {
+        let (points, style) = (coordinates(points), stroke_style(stroke));
+        self.put(format_args!(r#"<polyline points="{points}" fill="none" {style}/>"#));
+    }
+
+    /// A filled shape; a hairline of its own colour closes the seam to its neighbours.
+    pub fn facet(&mut self, corners: &[At], fill: Rgb) {
+        let (points, fill) = (coordinates(corners), hex(fill));
+        self.put(format_args!(
+            r#"<polygon points="{points}" fill="{fill}" stroke="{fill}" stroke-width=".3"/>"#
+        ));
+    }
+
+    /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
+    /// be drawn later, so that there is no seam between them.
+    pub fn block(&mut self, area: Area, fill: Rgb) {
+        let Area {
+            left,
+            top,
+            width,
+            height,
+        } = area;
+        let [left, top, width, height] = [left, top, width + OVERLAP, height + OVERLAP].map(number);
+        let fill = hex(fill);
+        self.put(format_args!(
+            r#"<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="{fill}" shape-rendering="crispEdges"/>"#
+        ));
+    }
+
+    pub fn outline(&mut self, area: Area, stroke: Stroke) {
+        let (left, top) = (area.left, area.top);
+        let corners = [
+            [left, top],
+            [area.right(), top],
+            [area.right(), area.bottom()],
+            [left, area.bottom()],
+            [left, top],
+        ];
+        self.polyline(&corners, stroke);
+    }
+
+    pub fn disc(&mut self, at: At, radius: f64, fill: Rgb, edge: Option<Stroke>) {
+        let [x, y] = at.map(number);
+        let (radius, fill) = (number(radius), hex(fill));
+        let edge = edge.map(stroke_style).unwrap_or_default();
+        self.put(format_args!(
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" {edge}/>"#
+        ));
+    }
+
+    pub fn ring(&mut self, at: At, radius: f64, stroke: Stroke) {
+        let ([x, y], radius, style) = (at.map(number), number(radius), stroke_style(stroke));
+        self.put(format_args!(
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="none" {style}/>"#
+        ));
+    }
+
+    /// Text whose middle line runs through `at`.
+    pub fn text(&mut self, at: At, anchor: Anchor, colour: Rgb, text: &str) {
+        let [x, y] = [at[0], at[1] + 0.36 * TEXT].map(number);
+        self.write_text(&format!(r#"x="{x}" y="{y}""#), anchor, colour, 400, text);
+    }
+
+    /// As [`Self::text`], in strong type.
+    pub fn title(&mut self, at: At, text: &str) {
+        let [x, y] = [at[0], at[1] + 0.36 * TEXT].map(number);
+        self.write_text(&format!(r#"x="{x}" y="{y}""#), Anchor::Middle, INK, 600, text);
+    }
+
+    /// Text that reads upwards, centred at `at`.
+    pub fn upright_text(&mut self, at: At, colour: Rgb, text: &str) {
+        let [x, y] = [at[0] + 0.36 * TEXT, at[1]].map(number);
+        let place = format!(r#"transform="translate({x} {y}) rotate(-90)""#);
+        self.write_text(&place, Anchor::Middle, colour, 400, text);
+    }
+
+    fn write_text(&mut self, place: &str, anchor: Anchor, colour: Rgb, weight: u16, text: &str) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let (colour, text) = (hex(colour), escaped(text));
+        self.put(format_args!(
+            r#"<text {place} text-anchor="{anchor}" font-weight="{weight}" fill="{colour}">{text}</text>"#
+        ));
+    }
+
+    /// What `draw` draws is cut off at the edges of `area`.
+    pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
+        self.clips += 1;
+        let clip = self.clips;
+        let [x, y, width, height] = [area.left, area.top, area.width, area.height].map(number);
+        self.put(format_args!(
+            r##"<clipPath id="c{clip}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#c{clip})">"##
+        ));
+        draw(self);
+        self.put("</g>");
+    }
+
+    pub fn finish(self) -> Picture {
+        let [width, height] = [self.width, self.height].map(number);
+        let body = self.body;
+        Picture::new(format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-linejoin="round">
+<rect width="{width}" height="{height}" fill="#ffffff"/>
+{body}</svg>
+"##
+        ))
+    }
+}
+
+/// To a hundredth of a point, without zeros that say nothing.
+fn number(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+fn coordinates(points: &[At]) -> String {
+    let pairs = points.iter().map(|point| point.map(number).join(","));
+    pairs.collect::<Vec<_>>().join(" ")
+}
+
+fn hex([red, green, blue]: Rgb) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+fn stroke_style(stroke: Stroke) -> String {
+    let (colour, width) = (hex(stroke.colour), number(stroke.width));
+    let dashes = if stroke.is_dashed {
+        r#" stroke-dasharray="3 2""#
+    } else {
+        ""
+    };
+    format!(r#"stroke="{colour}" stroke-width="{width}"{dashes}"#)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

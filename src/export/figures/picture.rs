@@ -1,0 +1,113 @@
+use std::{
+    io,
+    path::Path,
+    sync::{Arc, OnceLock},
+};
+
+use resvg::{tiny_skia, usvg};
+use thiserror::Error;
+
+use crate::export::{WriteError, atomic_write};
+
+/// A finished figure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    svg: String,
+}
+
+/// In which form a figure is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PictureFormat {
+    /// Lines and text, sharp at any size.
+    Svg,
+    /// Pixels, 300 to the inch.
+    Png,
+}
+
+impl PictureFormat {
+    /// File name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+        }
+    }
+}
+
+/// Why a figure is not written.
+#[derive(Debug, Error)]
+pub enum PictureError {
+    /// The pixels cannot be made.
+    #[error("the picture cannot be drawn in pixels: {0}; save it as SVG instead")]
+    Pixels(String),
+    /// The file.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What journals ask for at least.
+const DOTS_PER_INCH: f32 = 300.0;
+
+impl Picture {
+    pub(super) fn new(svg: String) -> Self {
+        Self { svg }
+    }
+
+    /// The figure as SVG. Its text names the program's font and common ones to stand in for it.
+    pub fn svg(&self) -> &str {
+        &self.svg
+    }
+
+    /// The figure as the bytes of a PNG file, 300 pixels to the inch.
+    ///
+    /// # Errors
+    /// There is no memory for the pixels.
+    pub fn png(&self) -> Result<Vec<u8>, PictureError> {
+        let options = usvg::Options {
+            dpi: DOTS_PER_INCH,
+            fontdb: fonts(),
+            ..usvg::Options::default()
+        };
+        let failed = |reason: String| PictureError::Pixels(reason);
+        let tree = usvg::Tree::from_str(&self.svg, &options).map_err(|error| failed(error.to_string()))?;
+        let size = tree.size().to_int_size();
+        let pixels = tiny_skia::Pixmap::new(size.width(), size.height());
+        let mut pixels = pixels.ok_or_else(|| failed(format!("no memory for {size:?}")))?;
+        resvg::render(&tree, tiny_skia::Transform::default(), &mut pixels.as_mut());
+        pixels.encode_png().map_err(|error| failed(error.to_string()))
+    }
+
+    /// Writes the figure whole or not at all.
+    ///
+    /// # Errors
+    /// The path is not one that can be written.
+    pub fn save(&self, format: PictureFormat, path: &Path) -> Result<(), PictureError> {
+        let png;
+        let bytes = match format {
+            PictureFormat::Svg => self.svg.as_bytes(),
+            PictureFormat::Png => {
+                png = self.png()?;
+                &png
+            }
+        };
+        atomic_write(path, |writer| io::Write::write_all(writer, bytes))?;
+        Ok(())
+    }
+}
+
+/// The program's own fonts and no others.
+fn fonts() -> Arc<usvg::fontdb::Database> {
+    static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
+    let load = || {
+        let mut fonts = usvg::fontdb::Database::new();
+        let faces: [&'static [u8]; 2] = [
+            include_bytes!("../../../assets/fonts/InterTabular-Regular.ttf"),
+            include_bytes!("../../../assets/fonts/InterTabular-SemiBold.ttf"),
+        ];
+        for face in faces {
+            fonts.load_font_source(usvg::fontdb::Source::Binary(Arc::new(face)));
+        }
+        Arc::new(fonts)
+    };
+    Arc::clone(FONTS.get_or_init(load))
+}
