@@ -312,6 +312,9 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
             1 + trials
         );
         assert!(file(&format!("table_{number}.md")).contains("| Z % publ. |"));
+        assert!(file(&format!("table_{number}.svg")).contains("published"));
+        let png = fs::read(folder.path().join(format!("tables/new/table_{number}.png"))).unwrap();
+        assert!(png.starts_with(b"\x89PNG"));
     }
 }
 

@@ -11,7 +11,7 @@ use super::interruption;
 use crate::{
     dataset::{DatasetError, ReadError},
     evaluation::{RunError, experiments::ExperimentError},
-    export::{CheckpointFileError, NetworkFileError, WriteError},
+    export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
     training::SettingError,
 };
 
@@ -44,6 +44,8 @@ pub(super) enum Failure {
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     #[error("cannot write to standard output: {0}")]
     Output(io::Error),
     #[error("cannot open '{}': {source}", .path.display())]

@@ -20,8 +20,9 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        WriteError, atomic_write, check_writable, describe_conditions, format_duration, write_cells,
-        write_experiment_markdown, write_trials,
+        atomic_write, check_writable, describe_conditions, draw_experiment,
+        figures::{PictureError, PictureFormat},
+        format_duration, write_cells, write_experiment_markdown, write_trials,
     },
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
@@ -65,7 +66,7 @@ pub(super) struct Reproduce {
     /// How often Table 2 deals the folds anew, for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
-    /// Folder for CSV and Markdown files of each table; made if it is not there
+    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
@@ -201,13 +202,15 @@ impl Reproduce {
     }
 }
 
-/// The files of a table: its cells, every trial, and all of it for reading.
-fn files(folder: &Path, table: PaperTable) -> [PathBuf; 3] {
+/// The files of a table: its cells, every trial, all of it for reading, and the figure in both forms.
+fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
     let number = table.number();
     [
         format!("table_{number}.csv"),
         format!("table_{number}_trials.csv"),
         format!("table_{number}.md"),
+        format!("table_{number}.svg"),
+        format!("table_{number}.png"),
     ]
     .map(|name| folder.join(name))
 }
@@ -222,17 +225,20 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
 }
 
-fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), WriteError> {
+fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), PictureError> {
     let Reproduced {
         table,
         results,
         verdicts,
     } = reproduced;
-    let [cells, trials, markdown] = files(folder, *table);
+    let [cells, trials, markdown, svg, png] = files(folder, *table);
     atomic_write(&cells, |writer| write_cells(results, writer))?;
     atomic_write(&trials, |writer| write_trials(results, writer))?;
     atomic_write(&markdown, |writer| {
         let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
         write_experiment_markdown(&title, &conditions, results, verdicts, writer)
-    })
+    })?;
+    let picture = draw_experiment(results);
+    picture.save(PictureFormat::Svg, &svg)?;
+    picture.save(PictureFormat::Png, &png)
 }

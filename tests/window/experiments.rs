@@ -232,6 +232,19 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with(expected), "{text}");
     }
+    for (button, name, expected) in [
+        ("Figure as SVG…", "map.svg", &b"<svg"[..]),
+        ("Figure as PNG…", "map.png", b"\x89PNG"),
+    ] {
+        let path = folder.path().join(name);
+        driver.click("Export");
+        driver.click(button);
+        driver.type_into("File", &path.display().to_string());
+        driver.click_button("Save");
+        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.click("Dismiss");
+        assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
+    }
     let rows = fs::read_to_string(folder.path().join("cells.csv"))
         .unwrap()
         .lines()

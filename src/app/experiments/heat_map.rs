@@ -3,7 +3,7 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, figures::log_share, open_cell::open_cell};
+use super::{ExperimentAction, Outcome, open_cell::open_cell};
 use crate::{
     app::{
         Action,
@@ -134,5 +134,32 @@ fn text_on(fill: Color32) -> Color32 {
         Color32::BLACK
     } else {
         Color32::WHITE
+    }
+}
+
+/// Where `value` stands between the least and largest of `values`, by the logarithm, from 0 to 1.
+fn log_share(value: f64, values: impl Iterator<Item = f64> + Clone) -> f32 {
+    let positive = values.filter(|value| *value > 0.0);
+    let least = positive.clone().fold(f64::INFINITY, f64::min).ln();
+    let largest = positive.fold(f64::NEG_INFINITY, f64::max).ln();
+    let share = (value.ln() - least) / (largest - least);
+    if share.is_finite() {
+        share.clamp(0.0, 1.0) as f32
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_run_from_least_to_largest_and_one_value_has_the_least() {
+        let values = [0.1, 1.0, 10.0];
+        let shares = values.map(|value| log_share(value, values.into_iter()));
+        assert_eq!(shares, [0.0, 0.5, 1.0]);
+        assert_eq!(log_share(2.0, [2.0].into_iter()), 0.0);
+        assert_eq!(log_share(0.0, values.into_iter()), 0.0);
     }
 }

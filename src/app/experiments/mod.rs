@@ -3,7 +3,6 @@
 
 mod action;
 mod axis_form;
-mod figures;
 mod file;
 mod form;
 mod heat_map;

@@ -5,10 +5,7 @@ use egui_plot::{
     GridMark, HLine, Line, LineStyle, MarkerShape, PlotPoint, PlotPoints, PlotUi, Points, Span, Text, VLine,
 };
 
-use super::{
-    Outcome,
-    figures::{CellPoint, trial_points, z_points},
-};
+use super::Outcome;
 use crate::{
     app::{
         charts::{
@@ -18,6 +15,10 @@ use crate::{
         theme::{Theme, space, type_size},
     },
     evaluation::{Errors, experiments::CellSummary},
+    export::{
+        experiment_points::{CellPoint, trial_points, z_points},
+        repeat_name,
+    },
     network::HiddenSuggestions,
 };
 
@@ -32,7 +33,7 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
         key("linear map", Mark::Dashes, palette.dim),
     ];
     legend_ui(ui, &keys);
-    let points = z_points(outcome);
+    let points = z_points(&outcome.results, &outcome.summaries);
     let scale = outcome.results.experiment.base.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let (fewest, most) = (
@@ -51,8 +52,8 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
             plot_ui.span(band.border_color(Color32::TRANSPARENT));
             let log = VLine::new("Eq. (13)", suggested.logarithm as f64).color(palette.warning);
             plot_ui.vline(log.width(1.2));
-            let top = PlotPoint::new(suggested.logarithm as f64, 1.08 * highest);
-            let name = RichText::new(" Eq. (13)").size(type_size().note);
+            let top = PlotPoint::new(suggested.logarithm as f64, plot_ui.plot_bounds().max()[1]);
+            let name = RichText::new(" Eq. (13)").size(type_size().body);
             plot_ui.text(
                 Text::new("Eq. (13)", top, name)
                     .anchor(Align2::LEFT_TOP)
@@ -90,7 +91,7 @@ pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
         key("linear map", Mark::Dashes, palette.dim),
     ];
     legend_ui(ui, &keys);
-    let points = z_points(outcome);
+    let points = z_points(&outcome.results, &outcome.summaries);
     let axis = &outcome.results.experiment.axis;
     let labels: Vec<String> = (0..axis.len()).map(|index| axis.label(index)).collect();
     let count = labels.len();
@@ -236,11 +237,7 @@ pub fn repeats_ui(ui: &mut Ui, outcome: &Outcome) {
         .map(|cell| cell.expected)
         .max()
         .unwrap_or(1);
-    let x_name = if experiment.seeds == 1 {
-        "repeat"
-    } else {
-        "repeat, through all seeds"
-    };
+    let x_name = repeat_name(&outcome.results);
     let (width, height) = ((ui.available_width() - 2.0 * space(2)) / 3.0, ui.available_height());
     ui.horizontal(|ui| {
         for (id, y_name, published, measured) in panels {

@@ -189,6 +189,9 @@ fn row_ui(ui: &mut Ui, outcome: &Outcome, cell: usize, is_marked: bool, places: 
         if column >= axes {
             let figure = ui.interact(rect, ui.scope_id().with(("figure", cell, column)), Sense::hover());
             figure.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{name}, {heading}: {text}")));
+            if heading.starts_with("linear") && loses {
+                figure.on_hover_text("The linear map does better here than the network");
+            }
         }
     }
     ui.painter()

@@ -1,9 +1,8 @@
-//! The figures of an experiment as points of a chart. Free of the toolkit.
+//! The figures of an experiment as points of a chart, in the window as on paper.
 
-use super::Outcome;
 use crate::evaluation::{
     Errors,
-    experiments::{Axis, CellResults, CellSummary, Experiment, Figure, Trial},
+    experiments::{Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure, Trial},
 };
 
 /// A cell in a chart: where it stands and what it came to.
@@ -19,10 +18,9 @@ pub struct CellPoint {
 }
 
 /// The Z errors of every cell along the first axis, in its order.
-pub fn z_points(outcome: &Outcome) -> Vec<CellPoint> {
-    let axis = &outcome.results.experiment.axis;
-    let mut points: Vec<CellPoint> = outcome
-        .summaries
+pub fn z_points(results: &ExperimentResults, summaries: &[CellSummary]) -> Vec<CellPoint> {
+    let axis = &results.experiment.axis;
+    let mut points: Vec<CellPoint> = summaries
         .iter()
         .enumerate()
         .map(|(at, cell)| point(axis, at, cell))
@@ -65,19 +63,6 @@ pub fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Erro
         .collect()
 }
 
-/// Where `value` stands between the least and largest of `values`, by the logarithm, from 0 to 1.
-pub fn log_share(value: f64, values: impl Iterator<Item = f64> + Clone) -> f32 {
-    let positive = values.filter(|value| *value > 0.0);
-    let least = positive.clone().fold(f64::INFINITY, f64::min).ln();
-    let largest = positive.fold(f64::NEG_INFINITY, f64::max).ln();
-    let share = (value.ln() - least) / (largest - least);
-    if share.is_finite() {
-        share.clamp(0.0, 1.0) as f32
-    } else {
-        0.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::num::NonZero;
@@ -85,7 +70,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{FoldUnit, Seed},
-        evaluation::experiments::{CrossValidation, ExperimentResults, Finished, PaperTable, run_experiments},
+        evaluation::experiments::{CrossValidation, Finished, PaperTable, run_experiments},
     };
 
     #[test]
@@ -110,14 +95,5 @@ mod tests {
         }
         let points = trial_points(&experiment, &results.cells[0], |errors| errors.z_percent);
         assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
-    }
-
-    #[test]
-    fn shares_run_from_least_to_largest_and_one_value_has_the_least() {
-        let values = [0.1, 1.0, 10.0];
-        let shares = values.map(|value| log_share(value, values.into_iter()));
-        assert_eq!(shares, [0.0, 0.5, 1.0]);
-        assert_eq!(log_share(2.0, [2.0].into_iter()), 0.0);
-        assert_eq!(log_share(0.0, values.into_iter()), 0.0);
     }
 }
