@@ -181,7 +181,7 @@ fn repeats(results: &ExperimentResults) -> Plot {
 pub(crate) fn repeat_name(results: &ExperimentResults) -> &'static str {
     match results.experiment.seeds {
         1 => "repeat",
-        _ => "repeat, through all seeds",
+        _ => "trial",
     }
 }
 

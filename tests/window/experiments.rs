@@ -8,6 +8,8 @@ use decoupler::{
     export::ExperimentTable,
 };
 
+use eframe::egui::vec2;
+
 use crate::driver::Driver;
 
 fn open() -> Driver {
@@ -250,4 +252,21 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
         .lines()
         .count();
     assert_eq!(rows, 5, "a heading and four cells");
+}
+
+#[test]
+fn the_form_keeps_to_its_panel_in_a_narrow_window() {
+    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
+    driver.click_button("Experiments");
+    for topic in ["Table 1", "Table 2", "Table 3", "Sweep"] {
+        driver.click(topic);
+        driver.settle();
+        let title = driver.get("Export").rect();
+        assert!(title.max.x < 1024.0, "{topic}: {title}");
+        for label in [topic, "Sweep", "■ Cancel", "▶ Run", "Seeds", "Epochs"] {
+            for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
+                assert!(rect.max.x < 272.0, "{topic}, {label}: {rect}");
+            }
+        }
+    }
 }

@@ -9,10 +9,10 @@ use super::Outcome;
 use crate::{
     app::{
         charts::{
-            Key, Mark, legend_ui,
+            Key, Mark, legend_ui, legend_width,
             plot_style::{log_marks, log_text, plot, whole_marks},
         },
-        theme::{Theme, space, type_size},
+        theme::{Theme, semibold, space, type_size},
     },
     evaluation::{Errors, experiments::CellSummary},
     export::{
@@ -32,7 +32,7 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
         key("bound of the bottleneck", Mark::Dashes, palette.validation_series),
         key("linear map", Mark::Dashes, palette.dim),
     ];
-    legend_ui(ui, &keys);
+    keys_ui(ui, &keys);
     let points = z_points(&outcome.results, &outcome.summaries);
     let scale = outcome.results.experiment.base.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
@@ -53,7 +53,9 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
             let log = VLine::new("Eq. (13)", suggested.logarithm as f64).color(palette.warning);
             plot_ui.vline(log.width(1.2));
             let top = PlotPoint::new(suggested.logarithm as f64, plot_ui.plot_bounds().max()[1]);
-            let name = RichText::new(" Eq. (13)").size(type_size().body);
+            let name = RichText::new(" Eq. (13)")
+                .font(semibold(type_size().body))
+                .color(palette.text);
             plot_ui.text(
                 Text::new("Eq. (13)", top, name)
                     .anchor(Align2::LEFT_TOP)
@@ -81,6 +83,18 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
         });
 }
 
+/// In two rows where one would be too long.
+fn keys_ui(ui: &mut Ui, keys: &[Key]) {
+    let rows = if legend_width(ui, keys) > ui.available_width() {
+        2
+    } else {
+        1
+    };
+    for row in keys.chunks(keys.len().div_ceil(rows)) {
+        legend_ui(ui, row);
+    }
+}
+
 /// Z error of each cell, side by side.
 pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
     let palette = Theme::of(ui).palette;
@@ -90,7 +104,7 @@ pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
         key("published", Mark::Squares, palette.text),
         key("linear map", Mark::Dashes, palette.dim),
     ];
-    legend_ui(ui, &keys);
+    keys_ui(ui, &keys);
     let points = z_points(&outcome.results, &outcome.summaries);
     let axis = &outcome.results.experiment.axis;
     let labels: Vec<String> = (0..axis.len()).map(|index| axis.label(index)).collect();

@@ -27,7 +27,7 @@ pub fn experiments_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         return actions;
     };
     let gap = space(2);
-    let height = results_card_height(ui, outcome, whole.width()).min((0.48 * whole.height()).round());
+    let height = results_card_height(ui, outcome, whole.width()).min((0.53 * whole.height()).round());
     let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height);
     card_ui(ui, upper, |ui| actions.extend(results_card_ui(ui, state, outcome)));
     let lower = lower.with_min_y(lower.min.y + gap);
