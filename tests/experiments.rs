@@ -78,6 +78,7 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
         let timeless = |trial: &Trial| Trial {
             seconds: 0.0,
             least_epoch_seconds: 0.0,
+            states: Vec::new(),
             ..trial.clone()
         };
         cell.trials.iter().map(timeless).collect()
@@ -108,16 +109,18 @@ fn a_trial_is_the_run_that_its_settings_describe() {
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
         for (trial, seed) in cell.trials.iter().zip(0..3) {
-            let mut alone = Run::prepare(RunSettings {
+            let settings = RunSettings {
                 seed: Seed(seed),
                 ..cell.cell.settings
-            })
-            .unwrap();
+            };
+            let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
             assert_eq!(trial.errors, alone.decouple_test().1);
             assert_eq!(trial.baselines, *alone.baselines());
-            assert_eq!(trial.network, Some(alone.network()));
+            let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
+            assert_eq!(taken_up.network(), alone.network());
+            assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.decouple_test().1.z_percent.unwrap());
         }
         z_percent.sort_by(f64::total_cmp);
@@ -141,7 +144,7 @@ fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
                 assert!(trial.baselines.mean.worst_mm < 1.0, "{unit}: {trial:?}");
                 assert!(trial.errors.worst_mm < 4.0, "{unit}: {trial:?}");
                 assert!(trial.bottleneck.worst_mm < 1e-12, "{unit}: {trial:?}");
-                assert_eq!((trial.networks, trial.network.is_none()), (4, true));
+                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);
@@ -309,17 +312,9 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
             1 + trials
         );
         assert!(file(&format!("table_{number}.md")).contains("| Z % publ. |"));
-        let figure = file(&format!("table_{number}.svg"));
-        let names = [
-            &[">hidden nodes<", ">published<", ">Eq. (12)<"][..],
-            &[">Z, 100 samples<", ">Y, 1000 samples<"],
-            &[">10×8_4×24<", ">published<", ">linear map<"],
-        ][number - 1];
-        for name in names {
-            assert!(figure.contains(name), "{name} in the figure of table {number}");
-        }
-        let png = folder.path().join(format!("tables/new/table_{number}.png"));
-        assert!(image::open(png).unwrap().width() > 1000);
+        assert!(file(&format!("table_{number}.svg")).contains("published"));
+        let png = fs::read(folder.path().join(format!("tables/new/table_{number}.png"))).unwrap();
+        assert!(png.starts_with(b"\x89PNG"));
     }
 }
 

@@ -10,13 +10,18 @@ use super::{
     state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
 };
-use crate::evaluation::{NodeAddress, RunSettings};
+use crate::{
+    evaluation::{NodeAddress, RunSettings},
+    training::TrainerState,
+};
 
 /// What the user meant. Panels return these; one place applies them.
 #[derive(Clone, Debug)]
 pub enum Action {
     /// Change the settings of the next training.
     Configure(Box<RunSettings>),
+    /// Show the training that has these settings and whose starts stand so.
+    TakeUp(Box<RunSettings>, Vec<TrainerState>),
     /// Begin training.
     Train,
     /// Hold the training.

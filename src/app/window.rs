@@ -187,6 +187,14 @@ impl DecouplerWindow {
                 state.notice = None;
                 self.worker.ask(Request::Train(Box::new(state.draft)));
             }
+            Action::TakeUp(settings, states) => {
+                // A training may have begun in the same frame.
+                if !state.phase.is_busy() {
+                    state.phase = Phase::Preparing;
+                    state.notice = None;
+                    self.worker.ask(Request::TakeUp(settings, states));
+                }
+            }
             Action::Pause => {
                 state.phase = Phase::Paused;
                 self.worker.ask(Request::Pause);
@@ -351,7 +359,11 @@ impl DecouplerWindow {
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         let layout = panels::WorkbenchLayout::of_width(ui.available_width());
         let has_report_beside = layout == panels::WorkbenchLayout::ReportBeside;
-        let left = if has_report_beside { space(68) } else { space(62) };
+        let left = if has_report_beside || !is_training_view {
+            space(68)
+        } else {
+            space(62)
+        };
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,

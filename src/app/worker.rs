@@ -23,7 +23,7 @@ use super::{
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     export::{CheckpointFile, NetworkFile},
-    training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainingSettings},
+    training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
@@ -44,6 +44,8 @@ pub enum Request {
     Train(Box<RunSettings>),
     /// Take up the training saved in this file and hold it; one in progress is dropped.
     Open(PathBuf),
+    /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
+    TakeUp(Box<RunSettings>, Vec<TrainerState>),
     /// Go on from the present weights with this method and this many epochs more.
     Continue(TrainingSettings),
     /// Step no further until told to resume.
@@ -282,6 +284,13 @@ impl Labour {
                 Ok((run, began)) => self.begin(run, true, Event::Opened(Ok(began))),
                 Err(error) => self.report.send(Event::Opened(Err(error))),
             },
+            Request::TakeUp(settings, states) => {
+                let resumed = Run::resume(*settings, states).map_err(TestViewError::from);
+                match resumed.and_then(begun) {
+                    Ok((run, began)) => self.begin(run, true, Event::Opened(Ok(began))),
+                    Err(error) => self.report.send(Event::Opened(Err(error.to_string()))),
+                }
+            }
             Request::Continue(training) => self.go_on(training),
             Request::Pause => {
                 self.is_paused = true;

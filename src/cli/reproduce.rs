@@ -20,8 +20,8 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        atomic_write, check_writable, describe_conditions,
-        figures::{PictureFormat, experiment_figure},
+        atomic_write, check_writable, describe_conditions, draw_experiment,
+        figures::{PictureError, PictureFormat},
         format_duration, write_cells, write_experiment_markdown, write_trials,
     },
     network::LARGEST_HIDDEN,
@@ -66,7 +66,7 @@ pub(super) struct Reproduce {
     /// How often Table 2 deals the folds anew, for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
-    /// Folder for CSV and Markdown files and a figure (SVG, PNG) of each table; made if it is not there
+    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
@@ -202,7 +202,7 @@ impl Reproduce {
     }
 }
 
-/// The files of a table: its cells, every trial, all of it for reading, and its figure in both forms.
+/// The files of a table: its cells, every trial, all of it for reading, and the figure in both forms.
 fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
     let number = table.number();
     [
@@ -225,7 +225,7 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
 }
 
-fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), Failure> {
+fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), PictureError> {
     let Reproduced {
         table,
         results,
@@ -238,8 +238,7 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), Failure> {
         let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
         write_experiment_markdown(&title, &conditions, results, verdicts, writer)
     })?;
-    let figure = experiment_figure(results);
-    figure.save(PictureFormat::Svg, &svg)?;
-    figure.save(PictureFormat::Png, &png)?;
-    Ok(())
+    let picture = draw_experiment(results);
+    picture.save(PictureFormat::Svg, &svg)?;
+    picture.save(PictureFormat::Png, &png)
 }

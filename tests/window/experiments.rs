@@ -8,6 +8,8 @@ use decoupler::{
     export::ExperimentTable,
 };
 
+use eframe::egui::vec2;
+
 use crate::driver::Driver;
 
 fn open() -> Driver {
@@ -89,22 +91,56 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     let sort = driver.state().experiments.sort;
     assert!(sort.is_descending && sort.column.is_some());
 
-    assert!(!driver.is_enabled("Use these settings"), "no cell is marked");
+    assert!(!driver.is_enabled(OPEN), "no cell is marked");
     driver.click("Cell 4");
-    driver.click("Use these settings");
-    assert_eq!(driver.state().view, View::Train);
+    driver.click(OPEN);
+    wait_for_the_network(&mut driver);
     assert_eq!(driver.state().draft, experiment.cells()[1].settings);
+    assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
     let z = results.cells[1].trials[0].errors.z_percent;
-    driver.click("▶ Train");
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
+    let shown = driver.state().result().unwrap().errors.z_percent;
+    assert_eq!(shown.map(f64::to_bits), z.map(f64::to_bits), "it is the cell's network");
+}
+
+const OPEN: &str = "Open in Train view";
+
+fn wait_for_the_network(driver: &mut Driver) {
+    assert_eq!(driver.state().view, View::Train);
+    driver.wait("the network", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_)) && driver.state().result().is_some()
     });
-    let trained = driver.state().result().unwrap().errors.z_percent;
-    assert_eq!(
-        trained.map(f64::to_bits),
-        z.map(f64::to_bits),
-        "training a cell again gives its network"
-    );
+    driver.settle();
+}
+
+#[test]
+fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
+    let mut driver = open();
+    driver.click("Table 2");
+    driver.type_into("Samples", "40");
+    driver.enter("Folds", "2");
+    driver.enter("Repeats", "2");
+    driver.enter("Seeds", "1");
+    driver.enter("Epochs", "3");
+    run_to_the_end(&mut driver);
+    driver.click("Cell 40");
+    driver.click(OPEN);
+    wait_for_the_network(&mut driver);
+    let state = driver.state();
+    let wanted = state.experiments.outcome().unwrap().results.cells[0].cell.settings;
+    assert_eq!(state.draft, wanted);
+    assert_eq!(state.result().unwrap().epochs_run, 3);
+}
+
+#[test]
+fn before_it_is_run_a_table_shows_the_published_figures() {
+    let mut driver = open();
+    assert!(driver.has("12, Z % publ.: 2.28"), "{:#?}", driver.texts());
+    assert!(driver.has("12, Z % median: –"), "{:#?}", driver.texts());
+    assert!(driver.says("Press Run"));
+    assert!(!driver.is_enabled("Export") && !driver.is_enabled(OPEN));
+    // What is typed is what would be filled in.
+    driver.type_into("Hidden nodes", "12, 99");
+    assert!(driver.has("99, Z % publ.: –"), "{:#?}", driver.texts());
 }
 
 #[test]
@@ -184,11 +220,12 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     }
     driver.settle();
     for (button, name, expected) in [
-        ("CSV…", "cells.csv", "array,hidden,samples"),
-        ("Trials…", "trials.csv", "array,hidden,samples"),
-        ("Markdown…", "table.md", "## Sweep over two axes"),
+        ("Table as CSV…", "cells.csv", "array,hidden,samples"),
+        ("Every trial as CSV…", "trials.csv", "array,hidden,samples"),
+        ("Table and verdicts as Markdown…", "table.md", "## Sweep over two axes"),
     ] {
         let path = folder.path().join(name);
+        driver.click("Export");
         driver.click(button);
         driver.type_into("File", &path.display().to_string());
         driver.click_button("Save");
@@ -197,9 +234,39 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with(expected), "{text}");
     }
+    for (button, name, expected) in [
+        ("Figure as SVG…", "map.svg", &b"<svg"[..]),
+        ("Figure as PNG…", "map.png", b"\x89PNG"),
+    ] {
+        let path = folder.path().join(name);
+        driver.click("Export");
+        driver.click(button);
+        driver.type_into("File", &path.display().to_string());
+        driver.click_button("Save");
+        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.click("Dismiss");
+        assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
+    }
     let rows = fs::read_to_string(folder.path().join("cells.csv"))
         .unwrap()
         .lines()
         .count();
     assert_eq!(rows, 5, "a heading and four cells");
+}
+
+#[test]
+fn the_form_keeps_to_its_panel_in_a_narrow_window() {
+    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
+    driver.click_button("Experiments");
+    for topic in ["Table 1", "Table 2", "Table 3", "Sweep"] {
+        driver.click(topic);
+        driver.settle();
+        let title = driver.get("Export").rect();
+        assert!(title.max.x < 1024.0, "{topic}: {title}");
+        for label in [topic, "Sweep", "■ Cancel", "▶ Run", "Seeds", "Epochs"] {
+            for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
+                assert!(rect.max.x < 272.0, "{topic}, {label}: {rect}");
+            }
+        }
+    }
 }

@@ -3,15 +3,20 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, figures::log_share};
+use super::{ExperimentAction, Outcome, open_cell::open_cell};
 use crate::{
-    app::theme::{Theme, semibold, space, type_size},
+    app::{
+        Action,
+        state::State,
+        theme::{Theme, semibold, space, type_size},
+    },
     export::{format_number, format_percent},
 };
 
-/// Median Z error over both axes of a sweep: dark is small. A click marks the cell.
-pub fn heat_map_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>) -> Vec<ExperimentAction> {
+/// Median Z error over both axes of a sweep: dark is small. A click marks the cell, two open it in the Train view.
+pub fn heat_map_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
     let mut actions = Vec::new();
+    let marked = state.experiments.marked;
     let palette = Theme::of(ui).palette;
     let experiment = &outcome.results.experiment;
     let across = &experiment.axis;
@@ -48,7 +53,10 @@ pub fn heat_map_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>) -> Vec
         });
         let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(hover);
         if response.clicked() {
-            actions.push(ExperimentAction::Mark(at));
+            actions.push(ExperimentAction::Mark(at).into());
+        }
+        if response.double_clicked() {
+            actions.extend(open_cell(state, outcome, at));
         }
         let fill = value.map(|value| Theme::of(ui).heights.at(log_share(value, medians())));
         ui.painter().rect_filled(rect, 2.0, fill.unwrap_or(palette.raised));
@@ -116,7 +124,7 @@ fn scale_ui(ui: &mut Ui, outcome: &Outcome) {
             ui.painter().rect_filled(piece, 0.0, Theme::of(ui).heights.at(share));
         }
         ui.label(text(format_percent(largest)));
-        ui.label(text("by the logarithm".to_owned()));
+        ui.label(text("logarithmic".to_owned()));
     });
 }
 
@@ -126,5 +134,32 @@ fn text_on(fill: Color32) -> Color32 {
         Color32::BLACK
     } else {
         Color32::WHITE
+    }
+}
+
+/// Where `value` stands between the least and largest of `values`, by the logarithm, from 0 to 1.
+fn log_share(value: f64, values: impl Iterator<Item = f64> + Clone) -> f32 {
+    let positive = values.filter(|value| *value > 0.0);
+    let least = positive.clone().fold(f64::INFINITY, f64::min).ln();
+    let largest = positive.fold(f64::NEG_INFINITY, f64::max).ln();
+    let share = (value.ln() - least) / (largest - least);
+    if share.is_finite() {
+        share.clamp(0.0, 1.0) as f32
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_run_from_least_to_largest_and_one_value_has_the_least() {
+        let values = [0.1, 1.0, 10.0];
+        let shares = values.map(|value| log_share(value, values.into_iter()));
+        assert_eq!(shares, [0.0, 0.5, 1.0]);
+        assert_eq!(log_share(2.0, [2.0].into_iter()), 0.0);
+        assert_eq!(log_share(0.0, values.into_iter()), 0.0);
     }
 }

@@ -3,11 +3,11 @@
 
 mod action;
 mod axis_form;
-mod figures;
 mod file;
 mod form;
 mod heat_map;
 mod news;
+mod open_cell;
 mod panel;
 mod plots;
 mod results_card;

@@ -13,10 +13,13 @@ use crate::app::{
 /// Takes what the threads have to tell.
 pub fn take_news(state: &mut State, worker: &ExperimentWorker) {
     let mut finished = Vec::new();
+    let present = state.experiments.running.map(|running| running.number);
     while let Some(event) = worker.next_event() {
         match event {
-            ExperimentEvent::Finished(trial) => finished.push(*trial),
-            ExperimentEvent::Ended(result) => {
+            // Of one that was cancelled.
+            ExperimentEvent::Finished(number, _) | ExperimentEvent::Ended(number, _) if Some(number) != present => {}
+            ExperimentEvent::Finished(_, trial) => finished.push(*trial),
+            ExperimentEvent::Ended(_, result) => {
                 state.experiments.record(std::mem::take(&mut finished));
                 state.experiments.end(Instant::now());
                 if let Err(reason) = result {
@@ -44,9 +47,7 @@ pub fn apply(action: ExperimentAction, state: &mut State, worker: &mut Experimen
         ExperimentAction::Run => run(state, worker),
         ExperimentAction::Cancel => {
             worker.cancel();
-            if let Some(running) = &mut experiments.running {
-                running.is_cancelled = true;
-            }
+            experiments.end(Instant::now());
         }
         ExperimentAction::Mark(cell) => experiments.marked = Some(cell),
         ExperimentAction::Sort(sort) => experiments.sort = sort,
@@ -71,9 +72,9 @@ fn run(state: &mut State, worker: &mut ExperimentWorker) {
         }
     };
     match worker.run(experiment.clone()) {
-        Ok(()) => {
+        Ok(number) => {
             state.notice = None;
-            state.experiments.begin(experiment);
+            state.experiments.begin(experiment, number);
         }
         Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
     }

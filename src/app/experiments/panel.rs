@@ -218,7 +218,7 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         {
             actions.push(ExperimentAction::Run.into());
         }
-        let can_cancel = experiments.running.is_some_and(|running| !running.is_cancelled);
+        let can_cancel = experiments.running.is_some();
         let cancel = ui.add_enabled(can_cancel, ghost_button(theme, "■ Cancel").min_size(size));
         if cancel
             .on_hover_text("End it; what is finished stays (Ctrl+.)")
@@ -243,7 +243,6 @@ fn progress_ui(ui: &mut Ui, running: &Running) {
         eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::ProgressIndicator, true, label)
     });
     let left = match running.time_left {
-        _ if running.is_cancelled => "ending".to_owned(),
         Some(time) => format!("about {} left", format_duration(time)),
         None => "time left not known yet".to_owned(),
     };

@@ -1,21 +1,24 @@
 //! The pictures of the paper's experiments.
 
-use eframe::egui::{Color32, RichText, Sense, Ui, vec2};
-use egui_plot::{GridMark, HLine, Line, LineStyle, MarkerShape, PlotPoints, PlotUi, Points, Span, VLine};
-
-use super::{
-    Outcome,
-    figures::{CellPoint, trial_points, z_points},
+use eframe::egui::{Align2, Color32, Label, RichText, Sense, Ui, vec2};
+use egui_plot::{
+    GridMark, HLine, Line, LineStyle, MarkerShape, PlotPoint, PlotPoints, PlotUi, Points, Span, Text, VLine,
 };
+
+use super::Outcome;
 use crate::{
     app::{
         charts::{
-            Key, Mark, legend_ui,
+            Key, Mark, legend_ui, legend_width,
             plot_style::{log_marks, log_text, plot, whole_marks},
         },
-        theme::{Theme, space, type_size},
+        theme::{Theme, semibold, space, type_size},
     },
-    evaluation::experiments::{CellSummary, Figure},
+    evaluation::{Errors, experiments::CellSummary},
+    export::{
+        experiment_points::{CellPoint, trial_points, z_points},
+        repeat_name,
+    },
     network::HiddenSuggestions,
 };
 
@@ -29,17 +32,19 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
         key("bound of the bottleneck", Mark::Dashes, palette.validation_series),
         key("linear map", Mark::Dashes, palette.dim),
     ];
-    legend_ui(ui, &keys);
-    let points = z_points(outcome);
+    keys_ui(ui, &keys);
+    let points = z_points(&outcome.results, &outcome.summaries);
     let scale = outcome.results.experiment.base.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let (fewest, most) = (
         *suggested.square_root.start() as f64,
         *suggested.square_root.end() as f64,
     );
+    let highest = largest(&points).max(1.0);
     plot(ui, "table 1", "hidden nodes", "Z error (%)")
         .include_y(0.0)
-        .include_y(1.1 * largest(&points))
+        .include_y(1.1 * highest)
+        .set_margin_fraction(vec2(0.03, 0.02))
         .include_x(suggested.logarithm as f64)
         .include_x(points.iter().map(|point| point.x).fold(most, f64::max))
         .show(ui, |plot_ui| {
@@ -47,6 +52,15 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
             plot_ui.span(band.border_color(Color32::TRANSPARENT));
             let log = VLine::new("Eq. (13)", suggested.logarithm as f64).color(palette.warning);
             plot_ui.vline(log.width(1.2));
+            let top = PlotPoint::new(suggested.logarithm as f64, plot_ui.plot_bounds().max()[1]);
+            let name = RichText::new(" Eq. (13)")
+                .font(semibold(type_size().body))
+                .color(palette.text);
+            plot_ui.text(
+                Text::new("Eq. (13)", top, name)
+                    .anchor(Align2::LEFT_TOP)
+                    .color(palette.dim),
+            );
             dashed(
                 plot_ui,
                 "linear map",
@@ -69,6 +83,18 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
         });
 }
 
+/// In two rows where one would be too long.
+fn keys_ui(ui: &mut Ui, keys: &[Key]) {
+    let rows = if legend_width(ui, keys) > ui.available_width() {
+        2
+    } else {
+        1
+    };
+    for row in keys.chunks(keys.len().div_ceil(rows)) {
+        legend_ui(ui, row);
+    }
+}
+
 /// Z error of each cell, side by side.
 pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
     let palette = Theme::of(ui).palette;
@@ -78,8 +104,8 @@ pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
         key("published", Mark::Squares, palette.text),
         key("linear map", Mark::Dashes, palette.dim),
     ];
-    legend_ui(ui, &keys);
-    let points = z_points(outcome);
+    keys_ui(ui, &keys);
+    let points = z_points(&outcome.results, &outcome.summaries);
     let axis = &outcome.results.experiment.axis;
     let labels: Vec<String> = (0..axis.len()).map(|index| axis.label(index)).collect();
     let count = labels.len();
@@ -94,7 +120,8 @@ pub fn side_by_side_ui(ui: &mut Ui, outcome: &Outcome) {
         })
         .x_axis_formatter(move |mark, _| labels.get(mark.value.round() as usize).cloned().unwrap_or_default())
         .include_y(0.0)
-        .include_y(1.1 * largest(&points))
+        .include_y(1.1 * largest(&points).max(1.0))
+        .set_margin_fraction(vec2(0.02, 0.02))
         .include_x(-0.5)
         .include_x(count as f64 - 0.5)
         .show(ui, |plot_ui| {
@@ -186,21 +213,54 @@ pub fn repeats_ui(ui: &mut Ui, outcome: &Outcome) {
             ui.label(RichText::new(name).size(type_size().note).color(palette.dim));
             ui.add_space(space(2));
         }
-        let text = "Dashed: published, in the same colour";
-        ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+        let is_zero = |cell: &CellSummary| cell.y_percent.median == Some(0.0);
+        let text = if outcome.summaries.iter().any(is_zero) {
+            "Dashed: published. Y is constant: our error of it is 0 and below its axis"
+        } else {
+            "Dashed: published"
+        };
+        ui.add(Label::new(RichText::new(text).size(type_size().note).color(palette.dim)).truncate());
     });
-    let panels: [(&'static str, &str, fn(&CellSummary) -> &Figure); 3] = [
-        ("fig 5 z", "Z error (%)", |cell| &cell.z_percent),
-        ("fig 5 x", "X error (%)", |cell| &cell.x_percent),
-        ("fig 5 y", "Y error (%)", |cell| &cell.y_percent),
+    type Published = fn(&CellSummary) -> Option<f64>;
+    type Measured = fn(&Errors) -> Option<f64>;
+    let panels: [(&'static str, &str, Published, Measured); 3] = [
+        (
+            "fig 5 z",
+            "Z error (%)",
+            |cell| cell.z_percent.published,
+            |errors| errors.z_percent,
+        ),
+        (
+            "fig 5 x",
+            "X error (%)",
+            |cell| cell.x_percent.published,
+            |errors| errors.x_percent,
+        ),
+        (
+            "fig 5 y",
+            "Y error (%)",
+            |cell| cell.y_percent.published,
+            |errors| errors.y_percent,
+        ),
     ];
+    let experiment = &outcome.results.experiment;
+    let trials = outcome
+        .results
+        .cells
+        .iter()
+        .map(|cell| cell.expected)
+        .max()
+        .unwrap_or(1);
+    let x_name = repeat_name(&outcome.results);
     let (width, height) = ((ui.available_width() - 2.0 * space(2)) / 3.0, ui.available_height());
     ui.horizontal(|ui| {
-        for (id, y_name, figure) in panels {
+        for (id, y_name, published, measured) in panels {
             // Y is constant, so its error is of the size of rounding for some and not for others.
             let is_log = id == "fig 5 y";
             let on_axis = move |value: f64| if is_log { value.log10() } else { value };
-            let mut chart = plot(ui, id, "repeat", y_name)
+            let mut chart = plot(ui, id, x_name, y_name)
+                .include_x(0.5)
+                .include_x(trials as f64 + 0.5)
                 .width(width)
                 .height(height)
                 .x_grid_spacer(whole_marks);
@@ -212,12 +272,12 @@ pub fn repeats_ui(ui: &mut Ui, outcome: &Outcome) {
                 chart = chart.include_y(0.0);
             }
             chart.set_margin_fraction(vec2(0.04, 0.08)).show(ui, |plot_ui| {
-                for (at, cell) in outcome.summaries.iter().enumerate() {
+                for (at, (cell, summary)) in outcome.results.cells.iter().zip(&outcome.summaries).enumerate() {
                     let colour = colours[at % colours.len()];
-                    let figure = figure(cell);
-                    let points = trial_points(figure).into_iter().map(|[x, y]| [x, on_axis(y)]);
+                    let points = trial_points(experiment, cell, measured);
+                    let points = points.into_iter().map(|[x, y]| [x, on_axis(y)]);
                     let points: Vec<[f64; 2]> = points.filter(|point| point[1].is_finite()).collect();
-                    if let Some(published) = figure.published.map(on_axis).filter(|value| value.is_finite()) {
+                    if let Some(published) = published(summary).map(on_axis).filter(|value| value.is_finite()) {
                         let line = HLine::new("published", published).color(colour).width(1.2);
                         plot_ui.hline(line.style(LineStyle::dashed_dense()));
                     }

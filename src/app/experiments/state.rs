@@ -4,10 +4,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{ExperimentFile, Form};
+use super::{ExperimentFile, Form, worker::RunNumber};
 use crate::{
-    evaluation::experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Verdict, verdicts},
+    evaluation::{
+        RunSettings,
+        experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
+    },
     export::ExperimentTable,
+    training::EpochRecord,
 };
 
 /// What the Experiments view is about.
@@ -67,7 +71,13 @@ struct CheckedForm {
     form: Form,
     /// How many trials it has, or why it is no experiment.
     checked: Result<usize, String>,
+    /// What it would fill in, with the published figures.
+    preview: Option<Outcome>,
 }
+
+/// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
+/// are trained again when they are to be seen.
+const MOST_KEPT_BYTES: usize = 400_000_000;
 
 /// The order of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,8 +101,8 @@ pub struct Running {
     pub time_left: Option<Duration>,
     /// When it began.
     pub begun: Instant,
-    /// Whether it has been told to end.
-    pub is_cancelled: bool,
+    /// By which its news are known.
+    pub(in crate::app) number: RunNumber,
 }
 
 /// How an experiment ended.
@@ -119,6 +129,7 @@ pub struct Outcome {
     pub ending: Option<Ending>,
     /// How long it took, once it has ended.
     pub took: Option<Duration>,
+    kept_bytes: usize,
 }
 
 impl Outcome {
@@ -131,6 +142,7 @@ impl Outcome {
             results: Arc::new(results),
             ending: None,
             took: None,
+            kept_bytes: 0,
         }
     }
 
@@ -140,6 +152,21 @@ impl Outcome {
         cells.fold((0, 0), |(done, all), cell| {
             (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
         })
+    }
+
+    fn record(&mut self, finished: Finished) {
+        let results = Arc::make_mut(&mut self.results);
+        let settings = results.cells[finished.cell].cell.settings;
+        let outcome = finished.outcome.map(|mut trial| {
+            let bytes = bytes_of(&trial, &settings);
+            if self.kept_bytes + bytes > MOST_KEPT_BYTES {
+                trial.states = Vec::new();
+            } else {
+                self.kept_bytes += bytes;
+            }
+            trial
+        });
+        results.record(finished.cell, outcome);
     }
 
     fn refresh(&mut self) {
@@ -187,12 +214,13 @@ impl ExperimentsState {
 
     /// Takes a changed form of what is looked at.
     pub fn edit(&mut self, form: Form) {
-        let trials = |experiment| {
-            let results = ExperimentResults::new(experiment);
-            results.cells.iter().map(|cell| cell.expected).sum()
+        let preview = form.experiment().map(Outcome::new);
+        let (checked, preview) = match preview {
+            Ok(preview) => (Ok(preview.trials().1), Some(preview)),
+            Err(error) => (Err(error.to_string()), None),
         };
-        let checked = form.experiment().map(trials).map_err(|error| error.to_string());
-        self.forms.insert(self.topic, CheckedForm { form, checked });
+        let checked = CheckedForm { form, checked, preview };
+        self.forms.insert(self.topic, checked);
     }
 
     /// Whether what is looked at can be run now.
@@ -201,7 +229,7 @@ impl ExperimentsState {
     }
 
     /// Makes room for the results of `experiment`.
-    pub fn begin(&mut self, experiment: Experiment) {
+    pub(in crate::app) fn begin(&mut self, experiment: Experiment, number: RunNumber) {
         let outcome = Outcome::new(experiment);
         self.running = Some(Running {
             topic: self.topic,
@@ -209,7 +237,7 @@ impl ExperimentsState {
             trials: outcome.trials().1,
             time_left: None,
             begun: Instant::now(),
-            is_cancelled: false,
+            number,
         });
         self.marked = None;
         self.sort = SortBy::default();
@@ -222,11 +250,10 @@ impl ExperimentsState {
         let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
             return;
         };
-        let results = Arc::make_mut(&mut outcome.results);
         for finished in finished {
             running.done = finished.done;
             running.time_left = finished.time_left;
-            results.record(finished.cell, finished.outcome);
+            outcome.record(finished);
         }
         outcome.refresh();
     }
@@ -251,6 +278,11 @@ impl ExperimentsState {
         self.outcome_of(self.topic)
     }
 
+    /// What is to be shown of it: what is known or, before anything is run, the published figures.
+    pub fn shown(&self) -> Option<&Outcome> {
+        self.outcome().or(self.forms[&self.topic].preview.as_ref())
+    }
+
     /// What is known of an experiment.
     pub fn outcome_of(&self, topic: Topic) -> Option<&Outcome> {
         self.outcomes.get(&topic)
@@ -261,6 +293,15 @@ impl ExperimentsState {
         let name = topic.name().to_lowercase().replace(' ', "_");
         format!("{name}{}", file.ending())
     }
+}
+
+/// About how much memory the finished training of a trial takes.
+fn bytes_of(trial: &Trial, settings: &RunSettings) -> usize {
+    let scale = settings.sensor.scale;
+    let weights = settings.hidden * (scale.columns() + 1) + (settings.hidden + 1) * scale.coordinates_per_row();
+    // The present and the best weights, and up to as many numbers of the method's own.
+    let of_start = 4 * weights * size_of::<f64>();
+    trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
 }
 
 impl Default for ExperimentsState {

@@ -10,10 +10,7 @@ use crate::{
 pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsState) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&experiments.running, experiments.outcome()) {
-        (Some(running), _) => {
-            let word = if running.is_cancelled { "Ending" } else { "Running" };
-            (palette.accent, format!("{word} {}", running.topic.name()))
-        }
+        (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),
         (None, Some(outcome)) => {
             let (done, all) = outcome.trials();
             let took = outcome

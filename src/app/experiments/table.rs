@@ -3,17 +3,19 @@
 use std::cmp::Ordering;
 
 use eframe::egui::{
-    Align2, Color32, CursorIcon, FontId, Rect, ScrollArea, Sense, Stroke, Ui, WidgetInfo, accesskit::Role, pos2, vec2,
+    Align2, Color32, CursorIcon, FontId, Rect, Response, ScrollArea, Sense, Stroke, Ui, WidgetInfo, accesskit::Role,
+    pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, SortBy};
+use super::{ExperimentAction, Outcome, SortBy, open_cell::open_cell};
 use crate::app::{
+    Action,
     state::State,
     theme::{Theme, semibold, space, type_size},
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
-pub fn table_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<ExperimentAction> {
+pub fn table_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
     let mut actions = Vec::new();
     let experiments = &state.experiments;
     let order = order(outcome, experiments.sort);
@@ -29,8 +31,12 @@ pub fn table_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Experiment
         body.show_rows(ui, row_height, order.len(), |ui, range| {
             for &cell in &order[range] {
                 let is_marked = experiments.marked == Some(cell);
-                if row_ui(ui, outcome, cell, is_marked, &places, total) {
-                    actions.push(ExperimentAction::Mark(cell));
+                let row = row_ui(ui, outcome, cell, is_marked, &places, total);
+                if row.clicked() {
+                    actions.push(ExperimentAction::Mark(cell).into());
+                }
+                if row.double_clicked() {
+                    actions.extend(open_cell(state, outcome, cell));
                 }
             }
         });
@@ -92,9 +98,10 @@ fn heading_ui(
     sort: SortBy,
     places: &[[f32; 2]],
     total: f32,
-    actions: &mut Vec<ExperimentAction>,
+    actions: &mut Vec<Action>,
 ) {
     let palette = Theme::of(ui).palette;
+    let axes = outcome.results.experiment.axes().count();
     let (line, _) = ui.allocate_exact_size(vec2(total, space(6)), Sense::hover());
     for (column, (heading, place)) in outcome.table.headings.iter().zip(places).enumerate() {
         let rect = cell_rect(line, *place);
@@ -106,10 +113,11 @@ fn heading_ui(
             .on_hover_text("Order the table by this column");
         if response.clicked() {
             let is_descending = is_sorted && !sort.is_descending;
-            actions.push(ExperimentAction::Sort(SortBy {
+            let sort = SortBy {
                 column: Some(column),
                 is_descending,
-            }));
+            };
+            actions.push(ExperimentAction::Sort(sort).into());
         }
         let colour = if is_sorted || response.hovered() {
             palette.text
@@ -126,11 +134,20 @@ fn heading_ui(
         } else {
             FontId::proportional(type_size().small)
         };
-        ui.painter()
-            .text(rect.right_center(), Align2::RIGHT_CENTER, text, font, colour);
+        cell_text(ui, rect, column < axes, text, font, colour);
     }
     ui.painter()
         .hline(line.x_range(), line.bottom(), Stroke::new(1.0, palette.line));
+}
+
+/// What is varied stands at the left of its column, figures at the right.
+fn cell_text(ui: &Ui, rect: Rect, is_name: bool, text: String, font: FontId, colour: Color32) {
+    let (place, anchor) = if is_name {
+        (rect.left_center() + vec2(space(1), 0.0), Align2::LEFT_CENTER)
+    } else {
+        (rect.right_center(), Align2::RIGHT_CENTER)
+    };
+    ui.painter().text(place, anchor, text, font, colour);
 }
 
 fn cell_rect(line: Rect, [left, right]: [f32; 2]) -> Rect {
@@ -140,8 +157,7 @@ fn cell_rect(line: Rect, [left, right]: [f32; 2]) -> Rect {
     )
 }
 
-/// Whether the row was clicked.
-fn row_ui(ui: &mut Ui, outcome: &Outcome, cell: usize, is_marked: bool, places: &[[f32; 2]], total: f32) -> bool {
+fn row_ui(ui: &mut Ui, outcome: &Outcome, cell: usize, is_marked: bool, places: &[[f32; 2]], total: f32) -> Response {
     let palette = Theme::of(ui).palette;
     let (line, response) = ui.allocate_exact_size(vec2(total, space(6)), Sense::click());
     let texts = &outcome.table.rows[cell];
@@ -169,16 +185,18 @@ fn row_ui(ui: &mut Ui, outcome: &Outcome, cell: usize, is_marked: bool, places: 
         } else {
             FontId::proportional(type_size().note)
         };
-        ui.painter()
-            .text(rect.right_center(), Align2::RIGHT_CENTER, text, font, colour);
+        cell_text(ui, rect, column < axes, text.clone(), font, colour);
         if column >= axes {
             let figure = ui.interact(rect, ui.scope_id().with(("figure", cell, column)), Sense::hover());
             figure.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{name}, {heading}: {text}")));
+            if heading.starts_with("linear") && loses {
+                figure.on_hover_text("The linear map does better here than the network");
+            }
         }
     }
     ui.painter()
         .hline(line.x_range(), line.bottom(), Stroke::new(0.5, palette.line));
-    response.clicked()
+    response
 }
 
 fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {

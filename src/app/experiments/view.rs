@@ -1,6 +1,12 @@
 use eframe::egui::{Sense, Ui};
 
-use super::{Outcome, Topic, heat_map::heat_map_ui, plots, results_card::results_card_ui, verdict_list::verdicts_ui};
+use super::{
+    Outcome, Topic,
+    heat_map::heat_map_ui,
+    plots,
+    results_card::{results_card_height, results_card_ui},
+    verdict_list::verdicts_ui,
+};
 use crate::{
     app::{
         Action,
@@ -14,22 +20,24 @@ use crate::{
 pub fn experiments_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut actions = Vec::new();
     let whole = ui.available_rect_before_wrap();
-    let Some(outcome) = state.experiments.outcome() else {
+    let Some(outcome) = state.experiments.shown() else {
         card_ui(ui, whole, |ui| {
-            placeholder_ui(
-                ui,
-                "Press Run: the figures appear here as they come, beside the published ones.",
-            );
+            placeholder_ui(ui, "The values on the left cannot be run yet: the note there says why.");
         });
         return actions;
     };
     let gap = space(2);
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + table_height(outcome, whole.height()));
+    let height = results_card_height(ui, outcome, whole.width()).min((0.53 * whole.height()).round());
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height);
     card_ui(ui, upper, |ui| actions.extend(results_card_ui(ui, state, outcome)));
     let lower = lower.with_min_y(lower.min.y + gap);
     let (left, right) = lower.split_left_right_at_x(lower.left() + (0.6 * lower.width()).round());
     card_ui(ui, left, |ui| actions.extend(picture_ui(ui, state, outcome)));
     card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
+        if outcome.trials().0 == 0 {
+            placeholder_ui(ui, hint(state));
+            return;
+        }
         section_heading_ui(ui, "What this run says");
         scrolled_ui(ui, "verdicts", |ui| verdicts_ui(ui, outcome));
     });
@@ -37,12 +45,14 @@ pub fn experiments_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     actions
 }
 
-/// As high as its rows, but leaves more than half to the picture.
-fn table_height(outcome: &Outcome, whole: f32) -> f32 {
-    let rows = space(6) * (outcome.table.rows.len() as f32 + 1.0);
-    // Title, conditions, note, and the margins of the card.
-    let rest = space(34);
-    (rows + rest).min(0.48 * whole)
+/// Why there is no figure yet.
+fn hint(state: &State) -> &'static str {
+    let experiments = &state.experiments;
+    match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) if running.topic == experiments.topic => "The figures appear as the trials finish.",
+        (_, Some(_)) => "It ended before the first trial was finished.",
+        _ => "Press Run: our figures appear beside the published ones as they come.",
+    }
 }
 
 fn picture_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
@@ -51,9 +61,7 @@ fn picture_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
         Topic::Table(PaperTable::CrossValidation) => plots::repeats_ui(ui, outcome),
         Topic::Table(PaperTable::ArrayScales) => plots::side_by_side_ui(ui, outcome),
         Topic::Sweep => {
-            let marked = state.experiments.marked;
-            let actions = heat_map_ui(ui, outcome, marked).into_iter();
-            return actions.map(Action::from).collect();
+            return heat_map_ui(ui, state, outcome);
         }
     }
     Vec::new()

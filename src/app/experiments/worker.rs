@@ -1,5 +1,5 @@
-//! The threads of an experiment: one that hands over what is finished, and as many that train as there are cores but
-//! one. All of them yield to the window.
+//! The threads of an experiment: one that hands over what is finished, and as many that train as there are cores. All
+//! of them yield to the window.
 
 use std::{
     fmt,
@@ -18,13 +18,17 @@ use crate::{
     evaluation::experiments::{Experiment, ExperimentResults, Finished, run_experiments, worker_threads},
 };
 
-/// What the threads tell the window.
+/// Tells experiments apart that were begun in one window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunNumber(u64);
+
+/// What the threads tell the window. What a cancelled experiment still had in hand comes with its own number.
 #[derive(Debug)]
 pub enum ExperimentEvent {
     /// A trial has come to something.
-    Finished(Box<Finished>),
+    Finished(RunNumber, Box<Finished>),
     /// The experiment has ended, or why it could not go on.
-    Ended(Result<(), String>),
+    Ended(RunNumber, Result<(), String>),
     /// A file was written, or why not.
     Written(Result<PathBuf, String>),
 }
@@ -34,6 +38,7 @@ pub struct ExperimentWorker {
     report: Report,
     events: Receiver<ExperimentEvent>,
     is_cancelled: Arc<AtomicBool>,
+    latest: RunNumber,
 }
 
 #[derive(Clone)]
@@ -61,18 +66,21 @@ impl ExperimentWorker {
             },
             events,
             is_cancelled: Arc::default(),
+            latest: RunNumber::default(),
         }
     }
 
-    /// Runs `experiment`; one that still runs is cancelled.
+    /// Runs `experiment` and tells its number; one that still runs is cancelled.
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn run(&mut self, experiment: Experiment) -> std::io::Result<()> {
+    pub fn run(&mut self, experiment: Experiment) -> std::io::Result<RunNumber> {
         self.cancel();
+        let number = RunNumber(self.latest.0 + 1);
         self.is_cancelled = Arc::default();
         let is_cancelled = Arc::clone(&self.is_cancelled);
         let mut ending = EndingReport {
+            number,
             report: self.report.clone(),
             result: Err("The experiment ended unexpectedly; what is finished stays.".to_owned()),
         };
@@ -80,16 +88,21 @@ impl ExperimentWorker {
             yield_to_window();
             let result = run_experiments(
                 &[experiment],
-                worker_threads(true),
+                worker_threads(false),
                 || is_cancelled.load(Ordering::Relaxed),
-                |finished| ending.report.send(ExperimentEvent::Finished(Box::new(finished))),
+                |finished| {
+                    ending
+                        .report
+                        .send(ExperimentEvent::Finished(number, Box::new(finished)))
+                },
             );
             ending.replace(result.map_err(|error| error.to_string()));
         })?;
-        Ok(())
+        self.latest = number;
+        Ok(number)
     }
 
-    /// Ends the experiment after the epochs in progress.
+    /// Ends the experiment. Its threads end after the epochs in progress, which nobody waits for.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
@@ -129,6 +142,7 @@ impl fmt::Debug for ExperimentWorker {
 
 /// Tells the end when dropped, also by a panic.
 struct EndingReport {
+    number: RunNumber,
     report: Report,
     result: Result<(), String>,
 }
@@ -142,6 +156,6 @@ impl EndingReport {
 impl Drop for EndingReport {
     fn drop(&mut self) {
         let result = std::mem::replace(&mut self.result, Ok(()));
-        self.report.send(ExperimentEvent::Ended(result));
+        self.report.send(ExperimentEvent::Ended(self.number, result));
     }
 }

@@ -95,7 +95,7 @@ impl CellResults {
             .map(|spread| spread.smallest)
     }
 
-    /// The trial of median AveZerr (the lower one of two), whose network may stand for the cell.
+    /// The trial of median AveZerr (the lower one of two), which may stand for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let with_errors = self
             .trials
@@ -143,7 +143,7 @@ pub(super) mod tests {
             epochs: 10,
             seconds: 10.0,
             least_epoch_seconds: 1.0,
-            network: None,
+            states: Vec::new(),
         }
     }
 

@@ -10,7 +10,7 @@ use crate::{
     dataset::{Dataset, DatasetError, Folds, Seed, Split, Stream},
     decoupling::{Decoupler, LinearMap, TrainingMean},
     evaluation::{Baselines, Errors, Run, RunError, RunSettings},
-    network::DecouplingNetwork,
+    training::TrainerState,
 };
 
 /// What one trial of a cell came to.
@@ -35,8 +35,9 @@ pub struct Trial {
     pub seconds: f64,
     /// Time of the quickest epoch, which other work on the machine has disturbed least.
     pub least_epoch_seconds: f64,
-    /// The network; none from a cross-validation, which has one for each fold.
-    pub network: Option<DecouplingNetwork>,
+    /// Every start as it ended, which [`Run::resume`] takes up; none from a cross-validation, which has as many
+    /// networks as folds.
+    pub states: Vec<TrainerState>,
 }
 
 /// A trial that could not be carried out.
@@ -80,7 +81,7 @@ impl Trial {
             epochs: spent.epochs,
             seconds: spent.seconds,
             least_epoch_seconds: spent.least_epoch_seconds,
-            network: Some(run.network()),
+            states: run.states(),
         }))
     }
 
@@ -125,7 +126,7 @@ impl Trial {
             epochs: spent.epochs,
             seconds: spent.seconds,
             least_epoch_seconds: spent.least_epoch_seconds,
-            network: None,
+            states: Vec::new(),
         }))
     }
 }

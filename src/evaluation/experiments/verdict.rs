@@ -91,7 +91,7 @@ impl Measured {
             let place = cell.cell;
             let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
             Some(Self {
-                label: results.cell_labels(cell).join(", "),
+                label: results.cell_labels(cell).join("/"),
                 column: place.column,
                 z: cell.z_percent()?,
                 published: place.published.map(|published| published.z_percent),

@@ -7,7 +7,6 @@
 mod canvas;
 mod colour_bar;
 mod colours;
-mod experiment;
 mod frame;
 mod heat_map;
 mod nodes;
@@ -18,7 +17,6 @@ mod relief;
 mod surfaces;
 
 pub use colours::Hue;
-pub use experiment::experiment_figure;
 pub use heat_map::HeatMap;
 pub use nodes::node_plot;
 pub use picture::{Picture, PictureError, PictureFormat};
