@@ -489,10 +489,7 @@ mod tests {
         assert_eq!((window.state.phase, &window.state.notice), (ended, &None));
         assert!(window.state.result().is_some() && window.state.frames.decoupled.is_some());
 
-        window.apply(Action::Export(
-            super::super::ExportKind::Errors.into(),
-            "errors.csv".into(),
-        ));
+        window.apply(Action::Export(super::super::ExportKind::Errors, "errors.csv".into()));
         wait(&mut window, |state| state.notice.is_some());
         let lost = "the network was lost when the training thread ended: train again";
         assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
@@ -535,7 +532,7 @@ mod tests {
         assert!(window.state.result().is_some());
 
         window.apply(Action::DismissNotice);
-        window.apply(Action::Export(super::super::ExportKind::Network.into(), path.clone()));
+        window.apply(Action::Export(super::super::ExportKind::Network, path.clone()));
         wait(&mut window, |state| state.notice.is_some());
         assert_eq!(
             window.state.notice,

@@ -80,7 +80,15 @@ fn along_the_axis(results: &ExperimentResults) -> Plot {
     };
     let all = [
         reference("linear map", Hue::Grey, plain(|cell| cell.linear)),
-        reference("bound of the hidden nodes", Hue::Green, plain(|cell| cell.bound)),
+        reference(
+            "bound of the hidden nodes",
+            Hue::Green,
+            if is_number {
+                plain(|cell| cell.bound)
+            } else {
+                Vec::new()
+            },
+        ),
         series("published", Hue::Red, Marker::Square, plain(|cell| cell.published)),
         series("median, least to largest", Hue::Blue, Marker::Disc, ours.collect()),
     ];

@@ -91,9 +91,8 @@ impl ExperimentWorker {
                 worker_threads(false),
                 || is_cancelled.load(Ordering::Relaxed),
                 |finished| {
-                    ending
-                        .report
-                        .send(ExperimentEvent::Finished(number, Box::new(finished)))
+                    let news = ExperimentEvent::Finished(number, Box::new(finished));
+                    ending.report.send(news);
                 },
             );
             ending.replace(result.map_err(|error| error.to_string()));
