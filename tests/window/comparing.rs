@@ -123,7 +123,14 @@ fn a_damaged_list_is_told_of_and_kept_aside() {
     let aside = folder.path().join("workspace.json.damaged-1");
     assert!(driver.says(&aside.display().to_string()), "{:#?}", driver.texts());
     assert!(aside.exists());
-    driver.click("Dismiss");
+    drop(driver);
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    assert!(
+        driver.state().notice.is_none(),
+        "told once: {:?}",
+        driver.state().notice
+    );
     driver.configure_small();
     train_and_keep(&mut driver, 1);
     drop(driver);

@@ -10,11 +10,25 @@ use crate::{
 
 /// Takes what the thread has to tell.
 pub fn take_news(state: &mut State, worker: &RunsWorker) {
-    while let Some(event) = worker.next_event() {
+    loop {
+        let event = match worker.next_event() {
+            Ok(Some(event)) => event,
+            Ok(None) => return,
+            Err(_) => {
+                if !std::mem::replace(&mut state.runs.has_worker_died, true) {
+                    state.runs.path = None;
+                    let text = "The thread that keeps the run list ended unexpectedly: runs are not kept from now on. \
+                                Start the program again.";
+                    state.notice = Some(Notice::Failed(text.to_owned()));
+                }
+                return;
+            }
+        };
         match event {
             RunsEvent::Loaded(path, Ok(FoundWorkspace { workspace, warning })) => {
                 state.runs.path = Some(path);
-                take_up(state, workspace, worker);
+                // What was damaged is replaced at once, lest it be found again.
+                take_up(state, workspace, warning.is_some(), worker);
                 if let Some(warning) = warning {
                     state.notice = Some(Notice::Failed(warning));
                 }
@@ -31,7 +45,12 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
                     state.runs.compared[place] = Some(*compared);
                 }
             }
-            RunsEvent::Prepared(_, Err(reason)) => state.notice = Some(Notice::Failed(reason)),
+            RunsEvent::Prepared(place, Err(reason)) => {
+                if state.runs.compared[place].is_none() {
+                    state.runs.workspace.pinned[place] = None;
+                }
+                state.notice = Some(Notice::Failed(reason));
+            }
             RunsEvent::Written(Ok(path)) => {
                 state.typed = None;
                 state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
@@ -42,7 +61,7 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
 }
 
 /// Puts the runs of the file before those that were finished while it was read.
-fn take_up(state: &mut State, mut workspace: Workspace, worker: &RunsWorker) {
+fn take_up(state: &mut State, mut workspace: Workspace, is_repaired: bool, worker: &RunsWorker) {
     let runs = &mut state.runs;
     std::mem::swap(&mut runs.workspace, &mut workspace);
     let newer = workspace.runs;
@@ -51,7 +70,7 @@ fn take_up(state: &mut State, mut workspace: Workspace, worker: &RunsWorker) {
         let run = runs.new_run(run.file);
         runs.workspace.runs.push(run);
     }
-    if has_newer {
+    if has_newer || is_repaired {
         worker.ask(RunsRequest::Save(runs.workspace.clone()));
     }
     for place in 0..2 {

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc,
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Receiver, Sender, TryRecvError, channel},
     },
     thread::{self, JoinHandle},
 };
@@ -18,7 +18,7 @@ use crate::{
     app::{
         shown_figure::Undrawn,
         test_view::{Frame, TestView},
-        worker::yield_to_window,
+        worker::{WorkerDied, yield_to_window},
     },
     export::{
         FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError,
@@ -87,14 +87,21 @@ impl RunsWorker {
     /// Asks for something.
     pub fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
-            // The other end is gone only if the thread panicked, which it was built not to.
+            // The other end is gone only if the thread died, which the next look at the events shows.
             let _ = requests.send(request);
         }
     }
 
     /// The next event, if one has come.
-    pub fn next_event(&self) -> Option<RunsEvent> {
-        self.events.try_recv().ok()
+    ///
+    /// # Errors
+    /// The thread has ended.
+    pub fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
+        match self.events.try_recv() {
+            Ok(event) => Ok(Some(event)),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(WorkerDied),
+        }
     }
 }
 
