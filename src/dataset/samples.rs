@@ -4,7 +4,7 @@ use rand::Rng;
 use thiserror::Error;
 
 use crate::{
-    scene::Scene,
+    scene::{Noise, Scene},
     sensor::{SensorError, SensorModel},
 };
 
@@ -56,10 +56,11 @@ impl Dataset {
         let snapshots = samples.div_ceil(rows);
         let mut resistances_ohm = Array2::zeros((snapshots * rows, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((snapshots * rows, model.scale.coordinates_per_row()));
+        let sampler = scene.sampler(model);
         let readings = resistances_ohm.axis_chunks_iter_mut(Axis(0), rows);
         let positions = coordinates_mm.axis_chunks_iter_mut(Axis(0), rows);
         for (snapshot, (mut readings, mut positions)) in readings.zip(positions).enumerate() {
-            let deformation = scene.draw(model.scale, &model.geometry, rng);
+            let deformation = sampler.draw(rng);
             for row in 0..rows {
                 let mut reading = readings.row_mut(row);
                 let reading = reading.as_slice_mut().expect("a row of a standard array is contiguous");
@@ -79,6 +80,35 @@ impl Dataset {
             coordinates_mm,
             rows,
         })
+    }
+
+    /// Disturbs the readings, snapshot by snapshot. Deformations stay as they are, so sets with different noise compare.
+    ///
+    /// # Errors
+    /// A model without resistances at rest.
+    pub fn disturb(&mut self, model: &SensorModel, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
+        if noise.is_none() {
+            return Ok(());
+        }
+        let source = noise.source(model)?;
+        for mut snapshot in self.resistances_ohm.axis_chunks_iter_mut(Axis(0), self.rows) {
+            let readings = snapshot.as_slice_mut().expect("rows of a standard array are contiguous");
+            source.disturb(readings, rng);
+        }
+        Ok(())
+    }
+
+    /// The samples of one row-wire of whole snapshots, in their order.
+    ///
+    /// # Panics
+    /// If the array has no such row-wire.
+    pub fn of_row(&self, row: usize) -> Self {
+        assert!(row < self.rows);
+        let samples: Vec<usize> = (row..self.samples()).step_by(self.rows).collect();
+        Self {
+            rows: 1,
+            ..self.select(&samples)
+        }
     }
 
     /// Number of samples.
@@ -166,6 +196,29 @@ mod tests {
     fn more_samples_extend_a_set_without_changing_its_beginning() {
         let (few, many) = (draw("10x6_3x18", 20, 3), draw("10x6_3x18", 40, 3));
         assert_eq!(few, many.select(&(0..20).collect::<Vec<_>>()));
+    }
+
+    #[test]
+    fn a_row_is_every_sample_of_it() {
+        let set = draw("10x6_3x18", 30, 3);
+        let row = set.of_row(4);
+        assert_eq!((row.samples(), row.snapshots()), (3, 3));
+        assert_eq!(row.resistances_ohm, set.select(&[4, 14, 24]).resistances_ohm);
+    }
+
+    #[test]
+    fn noise_changes_readings_and_not_deformations() {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let clean = draw("10x6_3x18", 30, 3);
+        let mut noisy = clean.clone();
+        let mut rng = Seed(3).rng(Stream::TrainingNoise);
+        noisy.disturb(&model, &Noise::relative(1e-3), &mut rng).unwrap();
+        assert_eq!(noisy.coordinates_mm, clean.coordinates_mm);
+        let ratio = (&noisy.resistances_ohm / &clean.resistances_ohm).mapv(|ratio| (ratio - 1.0).abs());
+        let mean = ratio.mean().unwrap();
+        // Mean of the absolute value of a normal deviate.
+        let expected = 1e-3 * (2.0 / std::f64::consts::PI).sqrt();
+        assert!((mean / expected - 1.0).abs() < 0.1, "{mean}");
     }
 
     #[test]

@@ -20,6 +20,12 @@ pub enum Stream {
     Start,
     /// Which samples are held out for validation.
     Split,
+    /// What disturbs the readings of the training (and validation) set.
+    TrainingNoise,
+    /// What disturbs the readings of the test set.
+    TestNoise,
+    /// Draws that estimate an expectation, such as the spread of a scene.
+    Expectation,
 }
 
 impl Seed {

@@ -1,10 +1,16 @@
 //! Decoupling: the resistances of rows in, the coordinates of their nodes out. Beside the network stand two
 //! baselines, so that a reader sees what the network adds.
 
+mod box_posterior;
 mod linear_map;
+mod newton;
+mod posterior;
+mod row_problem;
 mod training_mean;
 
 pub use linear_map::LinearMap;
+pub use newton::{Newton, NewtonError, NewtonReport, NewtonRules, NewtonStop, resistance_residual};
+pub use posterior::{Posterior, PosteriorReport};
 pub use training_mean::TrainingMean;
 
 use ndarray::{Array2, ArrayView2};

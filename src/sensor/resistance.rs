@@ -78,6 +78,12 @@ impl SensorModel {
         )
     }
 
+    /// The displacement that puts a node at `position_mm`, z counting downwards: the inverse of [`Self::displaced_mm`].
+    pub fn displacement_mm(&self, row: usize, node: usize, position_mm: DVec3) -> DVec3 {
+        let apart = position_mm - self.geometry.row_node_mm(self.scale, row, node);
+        DVec3::new(apart.x, apart.y, -apart.z)
+    }
+
     /// Row-column resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them),
     /// written to `resistances_ohm` (M4), Eq. (2):
     ///
