@@ -92,7 +92,9 @@ impl Dataset {
         }
         let source = noise.source(model)?;
         for mut snapshot in self.resistances_ohm.axis_chunks_iter_mut(Axis(0), self.rows) {
-            let readings = snapshot.as_slice_mut().expect("rows of a standard array are contiguous");
+            let readings = snapshot
+                .as_slice_mut()
+                .expect("rows of a standard array are contiguous");
             source.disturb(readings, rng);
         }
         Ok(())

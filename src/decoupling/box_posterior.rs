@@ -1,4 +1,7 @@
-use faer::{Mat, Side, linalg::solvers::{DenseSolveCore, Solve}};
+use faer::{
+    Mat, Side,
+    linalg::solvers::{DenseSolveCore, Solve},
+};
 
 use super::row_problem::Range;
 
@@ -113,11 +116,11 @@ struct Cavity {
 }
 
 impl Cavity {
-    /// Moments of the factor cut to a range, by the trapezoidal rule over the part that carries weight.
+    /// Moments of the factor cut to a range, by Simpson's rule over the part that carries weight.
     fn cut_to(self, range: Range) -> Marginal {
         /// exp(−36) ends what carries weight.
         const DECAY: f64 = 36.0;
-        const POINTS: usize = 96;
+        const POINTS: usize = 97;
         let precision = self.precision.max(0.0);
         let mode = range.clamp(self.linear / precision);
         // ln p at mode + t is slope t − ½ precision t²; the slope is 0 or points out of the range.
@@ -126,25 +129,32 @@ impl Cavity {
         let lowest = range.lowest.max(mode - reach(slope.max(0.0)));
         let highest = range.highest.min(mode + reach((-slope).max(0.0)));
         let step = (highest - lowest) / (POINTS - 1) as f64;
-        let mut weights = [0.0; POINTS];
+        let mut density = [0.0; POINTS];
         let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
-        for (k, weight) in weights.iter_mut().enumerate() {
+        for (k, density) in density.iter_mut().enumerate() {
             let t = lowest + step * k as f64 - mode;
-            let ends = if k == 0 || k == POINTS - 1 { 0.5 } else { 1.0 };
-            *weight = ends * (slope * t - 0.5 * precision * t * t).exp();
-            total += *weight;
-            first += *weight * t;
-            second += *weight * t * t;
+            let simpson = match k {
+                0 => 1.0,
+                _ if k == POINTS - 1 => 1.0,
+                _ if k % 2 == 1 => 4.0,
+                _ => 2.0,
+            };
+            *density = (slope * t - 0.5 * precision * t * t).exp();
+            total += simpson * *density;
+            first += simpson * *density * t;
+            second += simpson * *density * t * t;
         }
         let mean = first / total;
-        let mut below = 0.0;
+        // Half of the area under the density, by trapezoids.
+        let trapezoid = |k: usize| 0.5 * (density[k] + density[k + 1]);
+        let mut left = 0.5 * (0..POINTS - 1).map(trapezoid).sum::<f64>();
         let mut median = mode + mean;
-        for (k, &weight) in weights.iter().enumerate() {
-            if below + weight >= 0.5 * total {
-                median = lowest + step * (k as f64 - 0.5 + (0.5 * total - below) / weight);
+        for k in 0..POINTS - 1 {
+            if left <= trapezoid(k) {
+                median = lowest + step * (k as f64 + left / trapezoid(k));
                 break;
             }
-            below += weight;
+            left -= trapezoid(k);
         }
         Marginal {
             mean: mode + mean,
@@ -178,8 +188,14 @@ mod tests {
             let ratio = (density(alpha) - density(beta)) / mass;
             let expected = mean + deviation * ratio;
             let spread = 1.0 + (alpha * density(alpha) - beta * density(beta)) / mass - ratio * ratio;
-            assert!((ours.mean - expected).abs() < 2e-4 * deviation.min(1.0), "{mean} {deviation}: {ours:?}");
-            assert!((ours.variance / (deviation * deviation * spread) - 1.0).abs() < 2e-3, "{mean} {deviation}");
+            assert!(
+                (ours.mean - expected).abs() < 2e-4 * deviation.min(1.0),
+                "{mean} {deviation}: {ours:?}"
+            );
+            assert!(
+                (ours.variance / (deviation * deviation * spread) - 1.0).abs() < 2e-3,
+                "{mean} {deviation}"
+            );
             let below = (normal_cdf((ours.median - mean) / deviation) - normal_cdf(alpha)) / mass;
             assert!((below - 0.5).abs() < 2e-3, "{mean} {deviation}: {below}");
         }
@@ -235,8 +251,14 @@ mod tests {
                 let mean = first[i] / total;
                 let deviation = (second[i] / total - mean * mean).sqrt();
                 let ours = marginals[i];
-                assert!((ours.mean - mean).abs() < 0.03 * deviation, "{trial}: {ours:?} {mean} {deviation}");
-                assert!((ours.variance.sqrt() / deviation - 1.0).abs() < 0.05, "{trial}: {ours:?} {deviation}");
+                assert!(
+                    (ours.mean - mean).abs() < 0.03 * deviation,
+                    "{trial}: {ours:?} {mean} {deviation}"
+                );
+                assert!(
+                    (ours.variance.sqrt() / deviation - 1.0).abs() < 0.05,
+                    "{trial}: {ours:?} {deviation}"
+                );
             }
         }
     }

@@ -2,15 +2,27 @@
 //! baselines, so that a reader sees what the network adds.
 
 mod box_posterior;
+mod compiled_network;
+mod equation_decoders;
+mod frame;
 mod linear_map;
 mod newton;
 mod posterior;
+mod radial_basis;
+mod real;
+mod ridge_map;
 mod row_problem;
 mod training_mean;
 
+pub use compiled_network::CompiledNetworks;
+pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
+pub use frame::{DecodeError, FrameDecoder, RowMap, RowMaps, decode_set, fit_rows};
 pub use linear_map::LinearMap;
 pub use newton::{Newton, NewtonError, NewtonReport, NewtonRules, NewtonStop, resistance_residual};
 pub use posterior::{Posterior, PosteriorReport};
+pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
+pub use real::Real;
+pub use ridge_map::RidgeMap;
 pub use training_mean::TrainingMean;
 
 use ndarray::{Array2, ArrayView2};
@@ -26,5 +38,11 @@ pub trait Decoupler {
 impl Decoupler for DecouplingNetwork {
     fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
         Self::decouple(self, resistances_ohm)
+    }
+}
+
+impl RowMap for TrainingMean {
+    fn map(&mut self, _readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
+        coordinates_mm.copy_from_slice(self.coordinates_mm());
     }
 }

@@ -3,7 +3,7 @@ use std::fmt;
 use faer::{Mat, linalg::solvers::SolveLstsq};
 use thiserror::Error;
 
-use super::row_problem::{Range, RowProblem, ranges};
+use super::row_problem::{Range, RowProblem, ranges, wide_ranges};
 use crate::{
     scene::Scene,
     sensor::{Axes, SensorModel},
@@ -45,7 +45,9 @@ impl fmt::Display for NewtonStop {
         f.pad(match self {
             Self::Converged => "converged",
             Self::StepsTaken => "all steps taken",
-            Self::NoStepHelps => "no step lowers the misfit: readings do not come from this sensor, or leave it undetermined",
+            Self::NoStepHelps => {
+                "no step lowers the misfit: readings do not come from this sensor, or leave it undetermined"
+            }
         })
     }
 }
@@ -77,17 +79,23 @@ pub enum NewtonError {
 /// Gauss-Newton with Levenberg's damping and bounds on Eq. (2) for one known row-wire. Unknown is only what the scene
 /// moves.
 ///
-/// Each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that are not held at a bound, and is cut off at
+/// Plain steps first; where they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that are not held at a bound, and is cut off at
 /// the bounds. μ is 0 until a step fails to lower the misfit; then it grows tenfold, and shrinks again after steps that do.
 #[derive(Clone, Debug)]
 pub struct Newton {
     problem: RowProblem,
     ranges: Vec<Range>,
+    /// Where iterates may wander.
+    wide: Vec<Range>,
     rules: NewtonRules,
 }
 
 /// Damping relative to the largest diagonal entry of JᵀJ at which a failed step begins again.
 const FIRST_DAMPING: f64 = 1e-12;
+/// Plain steps tried before damped ones.
+const MOST_PLAIN_STEPS: usize = 25;
+/// A plain step that would have to be shortened further leads out of the sensor.
+const SHORTEST_SHARE: f64 = 1e-3;
 /// Damping beyond which steps only get shorter.
 const LARGEST_DAMPING: f64 = 1e6;
 
@@ -96,6 +104,7 @@ impl Newton {
     pub fn new(model: &SensorModel, scene: &Scene, rules: NewtonRules) -> Self {
         Self {
             problem: RowProblem::new(model, scene.movement.axes()),
+            wide: wide_ranges(model, scene),
             ranges: ranges(model, scene),
             rules,
         }
@@ -111,21 +120,31 @@ impl Newton {
     ///
     /// # Errors
     /// Readings that are no resistances.
-    pub fn solve(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<NewtonReport, NewtonError> {
+    pub fn solve(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<NewtonReport, NewtonError> {
         self.read(row, readings_ohm)?;
         let start = vec![0.0; self.problem.unknowns()];
-        Ok(self.run(start, coordinates_mm))
+        Ok(self.run(&start, coordinates_mm))
     }
 
     /// As [`Self::solve`], starting from the answer of another decoder in `coordinates_mm`, which is replaced.
     ///
     /// # Errors
     /// Readings that are no resistances.
-    pub fn polish(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<NewtonReport, NewtonError> {
+    pub fn polish(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<NewtonReport, NewtonError> {
         self.read(row, readings_ohm)?;
         let mut start = vec![0.0; self.problem.unknowns()];
         self.problem.unknowns_of(coordinates_mm, &mut start);
-        Ok(self.run(start, coordinates_mm))
+        Ok(self.run(&start, coordinates_mm))
     }
 
     fn read(&mut self, row: usize, readings_ohm: &[f64]) -> Result<(), NewtonError> {
@@ -137,20 +156,92 @@ impl Newton {
         Ok(())
     }
 
-    fn run(&mut self, start: Vec<f64>, coordinates_mm: &mut [f64]) -> NewtonReport {
-        let mut unknowns = start;
+    /// Plain Gauss-Newton first: it converges from anywhere nearby, though its misfit may rise on the way. If it ends
+    /// out of bounds or nowhere, as with noise, damped steps within the bounds follow.
+    fn run(&mut self, start: &[f64], coordinates_mm: &mut [f64]) -> NewtonReport {
+        let mut unknowns = start.to_vec();
+        self.clamp(&mut unknowns);
+        let first = unknowns.clone();
+        let before = self.problem.evaluate(&first);
+        let (stop, steps) = self.wander(&mut unknowns);
+        let outside = |(value, range): (&f64, &Range)| (value - range.clamp(*value)).abs() > self.rules.tolerance_mm;
+        let is_out = unknowns.iter().zip(&self.ranges).any(outside);
+        self.clamp(&mut unknowns);
+        let mut report = NewtonReport {
+            stop,
+            steps,
+            residual: self.problem.evaluate(&unknowns),
+        };
+        if report.residual > before || report.residual.is_nan() {
+            unknowns = first;
+            report.residual = before;
+            report.stop = NewtonStop::StepsTaken;
+        }
+        if steps < self.rules.steps && (is_out || report.stop != NewtonStop::Converged) {
+            report = self.descend(&mut unknowns, self.rules.steps - steps);
+            report.steps += steps;
+        }
+        self.problem.coordinates_of(&unknowns, coordinates_mm);
+        report
+    }
+
+    fn clamp(&self, unknowns: &mut [f64]) {
         for (value, range) in unknowns.iter_mut().zip(&self.ranges) {
             *value = range.clamp(*value);
         }
-        let mut residual = self.problem.evaluate(&unknowns);
+    }
+
+    /// Plain steps, each shortened to end where the model still means something.
+    fn wander(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
+        let most = self.rules.steps.min(MOST_PLAIN_STEPS);
+        for steps in 1..=most {
+            let system = Linearised::new(&mut self.problem, &self.wide, unknowns, false);
+            let step = damped_step(&system.jacobian, &system.right, 0.0);
+            let mut share = 1.0_f64;
+            let mut length = 0.0_f64;
+            for ((&step, &value), range) in step.iter().zip(&*unknowns).zip(&self.wide) {
+                let room = if step > 0.0 {
+                    range.highest - value
+                } else {
+                    range.lowest - value
+                };
+                if step != 0.0 {
+                    share = share.min(room / step);
+                }
+                length = length.max(step.abs());
+            }
+            // Written so that NaN ends it too.
+            if !(share >= SHORTEST_SHARE && length.is_finite()) {
+                return (NewtonStop::NoStepHelps, steps - 1);
+            }
+            unknowns
+                .iter_mut()
+                .zip(&step)
+                .for_each(|(value, step)| *value += share * step);
+            if length <= self.rules.tolerance_mm {
+                return (NewtonStop::Converged, steps);
+            }
+        }
+        (NewtonStop::StepsTaken, most)
+    }
+
+    /// Damped steps within the bounds, each of which lowers the misfit.
+    fn descend(&mut self, unknowns: &mut Vec<f64>, most_steps: usize) -> NewtonReport {
+        let mut residual = self.problem.evaluate(unknowns);
         let mut damping = 0.0;
         let mut steps = 0;
         let stop = loop {
-            if steps == self.rules.steps {
+            if steps == most_steps {
                 break NewtonStop::StepsTaken;
             }
             steps += 1;
-            let Linearised { free, jacobian, right, scale } = self.linearise(&unknowns);
+            let ranges = &self.ranges;
+            let Linearised {
+                free,
+                jacobian,
+                right,
+                scale,
+            } = Linearised::new(&mut self.problem, ranges, unknowns, true);
             if free.is_empty() {
                 break NewtonStop::Converged;
             }
@@ -159,57 +250,43 @@ impl Newton {
                 let mut next = unknowns.clone();
                 let mut length = 0.0_f64;
                 for (&unknown, &step) in free.iter().zip(&step) {
-                    next[unknown] = self.ranges[unknown].clamp(unknowns[unknown] + step);
+                    next[unknown] = ranges[unknown].clamp(unknowns[unknown] + step);
                     length = length.max((next[unknown] - unknowns[unknown]).abs());
                 }
                 let sound = step.iter().all(|step| step.is_finite());
-                let next_residual = if sound { self.problem.evaluate(&next) } else { f64::INFINITY };
+                let next_residual = if sound {
+                    self.problem.evaluate(&next)
+                } else {
+                    f64::INFINITY
+                };
                 // A step this short is within rounding, where the misfit falls no further.
-                if next_residual < residual || (sound && length <= self.rules.tolerance_mm) || damping > LARGEST_DAMPING {
+                let short = sound && length <= self.rules.tolerance_mm;
+                if next_residual < residual || short || damping > LARGEST_DAMPING {
                     break (next, length, next_residual);
                 }
                 damping = (10.0 * damping).max(FIRST_DAMPING);
             };
             if damping > LARGEST_DAMPING {
-                self.problem.evaluate(&unknowns);
                 break NewtonStop::NoStepHelps;
             }
-            unknowns = next;
+            *unknowns = next;
             residual = next_residual;
-            damping = if damping > 10.0 * FIRST_DAMPING { 0.1 * damping } else { 0.0 };
+            damping = if damping > 10.0 * FIRST_DAMPING {
+                0.1 * damping
+            } else {
+                0.0
+            };
             if length <= self.rules.tolerance_mm {
                 break NewtonStop::Converged;
             }
         };
-        self.problem.coordinates_of(&unknowns, coordinates_mm);
         NewtonReport { stop, steps, residual }
-    }
-
-    /// The equations at `unknowns`, where they were evaluated last, for the unknowns that are not held at a bound.
-    fn linearise(&mut self, unknowns: &[f64]) -> Linearised {
-        self.problem.evaluate(unknowns);
-        let (problem, equations) = (&self.problem, self.problem.equations());
-        let residuals = problem.residuals();
-        let is_free = |&unknown: &usize| {
-            let Range { lowest, highest } = self.ranges[unknown];
-            let slope: f64 = (0..equations).map(|k| problem.derivative(k, unknown) * residuals[k]).sum();
-            !(unknowns[unknown] <= lowest && slope >= 0.0 || unknowns[unknown] >= highest && slope <= 0.0)
-        };
-        let free: Vec<usize> = (0..unknowns.len()).filter(is_free).collect();
-        let jacobian = Mat::from_fn(equations, free.len(), |k, column| problem.derivative(k, free[column]));
-        let scale = jacobian.col_iter().map(|column| column.squared_norm_l2()).fold(0.0, f64::max);
-        Linearised {
-            right: residuals.iter().map(|residual| -residual).collect(),
-            free,
-            jacobian,
-            scale,
-        }
     }
 }
 
 /// Equations for a step.
 struct Linearised {
-    /// Unknowns that may move.
+    /// Unknowns that may move: all, or those not held at a bound.
     free: Vec<usize>,
     /// Readings × free unknowns, 1/mm.
     jacobian: Mat<f64>,
@@ -219,10 +296,43 @@ struct Linearised {
     scale: f64,
 }
 
+impl Linearised {
+    fn new(problem: &mut RowProblem, ranges: &[Range], unknowns: &[f64], hold: bool) -> Self {
+        problem.evaluate(unknowns);
+        let (problem, equations) = (&*problem, problem.equations());
+        let residuals = problem.residuals();
+        let is_free = |&unknown: &usize| {
+            let Range { lowest, highest } = ranges[unknown];
+            let slope: f64 = (0..equations)
+                .map(|k| problem.derivative(k, unknown) * residuals[k])
+                .sum();
+            !(unknowns[unknown] <= lowest && slope >= 0.0 || unknowns[unknown] >= highest && slope <= 0.0)
+        };
+        let free: Vec<usize> = (0..unknowns.len())
+            .filter(|unknown| !hold || is_free(unknown))
+            .collect();
+        let jacobian = Mat::from_fn(equations, free.len(), |k, column| problem.derivative(k, free[column]));
+        let scale = jacobian
+            .col_iter()
+            .map(|column| column.squared_norm_l2())
+            .fold(0.0, f64::max);
+        Self {
+            right: residuals.iter().map(|residual| -residual).collect(),
+            free,
+            jacobian,
+            scale,
+        }
+    }
+}
+
 /// `min ‖J δ − right‖² + damping ‖δ‖²` by QR of J with √damping · I below it.
 fn damped_step(jacobian: &Mat<f64>, right: &[f64], damping: f64) -> Vec<f64> {
     let (equations, unknowns) = (jacobian.nrows(), jacobian.ncols());
-    let below = if damping > 0.0 || equations < unknowns { unknowns } else { 0 };
+    let below = if damping > 0.0 || equations < unknowns {
+        unknowns
+    } else {
+        0
+    };
     let root = damping.sqrt();
     let stacked = Mat::from_fn(equations + below, unknowns, |k, u| {
         if k < equations {
@@ -296,7 +406,7 @@ mod tests {
 
     #[test]
     fn sideways_shifts_of_a_small_array_come_back() {
-        let model = SensorModel::new("3x2_2x12".parse().unwrap());
+        let model = SensorModel::new("2x1_3x9".parse().unwrap());
         let scene = Scene {
             movement: Movement::SIDEWAYS,
             ..Scene::default()

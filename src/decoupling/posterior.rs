@@ -37,7 +37,12 @@ impl RowPrior {
         for _ in 0..PRIOR_DRAWS {
             let deformation = sampler.draw(rng);
             for (&row, values) in rows.iter().zip(&mut draws) {
-                values.extend(deformation.row_mm(row).iter().flat_map(|u| axes.iter().map(|&axis| u[axis])));
+                values.extend(
+                    deformation
+                        .row_mm(row)
+                        .iter()
+                        .flat_map(|u| axes.iter().map(|&axis| u[axis])),
+                );
             }
         }
         let ranges = ranges(model, scene);
@@ -51,9 +56,11 @@ impl RowPrior {
         let count = draws.len() as f64;
         let mut mean = vec![0.0; n];
         for draw in draws.clone() {
-            mean.iter_mut().zip(draw).for_each(|(mean, value)| *mean += value / count);
+            mean.iter_mut()
+                .zip(draw)
+                .for_each(|(mean, value)| *mean += value / count);
         }
-        let mut covariance = Mat::zeros(n, n);
+        let mut covariance: Mat<f64> = Mat::zeros(n, n);
         for draw in draws {
             for i in 0..n {
                 for j in 0..n {
@@ -136,7 +143,12 @@ impl Posterior {
     ///
     /// # Panics
     /// If `row` is none of the rows given.
-    pub fn solve(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<PosteriorReport, NewtonError> {
+    pub fn solve(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<PosteriorReport, NewtonError> {
         let report = self.newton.solve(row, readings_ohm, coordinates_mm)?;
         let exact = PosteriorReport {
             steps: report.steps,
@@ -179,8 +191,12 @@ impl Posterior {
     }
 
     /// The medians of the posterior linearised at the true deformation of the row whose nodes are at `truth_mm`
-    /// (3·M2), given noisy readings of it: no decoder can know more. Writes absolute coordinates (3·M2).
-    pub(crate) fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) {
+    /// (3·M2), given noisy readings of it: what
+    /// a decoder would answer that knew the sensor perfectly. Writes absolute coordinates (3·M2).
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) {
         coordinates_mm.copy_from_slice(truth_mm);
         if self.largest_noise(readings_ohm) < SMALLEST_NOISE {
             return;
@@ -204,10 +220,7 @@ impl Posterior {
         self.problem.evaluate(at);
         let (n, equations) = (at.len(), self.problem.equations());
         // ρ(u) ≈ ρ(at) + J (u − at) has the covariance of the noise: J and the right side J·at − ρ, whitened.
-        let spreads: Vec<RelativeSpread> = readings_ohm
-            .iter()
-            .map(|&ohm| self.noise.spread(ohm))
-            .collect();
+        let spreads: Vec<RelativeSpread> = readings_ohm.iter().map(|&ohm| self.noise.spread(ohm)).collect();
         let mut system = Mat::from_fn(equations, n + 1, |k, i| {
             let own = spreads[k].own.max(SMALLEST_NOISE);
             let value = if i < n {
@@ -230,7 +243,10 @@ impl Posterior {
         } = &self.priors[place]
         {
             precision += of_prior;
-            linear.iter_mut().zip(prior_linear).for_each(|(sum, value)| *sum += value);
+            linear
+                .iter_mut()
+                .zip(prior_linear)
+                .for_each(|(sum, value)| *sum += value);
         }
         BoxPosterior::new(precision, linear, self.ranges.clone()).marginals()
     }
@@ -275,7 +291,11 @@ mod tests {
             let z: Vec<f64> = (0..nodes).map(|_| stroke_mm * rng.random::<f64>()).collect();
             let at: Vec<glam::DVec3> = z.iter().map(|&z| glam::DVec3::new(0.0, 0.0, z)).collect();
             let resistances = model.row_resistances(0, &at).unwrap();
-            let misfit: f64 = resistances.iter().zip(readings).map(|(r, m)| (m / r - 1.0).powi(2)).sum();
+            let misfit: f64 = resistances
+                .iter()
+                .zip(readings)
+                .map(|(r, m)| (m / r - 1.0).powi(2))
+                .sum();
             let weight = (-0.5 * misfit / (noise * noise)).exp();
             total += weight;
             means.iter_mut().zip(&z).for_each(|(mean, z)| *mean += weight * z);
@@ -292,7 +312,8 @@ mod tests {
                 ..Scene::default()
             };
             let mut set = Dataset::simulate(&model, &scene, 6, &mut Seed(1).rng(Stream::Test)).unwrap();
-            set.disturb(&model, &scene.noise, &mut Seed(1).rng(Stream::TestNoise)).unwrap();
+            set.disturb(&model, &scene.noise, &mut Seed(1).rng(Stream::TestNoise))
+                .unwrap();
             let mut posterior = Posterior::new(&model, &scene, &[0], &mut Seed(1).rng(Stream::Expectation)).unwrap();
             for sample in 0..set.samples() {
                 let readings = set.resistances_ohm.row(sample).to_vec();
@@ -317,7 +338,9 @@ mod tests {
         let mut rng = Seed(1).rng(Stream::Expectation);
         let mut posterior = Posterior::new(&model, &Scene::default(), &[0, 1], &mut rng).unwrap();
         let mut coordinates = vec![0.0; 12];
-        let report = posterior.solve(1, &set.resistances_ohm.row(3).to_vec(), &mut coordinates).unwrap();
+        let report = posterior
+            .solve(1, &set.resistances_ohm.row(3).to_vec(), &mut coordinates)
+            .unwrap();
         assert_eq!(report.spread_mm, 0.0);
         for (ours, truth) in coordinates.iter().zip(set.coordinates_mm.row(3)) {
             assert!((ours - truth).abs() < 1e-9);
@@ -326,14 +349,10 @@ mod tests {
 
     #[test]
     fn a_common_error_is_whitened_as_the_dense_inverse_says() {
-        let spreads: Vec<RelativeSpread> = [0.1, 0.2, 0.4]
-            .map(|own| RelativeSpread { own, common: 0.3 })
-            .to_vec();
+        let spreads: Vec<RelativeSpread> = [0.1, 0.2, 0.4].map(|own| RelativeSpread { own, common: 0.3 }).to_vec();
         let mut system = Mat::from_fn(3, 1, |k, _| (k as f64 + 1.0) / spreads[k].own);
         remove_common(&mut system, &spreads);
-        let covariance = Mat::from_fn(3, 3, |i, j| {
-            0.09 + if i == j { spreads[i].own.powi(2) } else { 0.0 }
-        });
+        let covariance = Mat::from_fn(3, 3, |i, j| 0.09 + if i == j { spreads[i].own.powi(2) } else { 0.0 });
         let inverse = covariance.partial_piv_lu().inverse();
         let mut expected = 0.0;
         for i in 0..3 {

@@ -66,6 +66,21 @@ pub(crate) fn ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
     nodes.flat_map(|_| axes.iter().map(|&axis| of_axis(axis))).collect()
 }
 
+/// [`ranges`] widened by their width either way, but never as far as the column-wires.
+pub(crate) fn wide_ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
+    let height_mm = model.geometry.height_mm;
+    let lowest_gap_mm = 0.5 * (height_mm - scene.stroke_mm(&model.geometry));
+    let axes = scene.movement.axes().indices();
+    let widened = |(unknown, range): (usize, Range)| Range {
+        lowest: range.lowest - range.width(),
+        highest: match axes[unknown % axes.len()] {
+            2 => (range.highest + range.width()).min(height_mm - lowest_gap_mm),
+            _ => range.highest + range.width(),
+        },
+    };
+    ranges(model, scene).into_iter().enumerate().map(widened).collect()
+}
+
 impl RowProblem {
     pub(crate) fn new(model: &SensorModel, axes: Axes) -> Self {
         Self {
@@ -96,7 +111,11 @@ impl RowProblem {
     /// Evaluates residuals and derivatives at `unknowns_mm`; gives the rms residual.
     pub(crate) fn evaluate(&mut self, unknowns_mm: &[f64]) -> f64 {
         let axes = self.axes.indices();
-        for (displacement, values) in self.displacements_mm.iter_mut().zip(unknowns_mm.chunks_exact(axes.len())) {
+        for (displacement, values) in self
+            .displacements_mm
+            .iter_mut()
+            .zip(unknowns_mm.chunks_exact(axes.len()))
+        {
             for (&axis, &value) in axes.iter().zip(values) {
                 displacement[axis] = value;
             }

@@ -3,12 +3,16 @@
 
 mod errors;
 mod published;
+mod reference;
+mod row_networks;
 mod run;
 mod settings;
 mod table;
 
 pub use errors::{Errors, NodeAddress};
 pub use published::{PublishedErrors, published_errors};
+pub use reference::reference_errors;
+pub use row_networks::{RowTraining, train_row_networks};
 pub use run::{Baselines, Run, RunError};
 pub use settings::{CountError, RunSettings};
 pub use table::{ErrorRow, error_rows};

@@ -55,7 +55,9 @@ pub enum SceneError {
     #[error("'{0}' is not a choice of rows: give all, known, or the number of a row from 1")]
     RowsText(String),
     /// The shift sideways is impossible.
-    #[error("the largest shift sideways is {0} mm: it must be above 0 and finite; for none, let nodes move along z only")]
+    #[error(
+        "the largest shift sideways is {0} mm: it must be above 0 and finite; for none, let nodes move along z only"
+    )]
     Shift(f64),
     /// The correlation length is impossible.
     #[error("the correlation length is {0} mm: it must be above 0 and finite")]

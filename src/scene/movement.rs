@@ -39,9 +39,9 @@ impl Movement {
 
     pub(super) fn check(self) -> Result<(), SceneError> {
         match self {
-            Self::Xyz { largest_shift_mm: shift } if !(shift > 0.0 && shift.is_finite()) => {
-                Err(SceneError::Shift(shift))
-            }
+            Self::Xyz {
+                largest_shift_mm: shift,
+            } if !(shift > 0.0 && shift.is_finite()) => Err(SceneError::Shift(shift)),
             _ => Ok(()),
         }
     }

@@ -72,12 +72,20 @@ impl Noise {
 
     /// What disturbs the training set.
     pub fn in_training(self) -> Self {
-        if self.sets == NoisySets::Test { Self::default() } else { self }
+        if self.sets == NoisySets::Test {
+            Self::default()
+        } else {
+            self
+        }
     }
 
     /// What disturbs the test set.
     pub fn in_test(self) -> Self {
-        if self.sets == NoisySets::Training { Self::default() } else { self }
+        if self.sets == NoisySets::Training {
+            Self::default()
+        } else {
+            self
+        }
     }
 
     pub(super) fn check(&self) -> Result<(), SceneError> {
@@ -104,7 +112,10 @@ impl Noise {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
         let mut largest_ohm = 0.0_f64;
         for row in 0..model.scale.rows() {
-            largest_ohm = model.row_resistances(row, &rest)?.into_iter().fold(largest_ohm, f64::max);
+            largest_ohm = model
+                .row_resistances(row, &rest)?
+                .into_iter()
+                .fold(largest_ohm, f64::max);
         }
         let steps = 2.0_f64.powi(i32::from(bits));
         Ok(Some(Converter {
@@ -142,7 +153,11 @@ impl NoiseSource {
             drift,
             ..
         } = self.noise;
-        let gain = if drift > 0.0 { 1.0 + drift * standard_normal(rng) } else { 1.0 };
+        let gain = if drift > 0.0 {
+            1.0 + drift * standard_normal(rng)
+        } else {
+            1.0
+        };
         for value in resistances_ohm {
             let true_ohm = *value;
             let mut reading = true_ohm * gain;

@@ -142,7 +142,11 @@ impl Identifiability {
     pub fn remaining_share(&self, noise: f64, prior_mm: f64) -> f64 {
         let remaining = |&s: &f64| {
             let seen = s * prior_mm / noise;
-            if seen.is_finite() { 1.0 / (1.0 + seen * seen) } else { 0.0 }
+            if seen.is_finite() {
+                1.0 / (1.0 + seen * seen)
+            } else {
+                0.0
+            }
         };
         (self.singular_values_per_mm.iter().map(remaining).sum::<f64>() / self.unknowns() as f64).sqrt()
     }
@@ -314,7 +318,10 @@ mod tests {
         assert_eq!(pair.first + pair.second, 9);
         let warnings = at_rest(&model, 0, Axes::Z).warnings(0.0, 0.3, Some(pair));
         let words = warnings[0].to_string();
-        assert!(words.contains("cannot be told apart") && words.contains("shift"), "{words}");
+        assert!(
+            words.contains("cannot be told apart") && words.contains("shift"),
+            "{words}"
+        );
         assert_eq!(
             Identifiability::most_alike_rows(&SensorModel::new("1x6_3x18".parse().unwrap())),
             Ok(None)
@@ -330,7 +337,13 @@ mod tests {
         let length = seen.worst_pattern.iter().map(|p| p.length_squared()).sum::<f64>();
         assert!((length - 1.0).abs() < 1e-12);
         let warnings = seen.warnings(0.0, 0.3, None);
-        assert!(matches!(warnings[0], IdentifiabilityWarning::TooFewReadings { equations: 4, unknowns: 6 }));
+        assert!(matches!(
+            warnings[0],
+            IdentifiabilityWarning::TooFewReadings {
+                equations: 4,
+                unknowns: 6
+            }
+        ));
     }
 
     #[test]

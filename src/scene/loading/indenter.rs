@@ -267,7 +267,8 @@ mod tests {
     #[test]
     fn a_round_body_leaves_no_kink() {
         let sphere = press(Body::Sphere(4.0), 0.0);
-        let slope = |at: f64| (sphere.depth_at_mm(3.0 + at + 1e-6, -1.0) - sphere.depth_at_mm(3.0 + at - 1e-6, -1.0)) / 2e-6;
+        let slope =
+            |at: f64| (sphere.depth_at_mm(3.0 + at + 1e-6, -1.0) - sphere.depth_at_mm(3.0 + at - 1e-6, -1.0)) / 2e-6;
         let mut last = slope(0.01);
         for step in 2..600 {
             let next = slope(0.01 * f64::from(step));
