@@ -26,7 +26,7 @@ fn trained() -> NetworkFile {
     };
     settings.training.stopping.epochs = 8;
     let mut run = Run::prepare(settings).unwrap();
-    while run.trainer_mut().step().is_none() {}
+    while run.step().is_none() {}
     NetworkFile::from_run(&run)
 }
 
@@ -62,7 +62,7 @@ fn a_training_in_progress_can_be_saved() {
         );
         file.save(&path).unwrap();
         assert_eq!(NetworkFile::load(&path).unwrap(), file);
-        run.trainer_mut().step();
+        run.step();
     }
 }
 

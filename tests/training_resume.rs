@@ -86,9 +86,13 @@ fn a_damaged_or_foreign_state_is_refused() {
     };
     let damaged = |error| matches!(error, ResumeError::Damaged(_));
     assert!(damaged(edited(|value| value["shape"]["hidden"] = 7.into())), "layers");
+    let gap = text.replacen("\"epoch\":[0,1,", "\"epoch\":[0,5,", 1);
+    let error = serde_json::from_str::<TrainerState>(&gap).expect_err("a gap is noticed");
+    assert!(error.to_string().contains("epoch 1 is missing"), "{error}");
+    assert!(damaged(edited(|value| value["best_epoch"] = 4.into())), "best epoch");
     assert!(
-        damaged(edited(|value| value["history"][1]["epoch"] = 5.into())),
-        "history"
+        damaged(edited(|value| value["stages"] = serde_json::json!([]))),
+        "stages"
     );
     assert!(
         damaged(edited(|value| value["method"] = serde_json::json!("gradient_descent"))),

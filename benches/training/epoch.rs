@@ -31,10 +31,10 @@ pub(crate) fn print() {
     let mut gram = Mat::<f64>::zeros(496, 78);
     let (mut epochs, mut products) = ([const { Vec::new() }; 3], Vec::new());
     for _ in 0..TURNS {
-        let mu = run.trainer().latest().parameter;
-        let epoch_ms = time_ms(|| run.trainer_mut().step());
+        let mu = run.leader().latest().parameter;
+        let epoch_ms = time_ms(|| run.step());
         // One factor mu_dec at the accepted step, one factor mu_inc at each rejected one.
-        let rejected = ((run.trainer().latest().parameter / mu).log10() + 1.0).round() as usize;
+        let rejected = ((run.leader().latest().parameter / mu).log10() + 1.0).round() as usize;
         if let Some(epochs) = epochs.get_mut(rejected) {
             epochs.push(epoch_ms);
         }

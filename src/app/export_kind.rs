@@ -87,7 +87,7 @@ impl ExportKind {
                 let rows = error_rows(&errors, run.baselines(), published.as_ref());
                 atomic_write(path, |writer| write_errors(&rows, writer))?;
             }
-            Self::LossCurves => atomic_write(path, |writer| write_loss_curves(run.trainer().history(), writer))?,
+            Self::LossCurves => atomic_write(path, |writer| write_loss_curves(run.leader().history(), writer))?,
         }
         Ok(())
     }

@@ -209,10 +209,7 @@ impl Labour {
     }
 
     fn is_training(&self) -> bool {
-        let unfinished = self
-            .run
-            .as_ref()
-            .is_some_and(|run| run.trainer().stop_reason().is_none());
+        let unfinished = self.run.as_ref().is_some_and(|run| run.stop_reason().is_none());
         unfinished && !self.is_paused
     }
 
@@ -244,7 +241,7 @@ impl Labour {
             Request::Resume => self.is_paused = false,
             Request::Stop => {
                 if let Some(run) = &mut self.run {
-                    run.trainer_mut().stop();
+                    run.stop();
                 }
                 self.report_progress();
             }
@@ -282,7 +279,7 @@ impl Labour {
 
     fn train_one_epoch(&mut self) {
         let Some(run) = &mut self.run else { return };
-        let ended = run.trainer_mut().step().is_some();
+        let ended = run.step().is_some();
         if ended || Instant::now() >= self.next_report {
             self.report_progress();
         }
@@ -291,18 +288,22 @@ impl Labour {
     fn report_progress(&mut self) {
         let Some(run) = &self.run else { return };
         let begun = Instant::now();
-        let trainer = run.trainer();
+        let trainer = run.leader();
         let (decoupled_mm, errors) = run.decouple_test();
         let cost = begun.elapsed();
         let snapshots = u32::try_from(run.test().snapshots()).unwrap_or(u32::MAX).max(1);
         self.report.send(Event::Progressed(Box::new(Progress {
-            epochs: trainer.history()[self.epochs_reported..].to_vec(),
+            epochs: trainer
+                .history()
+                .get(self.epochs_reported..)
+                .unwrap_or_default()
+                .to_vec(),
             decoupled_mm: Arc::new(decoupled_mm),
             errors,
             best_epoch: trainer.best_epoch(),
             elapsed: trainer.elapsed(),
             frame_time: cost / snapshots,
-            stop_reason: trainer.stop_reason(),
+            stop_reason: run.stop_reason(),
         })));
         self.epochs_reported = trainer.history().len();
         // A large test set takes long to decouple; let it take at most a fifth of the time.

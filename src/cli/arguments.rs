@@ -8,7 +8,7 @@ use std::{
 
 use clap::{Parser, Subcommand, error::ErrorKind};
 
-use super::{decode::Decode, failure::Failure, simulate::Simulate, train::Train};
+use super::{decode::Decode, failure::Failure, interruption, simulate::Simulate, train::Train};
 
 /// Opens the window and returns when it is closed.
 pub type Window = fn() -> Result<(), Box<dyn Error>>;
@@ -25,7 +25,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Train(Train),
+    Train(Box<Train>),
     Decode(Decode),
     Simulate(Simulate),
 }
@@ -44,7 +44,10 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
     match done {
         Err(failure) if !failure.is_broken_pipe() => {
             // Nobody is left to tell if this fails.
-            let _ = writeln!(stderr(), "error: {failure}");
+            let _ = match &failure {
+                Failure::Interrupted(told) => writeln!(stderr(), "{told}"),
+                _ => writeln!(stderr(), "error: {failure}"),
+            };
             ExitCode::from(failure.status())
         }
         _ => ExitCode::SUCCESS,
@@ -53,6 +56,9 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
 
 impl Arguments {
     fn run(self, window: Option<Window>) -> Result<(), Failure> {
+        if self.command.is_some() {
+            interruption::install();
+        }
         match self.command {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Decode(decode)) => decode.run(),

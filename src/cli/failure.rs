@@ -1,15 +1,17 @@
 use std::{
     error::Error as StdError,
+    fmt,
     io::{self, ErrorKind},
     path::PathBuf,
 };
 
 use thiserror::Error;
 
+use super::interruption;
 use crate::{
     dataset::{DatasetError, ReadError},
     evaluation::RunError,
-    export::{NetworkFileError, WriteError},
+    export::{CheckpointFileError, NetworkFileError, WriteError},
     training::SettingError,
 };
 
@@ -29,6 +31,12 @@ pub(super) enum Failure {
     #[error(transparent)]
     Network(#[from] NetworkFileError),
     #[error(transparent)]
+    Checkpoint(#[from] CheckpointFileError),
+    #[error("'{}': {source}", .path.display())]
+    Resume { path: PathBuf, source: RunError },
+    #[error("{0}")]
+    Interrupted(Interruption),
+    #[error(transparent)]
     Write(#[from] WriteError),
     #[error("cannot write to standard output: {0}")]
     Output(io::Error),
@@ -38,6 +46,25 @@ pub(super) enum Failure {
     Resistances { path: PathBuf, source: ReadError },
     #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
+}
+
+/// A training that Ctrl-C has stopped.
+#[derive(Debug)]
+pub(super) struct Interruption {
+    /// After this epoch.
+    pub(super) epoch: usize,
+    /// The command that goes on from there.
+    pub(super) resume: Option<String>,
+}
+
+impl fmt::Display for Interruption {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "interrupted after epoch {}; ", self.epoch)?;
+        match &self.resume {
+            Some(command) => write!(f, "to go on: {command}"),
+            None => write!(f, "with --checkpoint FILE it could go on from here"),
+        }
+    }
 }
 
 impl From<SettingError> for Failure {
@@ -51,6 +78,7 @@ impl Failure {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) => 2,
+            Self::Interrupted(_) => interruption::STATUS,
             _ => 1,
         }
     }

@@ -1,13 +1,17 @@
 //! The work without a window: `decoupler train`, `decode` and `simulate`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
-//! with one line on standard error.
+//! with one line on standard error. Ctrl-C ends it with status 130; `train` then first keeps what it has.
 
 mod arguments;
+mod checkpointing;
 mod decode;
 mod failure;
+mod interruption;
 mod simulate;
+mod spread_plot;
 mod train;
 mod train_report;
+mod training_arguments;
 
 pub use arguments::{Window, run};

@@ -1,58 +1,36 @@
-use std::{path::PathBuf, time::Duration};
-
-use clap::{
-    Args,
-    builder::{PossibleValuesParser, TypedValueParser},
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
 };
+
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
-    arguments::{count, seed},
-    failure::Failure,
+    checkpointing::{CheckpointArguments, Checkpointing},
+    failure::{Failure, Interruption},
+    interruption::Graceful,
     train_report::{print_json, print_text},
+    training_arguments::TrainingArguments,
 };
 use crate::{
-    dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Run, RunSettings},
-    export::{NetworkFile, check_writable, format_number},
-    network::LARGEST_HIDDEN,
-    sensor::{ArrayScale, SensorModel},
-    training::{Method, StoppingRules, TrainingSettings},
+    evaluation::Run,
+    export::{CheckpointFile, NetworkFile, check_writable, format_number},
 };
 
 /// Train a network and print what it is worth
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
-/// set, with the best linear map, and with the published figures where there are any.
+/// set, with the best linear map, and with the published figures where there are any. Ctrl-C stops after the epoch,
+/// keeps what there is, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
-    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
-    #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
-    array: ArrayScale,
-    /// Hidden nodes
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = count(1..=LARGEST_HIDDEN))]
-    hidden: usize,
-    /// Levenberg-Marquardt (lm) or gradient descent with momentum (gdm)
-    #[arg(long, default_value = "lm", value_parser = method())]
-    method: Method,
-    /// Most epochs
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
-    epochs: usize,
-    /// Training samples; this and the next two are rounded up to whole snapshots of all rows
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = count(1..=LARGEST_SAMPLES))]
-    samples: usize,
-    /// Samples for the errors that are printed
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
-    test_samples: usize,
-    /// Samples that choose the best weights and end the training; 0 for none
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = count(0..=LARGEST_SAMPLES))]
-    validation_samples: usize,
-    /// From which everything random follows
-    #[arg(long, default_value_t = 0, value_parser = seed)]
-    seed: u64,
-    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
-    set: Vec<(String, f64)>,
+    #[command(flatten)]
+    training: TrainingArguments,
+    #[command(flatten)]
+    checkpoint: CheckpointArguments,
     /// File for the network, to be opened in the window or given to decode
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -63,107 +41,185 @@ pub(super) struct Train {
 
 impl Train {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let settings = self.settings()?;
+        let checkpointing = self.checkpoint.checkpointing()?;
         if let Some(path) = &self.out {
+            if self
+                .checkpoint
+                .checkpoint
+                .as_ref()
+                .is_some_and(|other| is_same(path, other))
+            {
+                let message = "--out and --checkpoint name the same file: give each its own";
+                return Err(Failure::Arguments(message.to_owned()));
+            }
             check_writable(path)?;
         }
-        let mut run = Run::prepare(settings)?;
-        train(&mut run, !self.json);
+        if let Some(path) = &self.checkpoint.checkpoint {
+            check_writable(path)?;
+        }
+        let mut run = match &self.checkpoint.checkpoint {
+            Some(path) if self.checkpoint.resume => self.resume(path)?,
+            _ => Run::prepare(self.training.settings()?)?,
+        };
+        let end = self.train(&mut run, checkpointing);
         let file = NetworkFile::from_run(&run);
         if let Some(path) = &self.out {
             file.save(path)?;
         }
         if self.json {
-            print_json(&file)
+            print_json(&file)?;
         } else {
-            print_text(&file)
+            print_text(&file)?;
         }
+        end
     }
 
-    fn settings(&self) -> Result<RunSettings, Failure> {
-        let mut method = self.method;
-        for (name, value) in &self.set {
-            let mut settings = method.settings();
-            let names = settings.iter().map(|setting| dashed(setting.name)).collect::<Vec<_>>();
-            match settings.iter_mut().find(|setting| dashed(setting.name) == *name) {
-                Some(setting) => *setting.value = *value,
-                None => {
-                    let (method, names) = (self.method.short_name(), names.join(", "));
-                    let message = format!("--set {name}: {method} has no such setting; it has {names}");
-                    return Err(Failure::Arguments(message));
-                }
+    fn resume(&self, path: &Path) -> Result<Run, Failure> {
+        let file = CheckpointFile::load(path)?;
+        let saved = file.settings.training;
+        let training = self.training.training_from(&file.settings)?;
+        let mut run = file.resume().map_err(|source| Failure::Resume {
+            path: path.to_owned(),
+            source,
+        })?;
+        run.set_stopping(training.stopping)?;
+        if training.method != saved.method {
+            run.continue_with(training.method)?;
+            if run.stop_reason().is_some() {
+                let epochs = training.stopping.epochs;
+                return Err(Failure::Arguments(format!(
+                    "all {epochs} epochs of the checkpoint are run: give more with --epochs to go on with another method"
+                )));
             }
         }
-        let training = TrainingSettings {
-            method,
-            stopping: StoppingRules {
-                epochs: self.epochs,
-                ..StoppingRules::default()
-            },
-        };
-        training.check()?;
-        Ok(RunSettings {
-            sensor: SensorModel::new(self.array),
-            samples: self.samples,
-            validation_samples: self.validation_samples,
-            test_samples: self.test_samples,
-            hidden: self.hidden,
-            training,
-            seed: Seed(self.seed),
-            ..RunSettings::default()
-        })
+        Ok(run)
+    }
+
+    /// Steps to the end, or to the first epoch after Ctrl-C; the bar shows itself only where standard error is a
+    /// terminal.
+    fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
+        let bar = self.progress_bar(run);
+        let graceful = Graceful::begin();
+        let mut checkpointing = checkpointing;
+        while run.stop_reason().is_none() && !graceful.is_end_requested() {
+            if let Some(checkpointing) = &mut checkpointing {
+                checkpointing.save_if_due(run);
+            }
+            run.step();
+            if !bar.is_hidden() {
+                show(run, &bar);
+            }
+        }
+        bar.finish_and_clear();
+        let is_interrupted = run.stop_reason().is_none();
+        run.stop();
+        if let Some(checkpointing) = &checkpointing {
+            checkpointing.save(run)?;
+        }
+        drop(graceful);
+        if is_interrupted {
+            let resume = self
+                .checkpoint
+                .checkpoint
+                .as_deref()
+                .map(|path| self.resume_command(path));
+            let epoch = furthest(run);
+            return Err(Failure::Interrupted(Interruption { epoch, resume }));
+        }
+        Ok(())
+    }
+
+    fn progress_bar(&self, run: &Run) -> ProgressBar {
+        if self.json {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(run.settings().training.stopping.epochs as u64);
+        let style = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_position(furthest(run) as u64);
+        // The time left is reckoned from the epochs of this session only.
+        bar.reset_eta();
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+
+    /// The command that goes on from here.
+    fn resume_command(&self, checkpoint: &Path) -> String {
+        let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
+        if let Some(path) = &self.out {
+            command += &format!(" --out {}", quoted(path));
+        }
+        if self.json {
+            command += " --json";
+        }
+        command
     }
 }
 
-/// Steps to the end; the bar shows itself only where standard error is a terminal.
-fn train(run: &mut Run, with_progress: bool) {
-    let epochs = run.settings().training.stopping.epochs;
-    let bar = if with_progress {
-        ProgressBar::new(epochs as u64)
-    } else {
-        ProgressBar::hidden()
+/// The epoch of the start that is furthest.
+fn furthest(run: &Run) -> usize {
+    let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
+    epochs.max().unwrap_or(0)
+}
+
+fn show(run: &Run, bar: &ProgressBar) {
+    bar.set_position(furthest(run) as u64);
+    let mse = format_number(run.leader().latest().training_mse);
+    let ended = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_some());
+    let starts = match run.trainers().len() {
+        1 => String::new(),
+        starts => format!(", {} of {starts} starts ended", ended.count()),
     };
-    let style = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.enable_steady_tick(Duration::from_millis(200));
-    while run.trainer_mut().step().is_none() {
-        let latest = run.trainer().latest();
-        bar.set_position(latest.epoch as u64);
-        if !bar.is_hidden() {
-            bar.set_message(format!("mse {}", format_number(latest.training_mse)));
+    bar.set_message(format!("mse {mse}{starts}"));
+}
+
+/// Whether two paths lead to the same file, new or old.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
+        let new = path.file_name().map(|name| folder.join(name));
+        fs::canonicalize(path).ok().or(new)
+    };
+    place(one).is_some() && place(one) == place(other)
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text;
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_quoted_as_a_shell_needs_it() {
+        let cases = [
+            ("run.checkpoint", "run.checkpoint"),
+            ("my runs/a.json", "'my runs/a.json'"),
+            ("it's", r"'it'\''s'"),
+            ("$HOME", "'$HOME'"),
+        ];
+        for (path, expected) in cases {
+            assert_eq!(quoted(Path::new(path)), expected);
         }
     }
-    bar.finish_and_clear();
-}
 
-fn method() -> impl TypedValueParser<Value = Method> {
-    let names = Method::all().map(|method| method.short_name());
-    PossibleValuesParser::new(names).map(|name| {
-        let mut methods = Method::all().into_iter();
-        methods.find(|method| method.short_name() == name).unwrap_or_default()
-    })
-}
-
-fn assignment(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example mu=0.01")?;
-    let value = value.trim().parse().map_err(|_| format!("'{value}' is not a number"))?;
-    Ok((name.trim().to_owned(), value))
-}
-
-/// How a setting is named in the terminal.
-fn dashed(name: &str) -> String {
-    name.replace(' ', "-")
-}
-
-fn settings_help() -> String {
-    let of = |mut method: Method| {
-        let settings = method.settings();
-        let list = settings
-            .iter()
-            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
-        let list = list.collect::<Vec<_>>().join(", ");
-        format!("{} has {list}", method.short_name())
-    };
-    let methods = Method::all().map(of).join("; ");
-    format!("Change a setting of the method, as often as you like: {methods}")
+    #[test]
+    fn a_file_is_the_same_by_any_of_its_paths() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, same, other] = ["a", "./a", "b"].map(|name| folder.path().join(name));
+        assert!(
+            is_same(&file, &same) && !is_same(&file, &other),
+            "before there is a file"
+        );
+        fs::write(&file, "").unwrap();
+        assert!(is_same(&file, &same) && !is_same(&file, &other));
+    }
 }

@@ -5,12 +5,12 @@ use std::{
 
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
-    evaluation::{Baselines, ErrorRow, Errors, PublishedErrors, RunSettings, error_rows},
+    evaluation::{Baselines, ErrorRow, Errors, PublishedErrors, RunSettings, StartRecord, error_rows},
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     sensor::{ArrayScale, Geometry},
-    training::StopReason,
+    training::{Stage, StopReason},
 };
 
 /// What `train --json` prints.
@@ -23,6 +23,8 @@ struct Report<'a> {
     samples: usize,
     validation_samples: usize,
     test_samples: usize,
+    starts: &'a [StartRecord],
+    stages: &'a [Stage],
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
@@ -66,6 +68,8 @@ pub(super) fn print_json(file: &NetworkFile) -> Result<(), Failure> {
         samples: settings.samples,
         validation_samples: settings.validation_samples,
         test_samples: settings.test_samples,
+        starts: &training.starts,
+        stages: &training.stages,
         epochs: epochs(training),
         best_epoch: training.best_epoch,
         stop_reason: training.stop_reason,
@@ -95,12 +99,16 @@ pub(super) fn print_text(file: &NetworkFile) -> Result<(), Failure> {
 fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     let (settings, training) = (&file.settings, &file.training);
     let scale = settings.sensor.scale;
-    let method = settings.training.method;
+    let first = training.stages.first();
+    let method = first.map_or(settings.training.method, |stage| stage.method);
     writeln!(
         out,
         "{scale}, {} hidden nodes, {method}, seed {}",
         settings.hidden, settings.seed
     )?;
+    for stage in training.stages.iter().skip(1) {
+        writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
+    }
     let whole = |samples: usize| samples.div_ceil(scale.rows()) * scale.rows();
     writeln!(
         out,
@@ -121,6 +129,10 @@ fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
         time(epoch_seconds(training))
     )?;
     writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
+    if training.starts.len() > 1 {
+        write_starts(&training.starts, out)?;
+        writeln!(out)?;
+    }
     let published = published(settings);
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
     writeln!(

@@ -113,6 +113,15 @@ impl Dataset {
         }
     }
 
+    /// The same samples as if each were a snapshot of one row-wire: what a decoder sees that is not told the row.
+    #[must_use]
+    pub fn as_one_row(&self) -> Self {
+        Self {
+            rows: 1,
+            ..self.clone()
+        }
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.resistances_ohm.nrows()

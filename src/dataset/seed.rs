@@ -28,11 +28,23 @@ pub enum Stream {
     Expectation,
 }
 
+/// Streams from here on are those of the starts after the first.
+const FURTHER_STARTS: u64 = 1 << 32;
+
 impl Seed {
     /// The generator of one use.
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.0);
         rng.set_stream(stream as u64);
+        rng
+    }
+
+    /// The generator of the initial weights of start number `start`, from 0. Start 0 has that of [`Stream::Start`].
+    pub fn start_rng(self, start: usize) -> ChaCha8Rng {
+        let mut rng = self.rng(Stream::Start);
+        if start > 0 {
+            rng.set_stream(FURTHER_STARTS + start as u64);
+        }
         rng
     }
 }

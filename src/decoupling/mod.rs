@@ -1,5 +1,17 @@
-//! Decoupling: the resistances of rows in, the coordinates of their nodes out. Beside the network stand two
-//! baselines, so that a reader sees what the network adds.
+//! Decoupling: resistances in, coordinates of nodes out, by every way we know.
+//!
+//! | decoder | what it is |
+//! |---|---|
+//! | [`TrainingMean`] | knows nothing: the baseline |
+//! | [`RidgeMap`] | affine, with a penalty chosen by cross-validation |
+//! | [`RadialBasisNetwork`] | Gaussians around centres |
+//! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
+//! | [`NewtonDecoder`] | solves Eq. (2) |
+//! | [`PolishedDecoder`] | any of them, then a few of Newton's steps |
+//! | [`PosteriorDecoder`] | Newton's method with noise and prior |
+//!
+//! All are [`FrameDecoder`]s. [`resistance_residual`] tells how well an answer explains the readings, without ground truth.
+//! [`Decoupler`] is the older interface of networks and baselines to rows without order.
 
 mod box_posterior;
 mod compiled_network;

@@ -1,26 +1,31 @@
 use std::sync::Arc;
 
 use ndarray::Array2;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::{CountError, Errors, RunSettings};
+use super::{Errors, RunError, RunSettings, StartRecord, starts::lowest};
 use crate::{
-    dataset::{Dataset, DatasetError, Split, Stream, hold_out},
+    dataset::{Dataset, Split, Stream, hold_out},
     decoupling::{Decoupler, LinearMap, TrainingMean},
-    network::{DecouplingNetwork, MinMax, ScalingError, Shape, nguyen_widrow},
-    scene::SceneError,
-    sensor::SensorError,
-    training::{Examples, Problem, Trainer, TrainingError},
+    network::{DecouplingNetwork, MinMax, Shape, nguyen_widrow},
+    training::{
+        Examples, Method, NormalEquations, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer,
+        TrainerState, TrainingError,
+    },
 };
 
-/// A run: the sets drawn, the training in progress, and what its network is worth. Step it by its trainer.
+/// A run: the sets drawn, one training for each start, and what the best network is worth.
+///
+/// The starts share sets and scaling and differ in their first weights only. The *leader* is the start whose best
+/// network has the lowest validation error so far (training error where nothing is held out); the test set never
+/// decides.
 pub struct Run {
     settings: RunSettings,
     test: Arc<Dataset>,
     inputs: MinMax,
     outputs: MinMax,
-    trainer: Trainer,
+    trainers: Vec<Trainer>,
     baselines: Baselines,
 }
 
@@ -34,35 +39,53 @@ pub struct Baselines {
     pub linear: Errors,
 }
 
-/// Why a run cannot be prepared.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum RunError {
-    /// A number out of range.
-    #[error(transparent)]
-    Count(#[from] CountError),
-    /// An impossible sensor.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// An impossible scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Samples that cannot be drawn.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// Samples that cannot be scaled.
-    #[error(transparent)]
-    Scaling(#[from] ScalingError),
-    /// A training that cannot begin.
-    #[error(transparent)]
-    Training(#[from] TrainingError),
-}
+/// The most memory that the equations of all starts may take.
+const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 impl Run {
-    /// Draws the sets, scales them, starts the network and measures the baselines.
+    /// Draws the sets, scales them, starts the networks and measures the baselines.
     ///
     /// # Errors
     /// Settings that are impossible, with the reason.
     pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
+        Self::with_trainers(settings, |problem, shape| {
+            let start = |number| nguyen_widrow(shape, &mut settings.seed.start_rng(number));
+            let trainers = (0..settings.starts).into_par_iter().map(|number| {
+                let trainer = Trainer::new(start(number), problem.clone(), settings.training);
+                trainer.map_err(RunError::from)
+            });
+            trainers.collect()
+        })
+    }
+
+    /// Goes on where the states of all starts were taken from a run of these settings.
+    ///
+    /// # Errors
+    /// Settings that are impossible, or states that are damaged or not theirs.
+    pub fn resume(settings: RunSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
+        if states.len() != settings.starts {
+            return Err(RunError::Starts {
+                found: states.len(),
+                expected: settings.starts,
+            });
+        }
+        Self::with_trainers(settings, |problem, shape| {
+            let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
+                let refused = |source| RunError::Resume { start, source };
+                let trainer = Trainer::resume(state, problem.clone()).map_err(refused)?;
+                if trainer.present().shape() != shape {
+                    return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
+                }
+                Ok(trainer)
+            });
+            trainers.collect()
+        })
+    }
+
+    fn with_trainers(
+        settings: RunSettings,
+        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
+    ) -> Result<Self, RunError> {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
         let test = Self::test_set(&settings)?;
@@ -74,7 +97,7 @@ impl Run {
         let drawn = (settings.samples.div_ceil(rows) + held_out) * rows;
         let drawn = Dataset::simulate(&sensor, &scene, drawn, &mut seed.rng(Stream::Training))?;
         let split = hold_out(drawn, held_out, &mut seed.rng(Stream::Split));
-        Self::with_sets(settings, split, test)
+        Self::with_sets(settings, split, test, trainers)
     }
 
     /// The test set of these settings: what the window shows before anything is trained.
@@ -93,7 +116,12 @@ impl Run {
         )?)
     }
 
-    fn with_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+    fn with_sets(
+        settings: RunSettings,
+        split: Split,
+        test: Dataset,
+        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
+    ) -> Result<Self, RunError> {
         let Split { training, validation } = split;
         let stroke_mm = settings.stroke_mm();
         let score = |decoupler: &dyn Decoupler| {
@@ -119,14 +147,14 @@ impl Run {
             hidden: settings.hidden,
             outputs: problem.training.outputs(),
         };
-        let start = nguyen_widrow(shape, &mut settings.seed.rng(Stream::Start));
-        let trainer = Trainer::new(start, problem, settings.training)?;
+        check_memory(&settings.training.method, shape, settings.starts)?;
+        let trainers = trainers(&problem, shape)?;
         Ok(Self {
             settings,
             test: Arc::new(test),
             inputs,
             outputs,
-            trainer,
+            trainers,
             baselines,
         })
     }
@@ -136,14 +164,97 @@ impl Run {
         &self.settings
     }
 
-    /// The training in progress.
-    pub fn trainer(&self) -> &Trainer {
-        &self.trainer
+    /// Runs one epoch of every start that has not ended, side by side. Returns why the run has ended, once every
+    /// start has. The bits do not depend on the number of threads.
+    pub fn step(&mut self) -> Option<StopReason> {
+        match self.trainers.as_mut_slice() {
+            // Stays on this thread, which saves handing it over each epoch.
+            [only] => only.step(),
+            all => {
+                all.par_iter_mut().for_each(|trainer| {
+                    trainer.step();
+                });
+                self.stop_reason()
+            }
+        }
     }
 
-    /// The training in progress, to be stepped or stopped.
-    pub fn trainer_mut(&mut self) -> &mut Trainer {
-        &mut self.trainer
+    /// Ends every start by the user's wish.
+    pub fn stop(&mut self) {
+        self.trainers.iter_mut().for_each(Trainer::stop);
+    }
+
+    /// Why the run has ended, once every start has ended: the leader's reason, or the user's wish if any start could
+    /// have gone on.
+    pub fn stop_reason(&self) -> Option<StopReason> {
+        let reasons = self.trainers.iter().map(Trainer::stop_reason);
+        let reasons: Vec<_> = reasons.collect::<Option<_>>()?;
+        if reasons.contains(&StopReason::Stopped) {
+            return Some(StopReason::Stopped);
+        }
+        self.leader().stop_reason()
+    }
+
+    /// Goes on with another method from the present weights of every start: [`Trainer::continue_with`].
+    ///
+    /// # Errors
+    /// A setting out of range, or networks too wide for the method; then nothing has changed.
+    pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
+        check_memory(&method, self.leader().present().shape(), self.trainers.len())?;
+        // The starts have the same shape, so the first is refused or none.
+        for trainer in &mut self.trainers {
+            trainer.continue_with(method)?;
+        }
+        self.settings.training.method = method;
+        Ok(())
+    }
+
+    /// Changes when every start stops: [`Trainer::set_stopping`].
+    ///
+    /// # Errors
+    /// A setting out of range; then nothing has changed.
+    pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
+        for trainer in &mut self.trainers {
+            trainer.set_stopping(stopping)?;
+        }
+        self.settings.training.stopping = stopping;
+        Ok(())
+    }
+
+    /// The trainings of all starts.
+    pub fn trainers(&self) -> &[Trainer] {
+        &self.trainers
+    }
+
+    /// The number of the leader, from 0.
+    pub fn leader_number(&self) -> usize {
+        lowest(self.trainers.iter().map(Trainer::best_mse)).unwrap_or(0)
+    }
+
+    /// The training of the leader.
+    pub fn leader(&self) -> &Trainer {
+        &self.trainers[self.leader_number()]
+    }
+
+    /// How each start stands. Costs a decoupling of the test set for each.
+    pub fn starts(&self) -> Vec<StartRecord> {
+        let record = |trainer: &Trainer| {
+            let best = trainer.history()[trainer.best_epoch()];
+            StartRecord {
+                train_mse: best.training_mse,
+                validation_mse: best.validation_mse,
+                z_percent: self.test_errors(&self.network_of(trainer)).1.z_percent,
+                epochs: trainer.latest().epoch,
+                best_epoch: trainer.best_epoch(),
+                stop_reason: trainer.stop_reason(),
+            }
+        };
+        self.trainers.par_iter().map(record).collect()
+    }
+
+    /// The states of all starts, from which [`Self::resume`] goes on.
+    pub fn states(&self) -> Vec<TrainerState> {
+        self.trainers.iter().map(Trainer::state).collect()
     }
 
     /// The test set.
@@ -156,16 +267,32 @@ impl Run {
         &self.baselines
     }
 
-    /// The best network so far, ready to read resistances.
+    /// The leader's best network so far, ready to read resistances.
     pub fn network(&self) -> DecouplingNetwork {
-        DecouplingNetwork::new(self.inputs.clone(), self.trainer.best().clone(), self.outputs.clone())
+        self.network_of(self.leader())
     }
 
-    /// What the best network so far makes of the test set: coordinates in millimetres (samples × 3·M2) and their
-    /// errors.
+    fn network_of(&self, trainer: &Trainer) -> DecouplingNetwork {
+        DecouplingNetwork::new(self.inputs.clone(), trainer.best().clone(), self.outputs.clone())
+    }
+
+    /// What [`Self::network`] makes of the test set: coordinates in millimetres (samples × 3·M2) and their errors.
     pub fn decouple_test(&self) -> (Array2<f64>, Errors) {
-        let decoupled_mm = self.network().decouple(self.test.resistances_ohm.view());
+        self.test_errors(&self.network())
+    }
+
+    fn test_errors(&self, network: &DecouplingNetwork) -> (Array2<f64>, Errors) {
+        let decoupled_mm = network.decouple(self.test.resistances_ohm.view());
         let errors = Errors::measure(&self.test, &decoupled_mm, self.settings.stroke_mm());
         (decoupled_mm, errors)
     }
+}
+
+/// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.
+fn check_memory(method: &Method, shape: Shape, starts: usize) -> Result<(), RunError> {
+    let bytes = NormalEquations::bytes(shape).saturating_mul(starts);
+    if starts > 1 && method.has_normal_equations() && bytes > LARGEST_EQUATIONS_BYTES {
+        return Err(RunError::TooManyStarts { starts, bytes });
+    }
+    Ok(())
 }

@@ -27,10 +27,21 @@ pub struct RunSettings {
     pub test_samples: usize,
     /// Hidden nodes.
     pub hidden: usize,
+    /// Trainings from different random weights, of which the best by its validation error is kept.
+    #[serde(default = "one_start")]
+    pub starts: usize,
     /// Method, its settings, and when to stop.
     pub training: TrainingSettings,
     /// From which everything random follows.
     pub seed: Seed,
+}
+
+/// The most starts of one run: enough to know the distribution of its results, and what memory allows.
+pub const MOST_STARTS: usize = 100;
+
+/// Files written before there were several starts.
+fn one_start() -> usize {
+    1
 }
 
 /// A number out of its range.
@@ -55,6 +66,7 @@ impl Default for RunSettings {
             validation_samples: 200,
             test_samples: 100,
             hidden: 12,
+            starts: 1,
             training: TrainingSettings::default(),
             seed: Seed::default(),
         }
@@ -69,6 +81,7 @@ impl RunSettings {
     pub fn check_counts(&self) -> Result<(), CountError> {
         let counts = [
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
+            ("starts", self.starts, 1..=MOST_STARTS),
             ("training samples", self.samples, 1..=LARGEST_SAMPLES),
             ("validation samples", self.validation_samples, 0..=LARGEST_SAMPLES),
             ("test samples", self.test_samples, 1..=LARGEST_SAMPLES),

@@ -4,8 +4,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tempfile::NamedTempFile;
 use thiserror::Error;
+
+use super::unfinished::Unfinished;
 
 /// Why a file cannot be written.
 #[derive(Debug, Error)]
@@ -55,7 +56,7 @@ pub struct AtomicFile {
 #[derive(Debug)]
 enum Sink {
     /// Becomes the file at this target.
-    Beside(NamedTempFile, PathBuf),
+    Beside(Unfinished, PathBuf),
     /// A pipe or device, which nothing can replace.
     Through(File),
 }
@@ -123,7 +124,7 @@ impl AtomicFile {
                 folder,
                 permissions,
             } => {
-                let file = open_beside(&folder).map_err(error)?;
+                let file = Unfinished::begin(&folder).map_err(error)?;
                 if let Some(permissions) = permissions {
                     file.as_file().set_permissions(permissions).map_err(error)?;
                 }
@@ -146,25 +147,10 @@ impl AtomicFile {
             Sink::Through(_) => Ok(()),
             Sink::Beside(file, target) => {
                 file.as_file().sync_all().map_err(error)?;
-                file.persist(target).map_err(|e| error(e.error))?;
-                Ok(())
+                file.persist(&target).map_err(error)
             }
         }
     }
-}
-
-/// A nameless-looking file in `folder` with the permissions of any new file: what the umask leaves of 0666.
-fn open_beside(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".decoupler-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(Permissions::from_mode(0o666));
-    }
-    // The default error repeats the temporary name, which means nothing to the user.
-    let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
-    builder.tempfile_in(folder).map_err(plain)
 }
 
 impl Write for AtomicFile {
@@ -180,14 +166,14 @@ impl Write for AtomicFile {
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Beside(file, _) => file.write(bytes),
+            Self::Beside(file, _) => file.as_file().write(bytes),
             Self::Through(file) => file.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match self {
-            Self::Beside(file, _) => file.flush(),
+            Self::Beside(file, _) => file.as_file().flush(),
             Self::Through(file) => file.flush(),
         }
     }

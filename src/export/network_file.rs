@@ -4,19 +4,22 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::error::Category;
 use thiserror::Error;
 
-use super::{WriteError, atomic_write, epoch_columns::History, soundness::flaw};
+use super::{
+    WriteError, atomic_write,
+    heading::{Heading, NoHeading},
+    soundness::flaw,
+};
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunSettings},
+    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     network::DecouplingNetwork,
-    training::{EpochRecord, StopReason},
+    training::{EpochRecord, History, Stage, StopReason},
 };
 
 const FORMAT: &str = "decoupler network";
 const VERSION: u64 = 1;
-const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
 /// A network with all that is known of it: what was asked for, how the training went, and what the network is worth.
 /// Its file is JSON; reading it gives a network that answers with the same bits.
@@ -47,6 +50,11 @@ pub struct TrainingRecord {
     pub seconds: f64,
     /// Every epoch, the start first.
     pub history: Vec<EpochRecord>,
+    /// The methods it went through, the first one first.
+    pub stages: Vec<Stage>,
+    /// All starts of the run, of which the best one is the network's. Empty in files of programs that knew one start
+    /// only.
+    pub starts: Vec<StartRecord>,
 }
 
 /// Why a network file cannot be read or written.
@@ -115,16 +123,6 @@ pub enum NetworkFileError {
     Write(#[from] WriteError),
 }
 
-/// What tells whether a file is ours, read before the rest, which other versions may write otherwise.
-#[derive(Deserialize)]
-struct Heading {
-    format: serde_json::Value,
-    #[serde(default)]
-    version: serde_json::Value,
-    #[serde(default)]
-    program: serde_json::Value,
-}
-
 /// The file as it stands.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -147,21 +145,27 @@ struct TrainingDocument {
     epochs: usize,
     seconds: f64,
     history: History,
+    #[serde(default)]
+    stages: Vec<Stage>,
+    #[serde(default)]
+    starts: Vec<StartRecord>,
 }
 
 impl NetworkFile {
     /// The best network of `run` so far, and what is known of it.
     pub fn from_run(run: &Run) -> Self {
-        let trainer = run.trainer();
+        let trainer = run.leader();
         Self {
             program: PROGRAM.to_owned(),
             settings: *run.settings(),
             network: run.network(),
             training: TrainingRecord {
-                stop_reason: trainer.stop_reason(),
+                stop_reason: run.stop_reason(),
                 best_epoch: trainer.best_epoch(),
                 seconds: trainer.elapsed().as_secs_f64(),
                 history: trainer.history().to_vec(),
+                stages: trainer.stages().to_vec(),
+                starts: run.starts(),
             },
             errors: run.decouple_test().1,
             baselines: *run.baselines(),
@@ -199,15 +203,23 @@ impl NetworkFile {
 
     fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
         let path = || path.to_owned();
-        let heading: Heading = serde_json::from_slice(bytes).map_err(|error| not_ours(path(), bytes, &error))?;
+        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
+            NoHeading::NotJson(reason) => NetworkFileError::NotJson { path: path(), reason },
+            NoHeading::CutOff { line, column } => NetworkFileError::CutOff {
+                path: path(),
+                line,
+                column,
+            },
+            NoHeading::Other => NetworkFileError::NotOurs { path: path() },
+        })?;
         if heading.format != FORMAT {
             return Err(NetworkFileError::NotOurs { path: path() });
         }
-        if heading.version.as_u64().is_some_and(|version| version > VERSION) {
+        if let Some(version) = heading.newer_than(VERSION) {
             return Err(NetworkFileError::Version {
                 path: path(),
-                version: heading.version.to_string(),
-                program: heading.program.as_str().unwrap_or("another program").to_owned(),
+                version,
+                program: heading.program(),
             });
         }
         let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
@@ -249,6 +261,8 @@ impl NetworkFile {
                 epochs: training.history.last().map_or(0, |record| record.epoch),
                 seconds: training.seconds,
                 history: History(training.history),
+                stages: training.stages,
+                starts: training.starts,
             },
             errors,
             baselines,
@@ -266,36 +280,11 @@ impl NetworkFile {
                 best_epoch: training.best_epoch,
                 seconds: training.seconds,
                 history: training.history.0,
+                stages: training.stages,
+                starts: training.starts,
             },
             errors: document.errors,
             baselines: document.baselines,
         }
-    }
-}
-
-/// Why a file has no heading of ours.
-fn not_ours(path: PathBuf, bytes: &[u8], error: &serde_json::Error) -> NetworkFileError {
-    // To the parser a number that ends with the file, as "1e", is invalid; to us the file was cut off.
-    let in_last_number = error.to_string().starts_with("invalid number") && !bytes.trim_ascii_end().ends_with(b"}");
-    match error.classify() {
-        _ if bytes.trim_ascii().is_empty() => NetworkFileError::NotJson {
-            path,
-            reason: "it is empty".to_owned(),
-        },
-        Category::Eof => cut_off(path, error),
-        Category::Syntax if in_last_number => cut_off(path, error),
-        Category::Data => NetworkFileError::NotOurs { path },
-        Category::Syntax | Category::Io => NetworkFileError::NotJson {
-            path,
-            reason: format!("{error}"),
-        },
-    }
-}
-
-fn cut_off(path: PathBuf, error: &serde_json::Error) -> NetworkFileError {
-    NetworkFileError::CutOff {
-        path,
-        line: error.line(),
-        column: error.column(),
     }
 }

@@ -1,6 +1,8 @@
+use std::fmt::Display;
+
 use super::NetworkFile;
 use crate::{
-    evaluation::{Baselines, Errors},
+    evaluation::{Baselines, Errors, RunSettings, StartRecord},
     network::DecouplingNetwork,
     sensor::ArrayScale,
 };
@@ -16,22 +18,6 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         errors,
         baselines: Baselines { mean, linear },
     } = file;
-    let at = |field: &str, flaw: String| format!("{field}: {flaw}");
-    let checks = [
-        settings.check_counts().map_err(|flaw| at("settings", flaw.to_string())),
-        settings
-            .sensor
-            .check()
-            .map_err(|flaw| at("settings.sensor", flaw.to_string())),
-        settings
-            .scene
-            .check()
-            .map_err(|flaw| at("settings.scene", flaw.to_string())),
-        settings
-            .training
-            .check()
-            .map_err(|flaw| at("settings.training", flaw.to_string())),
-    ];
     let weight = network.mlp().weights().iter().position(|weight| !weight.is_finite());
     let last_epoch = training.history.last().map(|record| record.epoch);
     let flaws = [
@@ -43,12 +29,42 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
             .map(|last| format!("training.best_epoch: {} is after the last, {last}", training.best_epoch)),
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
+        starts_flaw(file),
         unmeasured("errors", errors),
         unmeasured("baselines.mean", mean),
         unmeasured("baselines.linear", linear),
     ];
-    let unchecked = checks.into_iter().find_map(Result::err);
-    unchecked.or_else(|| flaws.into_iter().flatten().next())
+    settings_flaw(settings).or_else(|| flaws.into_iter().flatten().next())
+}
+
+/// What is impossible about the settings in a file, and where.
+pub(super) fn settings_flaw(settings: &RunSettings) -> Option<String> {
+    let at = |field: &str, flaw: &dyn Display| format!("{field}: {flaw}");
+    let checks = [
+        settings.check_counts().map_err(|flaw| at("settings", &flaw)),
+        settings.sensor.check().map_err(|flaw| at("settings.sensor", &flaw)),
+        settings.scene.check().map_err(|flaw| at("settings.scene", &flaw)),
+        settings.training.check().map_err(|flaw| at("settings.training", &flaw)),
+    ];
+    checks.into_iter().find_map(Result::err)
+}
+
+fn starts_flaw(file: &NetworkFile) -> Option<String> {
+    let starts = &file.training.starts;
+    if !starts.is_empty() && starts.len() != file.settings.starts {
+        let (found, expected) = (starts.len(), file.settings.starts);
+        return Some(format!(
+            "training.starts: {found} of them, but the settings ask for {expected}"
+        ));
+    }
+    let infinite = |start: &StartRecord| {
+        let figures = [Some(start.train_mse), start.validation_mse, start.z_percent];
+        figures.into_iter().flatten().any(|figure| !figure.is_finite())
+    };
+    let place = starts.iter().position(infinite)?;
+    Some(format!(
+        "training.starts: an error of number {place} is not a finite number"
+    ))
 }
 
 fn mismatch(network: &DecouplingNetwork, scale: ArrayScale, hidden: usize) -> Option<String> {

@@ -7,7 +7,7 @@ use super::{
 use crate::network::Mlp;
 
 /// A method at work.
-pub(super) trait Algorithm: Send {
+pub(super) trait Algorithm: Send + Sync {
     /// Moves `mlp` by one epoch.
     ///
     /// # Errors

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, MethodState, Problem, SettingError, StopReason, Trainer, TrainingSettings, activations::Activations,
-    trainer::Best,
+    EpochRecord, History, MethodState, Problem, SettingError, Stage, StopReason, Trainer, TrainingSettings,
+    activations::Activations, trainer::Best,
 };
 use crate::network::{Mlp, Shape};
 
@@ -17,10 +17,12 @@ pub struct TrainerState {
     settings: TrainingSettings,
     shape: Shape,
     weights: Vec<f64>,
+    /// Training error of `weights`, by which the samples are recognised.
+    mse: f64,
     best_weights: Vec<f64>,
     best_epoch: usize,
-    best_mse: f64,
-    history: Vec<EpochRecord>,
+    history: History,
+    stages: Vec<Stage>,
     validation_failures: usize,
     stop_reason: Option<StopReason>,
     elapsed: Duration,
@@ -52,8 +54,8 @@ pub enum ResumeError {
     },
     /// The saved weights have another error on these samples than they had.
     #[error(
-        "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings it \
-         was begun with"
+        "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings and \
+         the version of the program it was begun with"
     )]
     OtherSamples {
         /// The training error saved.
@@ -74,7 +76,7 @@ impl TrainerState {
 
     /// Every epoch so far.
     pub fn history(&self) -> &[EpochRecord] {
-        &self.history
+        &self.history.0
     }
 
     /// Checks what does not depend on the samples.
@@ -98,9 +100,18 @@ impl TrainerState {
         if !weights.all(|weight| weight.is_finite()) {
             return Err(ResumeError::Damaged("a weight is not a finite number"));
         }
-        if self.history.is_empty() || self.history.iter().enumerate().any(|(epoch, kept)| kept.epoch != epoch) {
+        let history = self.history();
+        if history.is_empty() || history.iter().enumerate().any(|(epoch, kept)| kept.epoch != epoch) {
             return Err(ResumeError::Damaged("its history has gaps"));
         }
+        if self.best_epoch >= history.len() {
+            return Err(ResumeError::Damaged("its best epoch is after the last"));
+        }
+        let first_epochs = || self.stages.iter().map(|stage| stage.first_epoch);
+        if first_epochs().next() != Some(0) || !first_epochs().is_sorted() {
+            return Err(ResumeError::Damaged("its methods are out of order"));
+        }
+        self.stages.iter().try_for_each(|stage| stage.method.check())?;
         if !self.method.fits(self.weights.len()) {
             return Err(ResumeError::Damaged("the state of its method does not fit its weights"));
         }
@@ -115,10 +126,14 @@ impl Trainer {
             settings: self.settings,
             shape: self.mlp.shape(),
             weights: self.mlp.weights().to_vec(),
+            mse: self
+                .problem
+                .training
+                .mse(&self.mlp, &mut Activations::new(self.mlp.shape())),
             best_weights: self.best.mlp.weights().to_vec(),
             best_epoch: self.best.epoch,
-            best_mse: self.best.mse,
-            history: self.history.clone(),
+            history: History(self.history.clone()),
+            stages: self.stages.clone(),
             validation_failures: self.validation_failures,
             stop_reason: self.stop_reason,
             elapsed: self.elapsed,
@@ -143,24 +158,27 @@ impl Trainer {
         let mlp = Mlp::from_weights(shape, state.weights);
         let mut activations = Activations::new(shape);
         let found = training.mse(&mlp, &mut activations);
-        let saved = state.history.last().map_or(found, |last| last.training_mse);
-        // After a divergence the weights are the best ones, not the last.
-        let same = found == saved || (found - saved).abs() <= SAME_ERROR * saved.abs();
-        if !same && state.stop_reason != Some(StopReason::Diverged) {
+        let saved = state.mse;
+        // False for NaN.
+        let is_same = (found - saved).abs() <= SAME_ERROR * saved.abs();
+        if !is_same {
             return Err(ResumeError::OtherSamples { saved, found });
         }
         let algorithm = state.settings.method.resume(state.method, &mlp, training);
         let algorithm = algorithm.ok_or(ResumeError::Damaged("the state is that of another method"))?;
+        let best = state.history.0[state.best_epoch];
+        let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {
             settings: state.settings,
             algorithm,
             best: Best {
                 mlp: Mlp::from_weights(shape, state.best_weights),
                 epoch: state.best_epoch,
-                mse: state.best_mse,
+                mse: if best_mse.is_nan() { f64::INFINITY } else { best_mse },
             },
             mlp,
-            history: state.history,
+            history: state.history.0,
+            stages: state.stages,
             validation_failures: state.validation_failures,
             stop_reason: state.stop_reason.filter(|reason| *reason != StopReason::Stopped),
             elapsed: state.elapsed,

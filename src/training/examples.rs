@@ -1,3 +1,5 @@
+use std::sync::{Arc, OnceLock};
+
 use faer::{Mat, MatMut, MatRef};
 use ndarray::ArrayView2;
 
@@ -8,13 +10,21 @@ use crate::network::Mlp;
 /// grow with the number of samples.
 pub(super) const BLOCK: usize = 512;
 
-/// Scaled inputs and targets, cut into blocks of samples for the products of training.
+/// Scaled inputs and targets, cut into blocks of samples for the products of training. A clone shares the samples.
 #[derive(Clone, Debug)]
 pub struct Examples {
-    blocks: Vec<Block>,
+    shared: Arc<Shared>,
     samples: usize,
     inputs: usize,
     outputs: usize,
+}
+
+/// What all trainings on the same examples share.
+#[derive(Debug)]
+struct Shared {
+    blocks: Vec<Block>,
+    /// Products of two input columns, block by block, once a method has asked for them.
+    input_pairs: OnceLock<Vec<Mat<f64>>>,
 }
 
 /// Up to [`BLOCK`] samples, each channel contiguous.
@@ -48,7 +58,10 @@ impl Examples {
             }
         };
         Self {
-            blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
+            shared: Arc::new(Shared {
+                blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
+                input_pairs: OnceLock::new(),
+            }),
             samples,
             inputs: n,
             outputs: targets.ncols(),
@@ -76,13 +89,20 @@ impl Examples {
     }
 
     pub(super) fn blocks(&self) -> &[Block] {
-        &self.blocks
+        &self.shared.blocks
+    }
+
+    /// The products of two input columns of each block, made by `make` if nobody has asked before. Making must not
+    /// wait for other threads, which may be waiting here.
+    pub(super) fn input_pairs(&self, make: impl FnMut(&Block) -> Mat<f64>) -> &[Mat<f64>] {
+        let all = || self.blocks().iter().map(make).collect();
+        self.shared.input_pairs.get_or_init(all)
     }
 
     /// Mean squared error of `mlp` over samples and outputs.
     pub fn mse(&self, mlp: &Mlp, activations: &mut Activations) -> f64 {
         let squares = self
-            .blocks
+            .blocks()
             .iter()
             .map(|block| activations.forward(mlp, block))
             .sum::<f64>();

@@ -14,8 +14,8 @@ const LARGEST_KEPT_BYTES: usize = 32 << 20;
 /// sample are contiguous and enter the product as they are. They never change during training.
 #[derive(Debug)]
 pub(super) enum InputPairs {
-    /// One matrix per block.
-    Kept(Vec<Mat<f64>>),
+    /// One matrix per block, shared by all trainings on these examples.
+    Kept(Examples),
     /// Room for one block, and for one sample of it.
     Made(Mat<f64>, Vec<f64>),
 }
@@ -27,19 +27,14 @@ impl InputPairs {
         if examples.samples() * pairs * size_of::<f64>() > LARGEST_KEPT_BYTES {
             return Self::Made(Mat::zeros(pairs, BLOCK), vec![0.0; n1]);
         }
-        let mut sample = vec![0.0; n1];
-        let filled = |block: &Block| {
-            let mut kept = Mat::zeros(pairs, block.samples());
-            fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
-            kept
-        };
-        Self::Kept(examples.blocks().iter().map(filled).collect())
+        kept(examples);
+        Self::Kept(examples.clone())
     }
 
     /// The pairs of block number `index`.
     pub(super) fn of(&mut self, index: usize, block: &Block) -> MatRef<'_, f64> {
         match self {
-            Self::Kept(blocks) => blocks[index].as_ref(),
+            Self::Kept(examples) => kept(examples)[index].as_ref(),
             Self::Made(room, sample) => {
                 fill(
                     block.inputs.as_ref(),
@@ -64,6 +59,17 @@ impl InputPairs {
             }
         }
     }
+}
+
+/// The pairs of all blocks, made when first asked for.
+fn kept(examples: &Examples) -> &[Mat<f64>] {
+    examples.input_pairs(|block| {
+        let n1 = block.inputs.ncols();
+        let mut sample = vec![0.0; n1];
+        let mut pairs = Mat::zeros(n1 * (n1 + 1) / 2, block.samples());
+        fill(block.inputs.as_ref(), &mut sample, pairs.as_mut());
+        pairs
+    })
 }
 
 fn fill(inputs: MatRef<'_, f64>, sample: &mut [f64], mut pairs: MatMut<'_, f64>) {

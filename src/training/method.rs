@@ -165,7 +165,7 @@ impl Method {
     }
 
     /// Whether it factors the normal equations, whose memory grows with the square of the hidden weights.
-    pub(super) fn has_normal_equations(&self) -> bool {
+    pub fn has_normal_equations(&self) -> bool {
         matches!(
             self,
             Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_)

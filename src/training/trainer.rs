@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, StopReason, StoppingRules,
+    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, Stage, StopReason, StoppingRules,
     activations::Activations, algorithm::Algorithm,
 };
 use crate::network::{Mlp, Shape};
@@ -69,7 +69,7 @@ pub enum TrainingError {
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
-fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
+pub(super) fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
     let bytes = if method.has_normal_equations() {
         NormalEquations::bytes(shape)
     } else {
@@ -89,6 +89,7 @@ pub struct Trainer {
     pub(super) mlp: Mlp,
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
+    pub(super) stages: Vec<Stage>,
     /// How often the validation error has risen since it last fell, under the present method.
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
@@ -129,6 +130,10 @@ impl Trainer {
                 mse: f64::INFINITY,
             },
             history: Vec::new(),
+            stages: vec![Stage {
+                first_epoch: 0,
+                method: settings.method,
+            }],
             validation_failures: 0,
             stop_reason: None,
             elapsed: Duration::ZERO,
@@ -148,51 +153,28 @@ impl Trainer {
             match self.algorithm.step(&mut self.mlp, &self.problem.training) {
                 Ok(evaluation) => self.record(evaluation),
                 Err(reason) => {
-                    if reason == StopReason::Diverged {
-                        self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
-                    }
                     self.stop_reason = Some(reason);
+                    self.restart_method();
                 }
+            }
+            if self.stop_reason == Some(StopReason::Diverged) {
+                self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
+                self.restart_method();
             }
             self.elapsed += begun.elapsed();
         }
         self.stop_reason
     }
 
+    /// Puts the method to work anew where it gave up with numbers that need not be finite, so that the state can be
+    /// saved and other rules can let it go on.
+    fn restart_method(&mut self) {
+        (self.algorithm, _) = self.settings.method.start(&self.mlp, &self.problem.training);
+    }
+
     /// Ends the training by the user's wish.
     pub fn stop(&mut self) {
         self.stop_reason.get_or_insert(StopReason::Stopped);
-    }
-
-    /// Goes on from the present weights with another method (momentum first, Levenberg-Marquardt to finish), also after
-    /// the training has ended, unless it ended because all epochs were run. Epochs go on counting.
-    ///
-    /// # Errors
-    /// A setting out of range, or a network too wide for the method; then nothing has changed.
-    pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        method.check()?;
-        check_width(&method, self.mlp.shape())?;
-        let begun = Instant::now();
-        self.settings.method = method;
-        (self.algorithm, _) = method.start(&self.mlp, &self.problem.training);
-        self.validation_failures = 0;
-        let all_run = self.latest().epoch >= self.settings.stopping.epochs;
-        self.stop_reason = all_run.then_some(StopReason::EpochsReached);
-        self.elapsed += begun.elapsed();
-        Ok(())
-    }
-
-    /// Changes when to stop; more epochs let a training go on that had run all of its own.
-    ///
-    /// # Errors
-    /// A setting out of range; then nothing has changed.
-    pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        stopping.check()?;
-        self.settings.stopping = stopping;
-        if self.stop_reason == Some(StopReason::EpochsReached) && self.latest().epoch < stopping.epochs {
-            self.stop_reason = None;
-        }
-        Ok(())
     }
 
     fn record(&mut self, evaluation: Evaluation) {
@@ -215,7 +197,7 @@ impl Trainer {
             Some(last) if validation_mse == last.validation_mse => {}
             _ => self.validation_failures = 0,
         }
-        self.history.push(EpochRecord {
+        let latest = EpochRecord {
             epoch,
             training_mse: mse,
             validation_mse,
@@ -224,22 +206,24 @@ impl Trainer {
             parameter: self.algorithm.parameter(),
             effective_parameters: self.algorithm.effective_parameters(),
             validation_failures: self.validation_failures,
-        });
-        self.stop_reason = self.reason_to_stop(epoch, evaluation);
+        };
+        self.history.push(latest);
+        self.stop_reason = self.reason_to_stop(&latest);
     }
 
-    fn reason_to_stop(&self, epoch: usize, now: Evaluation) -> Option<StopReason> {
+    pub(super) fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
         let rules = self.settings.stopping;
         let validation_rose = self.validation_failures >= rules.max_fail;
+        let mse = latest.training_mse;
         let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
-            (!now.mse.is_finite(), StopReason::Diverged),
+            (!mse.is_finite(), StopReason::Diverged),
             // Validation that rises together with the training error, above where it began, is no overfitting.
-            (validation_rose && now.mse > start_mse, StopReason::Diverged),
-            (now.mse <= rules.goal_mse, StopReason::GoalReached),
-            (now.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
+            (validation_rose && mse > start_mse, StopReason::Diverged),
+            (mse <= rules.goal_mse, StopReason::GoalReached),
+            (latest.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
             (validation_rose, StopReason::ValidationRose),
-            (epoch >= rules.epochs, StopReason::EpochsReached),
+            (latest.epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
     }
@@ -262,6 +246,16 @@ impl Trainer {
     /// The epoch of [`Self::best`].
     pub fn best_epoch(&self) -> usize {
         self.best.epoch
+    }
+
+    /// The error of [`Self::best`]: on the validation set, or on the training set where nothing is held out.
+    pub fn best_mse(&self) -> f64 {
+        self.best.mse
+    }
+
+    /// The methods so far, the first one first.
+    pub fn stages(&self) -> &[Stage] {
+        &self.stages
     }
 
     /// Every epoch so far, the start first.

@@ -251,7 +251,7 @@ pub(crate) fn small() -> RunSettings {
 /// What the library makes of `settings` by itself, trained to the end.
 pub(crate) fn trained(settings: RunSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
-    while run.trainer_mut().step().is_none() {}
+    while run.step().is_none() {}
     run
 }
 

@@ -24,12 +24,12 @@ fn a_training_ends_with_the_librarys_own_numbers() {
     let run = trained(small());
     assert_eq!(driver.table(), table_of(&run));
     assert_eq!(driver.table().len(), 15, "three rows of five figures");
-    let reason = run.trainer().stop_reason().unwrap();
+    let reason = run.stop_reason().unwrap();
     assert!(driver.has(&format!("Finished: {reason}")), "{reason}");
-    let epochs = run.trainer().latest().epoch;
+    let epochs = run.leader().latest().epoch;
     assert!(driver.has(&format!("Epoch {epochs} of 15")));
     let shown = driver.state().run.as_ref().unwrap();
-    assert_eq!(shown.history, run.trainer().history());
+    assert_eq!(shown.history, run.leader().history());
     driver.settle();
 }
 
@@ -161,9 +161,9 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
     assert!(driver.says("stopped by you"));
     let mut run = Run::prepare(endless()).unwrap();
     for _ in 0..driver.epochs() {
-        run.trainer_mut().step();
+        run.step();
     }
-    assert_eq!(driver.state().run.as_ref().unwrap().history, run.trainer().history());
+    assert_eq!(driver.state().run.as_ref().unwrap().history, run.leader().history());
     assert_eq!(driver.table(), table_of(&run));
     assert!(driver.has("Decoupled surface") && driver.is_enabled("Hidden nodes"));
     driver.settle();

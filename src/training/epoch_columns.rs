@@ -5,13 +5,13 @@ use serde::{
     de::{Error, Visitor},
 };
 
-use crate::training::EpochRecord;
+use super::EpochRecord;
 
 /// The history of a training as columns of equal length: a third of the size of records, and what a plotting program
 /// wants.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Columns", into = "Columns")]
-pub(super) struct History(pub(super) Vec<EpochRecord>);
+pub(crate) struct History(pub(crate) Vec<EpochRecord>);
 
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,0 +1,89 @@
+use std::{
+    io::{Write, stderr},
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+
+use super::failure::Failure;
+use crate::{
+    evaluation::Run,
+    export::{CheckpointFile, CheckpointFileError},
+};
+
+/// Saving takes at most this share of the time.
+const LARGEST_SHARE: u32 = 20;
+
+#[derive(Args)]
+pub(super) struct CheckpointArguments {
+    /// File in which the training is saved now and then and at its end, so that it can go on from there
+    #[arg(long, value_name = "FILE")]
+    pub(super) checkpoint: Option<PathBuf>,
+    /// Go on from the file given by --checkpoint, with the same bits as if never interrupted
+    ///
+    /// All settings come from the file. --epochs, --goal, --max-fail and --min-gradient change when to stop; another
+    /// --method (or --set) goes on from the present weights with that method. What is given beside them must be as in
+    /// the file.
+    #[arg(long, requires = "checkpoint")]
+    pub(super) resume: bool,
+    /// Seconds between two savings
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "checkpoint")]
+    checkpoint_interval: f64,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    /// A day.
+    const LONGEST: f64 = 86_400.0;
+    let seconds = text.parse().ok().filter(|seconds| (0.0..=LONGEST).contains(seconds));
+    seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
+}
+
+/// The file in which a training is saved.
+pub(super) struct Checkpointing {
+    path: PathBuf,
+    interval: Duration,
+    next: Instant,
+    has_warned: bool,
+}
+
+impl CheckpointArguments {
+    /// What is to be saved where; nothing is ever overwritten but what is gone on from.
+    pub(super) fn checkpointing(&self) -> Result<Option<Checkpointing>, Failure> {
+        let Some(path) = &self.checkpoint else { return Ok(None) };
+        if !self.resume && path.symlink_metadata().is_ok() {
+            let path = path.display();
+            return Err(Failure::Arguments(format!(
+                "--checkpoint '{path}' exists: add --resume to go on from it, or give another name"
+            )));
+        }
+        Ok(Some(Checkpointing {
+            path: path.clone(),
+            interval: Duration::from_secs_f64(self.checkpoint_interval),
+            next: Instant::now(),
+            has_warned: false,
+        }))
+    }
+}
+
+impl Checkpointing {
+    /// Saves `run` if it is time. A failure is told once and tried again: the training is worth more.
+    pub(super) fn save_if_due(&mut self, run: &Run) {
+        let begun = Instant::now();
+        if begun < self.next {
+            return;
+        }
+        if let Err(error) = self.save(run)
+            && !self.has_warned
+        {
+            self.has_warned = true;
+            // Nobody is left to tell if this fails.
+            let _ = writeln!(stderr(), "warning: {error}; the training goes on");
+        }
+        self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());
+    }
+
+    pub(super) fn save(&self, run: &Run) -> Result<(), CheckpointFileError> {
+        CheckpointFile::from_run(run).save(&self.path)
+    }
+}

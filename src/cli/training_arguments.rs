@@ -1,0 +1,191 @@
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
+
+use super::{
+    arguments::{count, seed},
+    failure::Failure,
+};
+use crate::{
+    dataset::{LARGEST_SAMPLES, Seed},
+    evaluation::{MOST_STARTS, RunSettings},
+    network::LARGEST_HIDDEN,
+    sensor::{ArrayScale, SensorModel},
+    training::{Method, StoppingRules, TrainingSettings},
+};
+
+// What to train. Whatever is not given is the default, or what a checkpoint says.
+#[derive(Args)]
+pub(super) struct TrainingArguments {
+    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
+    #[arg(long, value_name = "SCALE")]
+    array: Option<ArrayScale>,
+    /// Hidden nodes [default: 12]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
+    hidden: Option<usize>,
+    /// Trainings from different random weights, side by side; the best one by validation error is kept [default: 1]
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
+    starts: Option<usize>,
+    /// Training method [default: lm]
+    #[arg(long, value_parser = method())]
+    method: Option<Method>,
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
+    set: Vec<(String, f64)>,
+    /// Most epochs [default: 1000]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    epochs: Option<usize>,
+    /// Training error (mse, scaled) that is good enough [default: 0]
+    #[arg(long, value_name = "MSE", value_parser = number)]
+    goal: Option<f64>,
+    /// How often the validation error may rise before it falls again [default: 6]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    max_fail: Option<usize>,
+    /// Length of the gradient below which training ends [default: 1e-7]
+    #[arg(long, value_name = "LENGTH", value_parser = number)]
+    min_gradient: Option<f64>,
+    /// Training samples; this and the next two are rounded up to whole snapshots of all rows [default: 1000]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    samples: Option<usize>,
+    /// Samples for the errors that are printed [default: 100]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    test_samples: Option<usize>,
+    /// Samples that choose the best weights and end the training; 0 for none [default: 200]
+    #[arg(long, value_name = "N", value_parser = count(0..=LARGEST_SAMPLES))]
+    validation_samples: Option<usize>,
+    /// From which everything random follows [default: 0]
+    #[arg(long, value_parser = seed)]
+    seed: Option<u64>,
+}
+
+impl TrainingArguments {
+    /// The settings of a new run.
+    pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
+        let default = RunSettings::default();
+        Ok(RunSettings {
+            sensor: self.array.map_or(default.sensor, SensorModel::new),
+            samples: self.samples.unwrap_or(default.samples),
+            validation_samples: self.validation_samples.unwrap_or(default.validation_samples),
+            test_samples: self.test_samples.unwrap_or(default.test_samples),
+            hidden: self.hidden.unwrap_or(default.hidden),
+            starts: self.starts.unwrap_or(default.starts),
+            training: self.training(default.training)?,
+            seed: self.seed.map_or(default.seed, Seed),
+            ..default
+        })
+    }
+
+    /// How a run of the settings `saved` is to go on.
+    pub(super) fn training_from(&self, saved: &RunSettings) -> Result<TrainingSettings, Failure> {
+        let same = |argument: &str, given: Option<String>, saved: String| match given {
+            Some(given) if given != saved => Err(Failure::Arguments(format!(
+                "--{argument} {given}: the checkpoint has {saved}; leave it out to go on, or begin anew with another \
+                 --checkpoint"
+            ))),
+            _ => Ok(()),
+        };
+        let count = |argument, given: Option<usize>, saved: usize| {
+            same(argument, given.map(|given| given.to_string()), saved.to_string())
+        };
+        let scale = saved.sensor.scale;
+        same("array", self.array.map(|scale| scale.to_string()), scale.to_string())?;
+        count("hidden", self.hidden, saved.hidden)?;
+        count("starts", self.starts, saved.starts)?;
+        count("samples", self.samples, saved.samples)?;
+        count("test-samples", self.test_samples, saved.test_samples)?;
+        count("validation-samples", self.validation_samples, saved.validation_samples)?;
+        same("seed", self.seed.map(|seed| seed.to_string()), saved.seed.to_string())?;
+        self.training(saved.training)
+    }
+
+    /// The method and stopping rules given, the others as in `present`.
+    fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
+        let mut method = self.method.unwrap_or(present.method);
+        for (name, value) in &self.set {
+            let short_name = method.short_name();
+            let mut settings = method.settings();
+            let names = settings.iter().map(|setting| dashed(setting.name)).collect::<Vec<_>>();
+            match settings.iter_mut().find(|setting| dashed(setting.name) == *name) {
+                Some(setting) => *setting.value = *value,
+                None => {
+                    let names = names.join(", ");
+                    let message = format!("--set {name}: {short_name} has no such setting; it has {names}");
+                    return Err(Failure::Arguments(message));
+                }
+            }
+        }
+        let rules = present.stopping;
+        let training = TrainingSettings {
+            method,
+            stopping: StoppingRules {
+                epochs: self.epochs.unwrap_or(rules.epochs),
+                goal_mse: self.goal.unwrap_or(rules.goal_mse),
+                min_gradient: self.min_gradient.unwrap_or(rules.min_gradient),
+                max_fail: self.max_fail.unwrap_or(rules.max_fail),
+            },
+        };
+        training.check()?;
+        Ok(training)
+    }
+}
+
+fn method() -> impl TypedValueParser<Value = Method> {
+    let names = Method::all().map(|method| method.short_name());
+    PossibleValuesParser::new(names).map(|name| {
+        let mut methods = Method::all().into_iter();
+        methods.find(|method| method.short_name() == name).unwrap_or_default()
+    })
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example mu=0.01")?;
+    let value = value.trim().parse().map_err(|_| format!("'{value}' is not a number"))?;
+    Ok((name.trim().to_owned(), value))
+}
+
+/// How a setting is named in the terminal.
+fn dashed(name: &str) -> String {
+    name.replace(' ', "-")
+}
+
+fn settings_help() -> String {
+    let of = |mut method: Method| {
+        let settings = method.settings();
+        let list = settings
+            .iter()
+            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
+        let list = list.collect::<Vec<_>>().join(", ");
+        format!("{} has {list}", method.short_name())
+    };
+    let methods = Method::all().map(of).join("; ");
+    format!("Change a setting of the method, as often as you like: {methods}")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Command, FromArgMatches};
+
+    use super::*;
+
+    fn parsed(line: &str) -> TrainingArguments {
+        let command = TrainingArguments::augment_args(Command::new("train"));
+        let matches = command.get_matches_from(line.split(' '));
+        TrainingArguments::from_arg_matches(&matches).unwrap()
+    }
+
+    #[test]
+    fn the_defaults_in_the_help_are_those_of_the_library() {
+        assert_eq!(parsed("train").settings().unwrap(), RunSettings::default());
+        let told = "train --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 --goal 0 --max-fail 6 \
+                    --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples 200 --seed 0";
+        assert_eq!(parsed(told).settings().unwrap(), RunSettings::default());
+    }
+}

@@ -1,0 +1,61 @@
+use thiserror::Error;
+
+use super::CountError;
+use crate::{
+    dataset::DatasetError,
+    network::ScalingError,
+    scene::SceneError,
+    sensor::SensorError,
+    training::{ResumeError, TrainingError},
+};
+
+/// Why a run cannot be prepared.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RunError {
+    /// A number out of range.
+    #[error(transparent)]
+    Count(#[from] CountError),
+    /// An impossible sensor.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// An impossible scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Samples that cannot be drawn.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// Samples that cannot be scaled.
+    #[error(transparent)]
+    Scaling(#[from] ScalingError),
+    /// A training that cannot begin.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The method's equations of all starts would take too much memory.
+    #[error(
+        "{starts} starts of this network would take {:.1} GB with this method: use fewer starts, fewer hidden nodes, \
+         or the scaled conjugate gradient (scg)",
+        *.bytes as f64 * 1e-9
+    )]
+    TooManyStarts {
+        /// How many were asked for.
+        starts: usize,
+        /// How many bytes they would take.
+        bytes: usize,
+    },
+    /// A saved training that cannot be resumed.
+    #[error("start {}: {source}", .start + 1)]
+    Resume {
+        /// Which start, from 0.
+        start: usize,
+        /// What is wrong with it.
+        source: ResumeError,
+    },
+    /// Not as many saved trainings as starts.
+    #[error("{found} saved trainings, but the settings ask for {expected} starts")]
+    Starts {
+        /// Trainings found.
+        found: usize,
+        /// Starts asked for.
+        expected: usize,
+    },
+}

@@ -1,0 +1,226 @@
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+use thiserror::Error;
+
+use super::{
+    WriteError, atomic_write,
+    heading::{Heading, NoHeading},
+    network_file::PROGRAM,
+    soundness::settings_flaw,
+};
+use crate::{
+    evaluation::{Run, RunError, RunSettings},
+    training::TrainerState,
+};
+
+const FORMAT: &str = "decoupler checkpoint";
+const VERSION: u64 = 1;
+/// How the file begins, whatever became of the rest.
+const BEGINNING: &[u8] = br#"{"format":"decoupler checkpoint","#;
+
+/// A run at some epoch, saved to go on from there with the same bits as if it had never been interrupted.
+///
+/// Its file is JSON. The samples are not in it, for they follow from the settings. A checksum (CRC-32) tells whether
+/// so much as a digit has changed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckpointFile {
+    /// Program and version that wrote it.
+    pub program: String,
+    /// What was asked for, with the method and the stopping rules of that epoch.
+    pub settings: RunSettings,
+    /// Each start.
+    pub starts: Vec<TrainerState>,
+}
+
+/// Why a checkpoint cannot be read or written.
+#[derive(Debug, Error)]
+pub enum CheckpointFileError {
+    /// The system refuses to read it.
+    #[error("cannot read '{}': {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Something else.
+    #[error("'{}' is not a checkpoint: {reason}; choose one that train --checkpoint or the window saved", .path.display())]
+    NotOurs {
+        /// The file.
+        path: PathBuf,
+        /// What it is instead.
+        reason: String,
+    },
+    /// It ends too early.
+    #[error("'{}' is cut off at line {line}, column {column}; copy it again, or begin anew", .path.display())]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+        /// Line of the end, from 1.
+        line: usize,
+        /// Column of the end, from 1.
+        column: usize,
+    },
+    /// Written in a format unknown to this version.
+    #[error("'{}' has version {version} of the checkpoint format, written by {program}; this is {PROGRAM}, which reads version {VERSION}: install a newer one", .path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: String,
+        /// What wrote it.
+        program: String,
+    },
+    /// Something in it has changed, or is not possible.
+    #[error("'{}' is damaged: {flaw}; copy it again, or begin anew", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        flaw: String,
+    },
+    /// A run that could not be read back.
+    #[error("'{}' is not saved: the training has numbers that no file can hold ({flaw})", .path.display())]
+    Unsound {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        flaw: String,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// The file as it stands. `crc32` is that of the text of `run`, as hexadecimal digits.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document<'a> {
+    format: String,
+    version: u64,
+    program: String,
+    crc32: String,
+    #[serde(borrow)]
+    run: &'a RawValue,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RunDocument {
+    settings: RunSettings,
+    starts: Vec<TrainerState>,
+}
+
+impl CheckpointFile {
+    /// `run` as it stands.
+    pub fn from_run(run: &Run) -> Self {
+        Self {
+            program: PROGRAM.to_owned(),
+            settings: *run.settings(),
+            starts: run.states(),
+        }
+    }
+
+    /// The run, to go on from this epoch: draws its samples and takes up every start.
+    ///
+    /// # Errors
+    /// Settings that are impossible, or states that do not fit them or each other.
+    pub fn resume(self) -> Result<Run, RunError> {
+        Run::resume(self.settings, self.starts)
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// A run with numbers that JSON does not know, or a path that cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), CheckpointFileError> {
+        let unsound = |error: serde_json::Error| CheckpointFileError::Unsound {
+            path: path.to_owned(),
+            flaw: error.to_string(),
+        };
+        let run = serde_json::value::to_raw_value(&RunDocument {
+            settings: self.settings,
+            starts: self.starts.clone(),
+        });
+        let run = run.map_err(unsound)?;
+        // What was written must be readable: a weight that is not finite would be `null`.
+        serde_json::from_str::<RunDocument>(run.get()).map_err(unsound)?;
+        let document = Document {
+            format: FORMAT.to_owned(),
+            version: VERSION,
+            program: self.program.clone(),
+            crc32: checksum(&run),
+            run: &run,
+        };
+        atomic_write(path, |writer| {
+            serde_json::to_writer(&mut *writer, &document)?;
+            writeln!(writer)
+        })?;
+        Ok(())
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// What is wrong with it, and where.
+    pub fn load(path: &Path) -> Result<Self, CheckpointFileError> {
+        let bytes = fs::read(path).map_err(|source| CheckpointFileError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(path, &bytes)
+    }
+
+    fn parse(path: &Path, bytes: &[u8]) -> Result<Self, CheckpointFileError> {
+        let path = || path.to_owned();
+        let damaged = |flaw| CheckpointFileError::Damaged { path: path(), flaw };
+        let not_ours = |reason| CheckpointFileError::NotOurs { path: path(), reason };
+        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
+            NoHeading::CutOff { line, column } => CheckpointFileError::CutOff {
+                path: path(),
+                line,
+                column,
+            },
+            NoHeading::NotJson(flaw) if bytes.starts_with(BEGINNING) => damaged(flaw),
+            NoHeading::NotJson(reason) => not_ours(reason),
+            NoHeading::Other => not_ours(format!("it has no field \"format\": \"{FORMAT}\"")),
+        })?;
+        if heading.format != FORMAT {
+            return Err(not_ours(format!("its format is {}", heading.format)));
+        }
+        if let Some(version) = heading.newer_than(VERSION) {
+            return Err(CheckpointFileError::Version {
+                path: path(),
+                version,
+                program: heading.program(),
+            });
+        }
+        let document: Document<'_> = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
+        if document.version != VERSION {
+            return Err(damaged(format!("there is no version {}", document.version)));
+        }
+        if document.crc32 != checksum(document.run) {
+            return Err(damaged(
+                "its checksum shows that something in it has changed".to_owned(),
+            ));
+        }
+        let run: RunDocument = serde_json::from_str(document.run.get()).map_err(|error| damaged(error.to_string()))?;
+        if let Some(flaw) = settings_flaw(&run.settings) {
+            return Err(damaged(flaw));
+        }
+        Ok(Self {
+            program: document.program,
+            settings: run.settings,
+            starts: run.starts,
+        })
+    }
+}
+
+fn checksum(run: &RawValue) -> String {
+    format!("{:08x}", crc32fast::hash(run.get().as_bytes()))
+}

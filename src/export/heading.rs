@@ -1,0 +1,54 @@
+use serde::Deserialize;
+use serde_json::error::Category;
+
+/// What tells whether a JSON file is ours, read before the rest, which other versions may write otherwise.
+#[derive(Deserialize)]
+pub(super) struct Heading {
+    pub(super) format: serde_json::Value,
+    #[serde(default)]
+    pub(super) version: serde_json::Value,
+    #[serde(default)]
+    program: serde_json::Value,
+}
+
+/// Why a file has no heading of ours.
+pub(super) enum NoHeading {
+    /// Nothing that JSON can be, with line and column.
+    NotJson(String),
+    /// JSON that ends too early, after this line and column, from 1.
+    CutOff { line: usize, column: usize },
+    /// JSON of another program.
+    Other,
+}
+
+impl Heading {
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, NoHeading> {
+        serde_json::from_slice(bytes).map_err(|error| {
+            let cut_off = NoHeading::CutOff {
+                line: error.line(),
+                column: error.column(),
+            };
+            // To the parser a number that ends with the file, as "1e", is invalid; to us the file was cut off.
+            let in_last_number =
+                error.to_string().starts_with("invalid number") && !bytes.trim_ascii_end().ends_with(b"}");
+            match error.classify() {
+                _ if bytes.trim_ascii().is_empty() => NoHeading::NotJson("it is empty".to_owned()),
+                Category::Eof => cut_off,
+                Category::Syntax if in_last_number => cut_off,
+                Category::Data => NoHeading::Other,
+                Category::Syntax | Category::Io => NoHeading::NotJson(error.to_string()),
+            }
+        })
+    }
+
+    /// The version, if it is newer than `known`.
+    pub(super) fn newer_than(&self, known: u64) -> Option<String> {
+        let newer = self.version.as_u64().is_some_and(|version| version > known);
+        newer.then(|| self.version.to_string())
+    }
+
+    /// The program that wrote it.
+    pub(super) fn program(&self) -> String {
+        self.program.as_str().unwrap_or("another program").to_owned()
+    }
+}
