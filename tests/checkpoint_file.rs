@@ -208,9 +208,10 @@ fn other_files_and_versions_are_named() {
 /// Files that are what their checksum says, but impossible.
 #[test]
 fn impossible_contents_are_refused() {
+    type Edit = fn(&mut CheckpointFile);
     let run = stepped(settings(Method::default()), 2);
     let (_folder, path) = place();
-    let refused = |edit: fn(&mut CheckpointFile)| {
+    let refused = |edit: Edit| {
         let mut file = CheckpointFile::from_run(&run);
         edit(&mut file);
         file.save(&path).unwrap();
@@ -219,7 +220,7 @@ fn impossible_contents_are_refused() {
             Err(error) => error.to_string(),
         }
     };
-    let cases: [(fn(&mut CheckpointFile), &str); 6] = [
+    let cases: [(Edit, &str); 6] = [
         (|file| file.settings.hidden = 0, "hidden nodes: 0 is not possible"),
         (|file| file.settings.hidden = 3, "another number of hidden nodes"),
         (|file| file.settings.seed = Seed(1), "on these samples it is"),

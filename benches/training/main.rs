@@ -1,4 +1,5 @@
-//! How fast training is: `cargo bench --no-default-features --bench training`.
+//! How fast training is: `cargo bench --no-default-features --bench training`, or a part of it with its name behind
+//! `--`: `epoch`, `dense`, `sizes`, `growth` or `methods`.
 //!
 //! Every figure is a median, and what is compared is measured in turns within the same run, since a machine's speed
 //! drifts. Only ratios are worth remembering.
@@ -8,10 +9,34 @@
 mod dense;
 mod epoch;
 mod growth;
+mod memory;
+mod methods;
+mod problem;
+mod sizes;
 mod timing;
 
 fn main() {
-    epoch::print();
-    dense::print();
-    growth::print();
+    let parts: [(&str, fn()); 5] = [
+        ("epoch", epoch::print),
+        ("dense", dense::print),
+        ("sizes", sizes::print),
+        ("growth", growth::print),
+        ("methods", methods::print),
+    ];
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(sizes) = memory::asked(&arguments) {
+        memory::print_peak(sizes);
+        return;
+    }
+    // What begins with two dashes comes from cargo.
+    let named: Vec<&String> = arguments.iter().filter(|name| !name.starts_with("--")).collect();
+    for name in &named {
+        assert!(parts.iter().any(|(part, _)| part == name), "there is no part {name}");
+    }
+    for (_, print) in parts
+        .iter()
+        .filter(|(part, _)| named.is_empty() || named.iter().any(|name| name == part))
+    {
+        print();
+    }
 }

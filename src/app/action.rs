@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use super::{
     export_kind::ExportKind,
+    file_task::FileTask,
     state::{BottomTab, RightCard},
     surface_view::{OrbitCamera, ViewMode},
 };
@@ -36,14 +37,18 @@ pub enum Action {
     ShowTab(BottomTab),
     /// Dark or light.
     SetDark(bool),
-    /// Ask where to write a file.
-    ChooseFile(ExportKind),
+    /// Go on from the present weights with the method and the epochs of the settings.
+    Continue,
+    /// Ask for the path of a file.
+    ChooseFile(FileTask),
     /// Ask for the path in the window itself.
-    TypePath(ExportKind),
+    TypePath(FileTask),
     /// Change the path being typed.
     EditPath(String),
     /// Write the file.
     Export(ExportKind, PathBuf),
+    /// Take up the training saved in this file.
+    OpenCheckpoint(PathBuf),
     /// Close the question for a path.
     CancelSave,
     /// Close the notice.

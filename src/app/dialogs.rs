@@ -2,12 +2,15 @@
 
 use std::{
     path::PathBuf,
+    pin::Pin,
     sync::mpsc::{Receiver, Sender, channel},
     thread,
     time::{Duration, Instant},
 };
 
-use super::export_kind::ExportKind;
+use rfd::FileHandle;
+
+use super::file_task::FileTask;
 
 /// An answer sooner than this was no person's: the desktop has no dialog to show.
 const NO_PERSON: Duration = Duration::from_millis(250);
@@ -16,11 +19,11 @@ const NO_PERSON: Duration = Duration::from_millis(250);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// The user chose this file.
-    Chosen(ExportKind, PathBuf),
+    Chosen(FileTask, PathBuf),
     /// The user thought better of it.
     Cancelled,
     /// There is no dialog here; ask in the window.
-    NoDialog(ExportKind),
+    NoDialog(FileTask),
 }
 
 /// Where questions for a path go.
@@ -51,31 +54,38 @@ impl Dialogs {
         }
     }
 
-    /// Asks where to write a file; `wake` is called when the answer is there. Must run on the window's thread, which
+    /// Asks for the path of a file; `wake` is called when the answer is there. Must run on the window's thread, which
     /// some desktops require.
-    pub fn ask(&self, kind: ExportKind, suggestion: &std::path::Path, wake: impl FnOnce() + Send + 'static) {
+    pub fn ask(&self, task: FileTask, suggestion: &std::path::Path, wake: impl FnOnce() + Send + 'static) {
         let send = self.outgoing.clone();
-        let no_dialog = Answer::NoDialog(kind);
+        let no_dialog = Answer::NoDialog(task);
         if self.kind == DialogKind::None {
             // The receiver lives as long as `self`.
             let _ = send.send(no_dialog);
             return;
         }
+        let extension = task.kind().extension();
         let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title(format!("Save {}", kind.file_kind()))
-            .add_filter(kind.extension().to_uppercase(), &[kind.extension()]);
-        if let Some(name) = suggestion.file_name() {
-            dialog = dialog.set_file_name(name.to_string_lossy());
-        }
+            .set_title(format!("{} {}", task.verb(), task.kind().file_kind()))
+            .add_filter(extension.to_uppercase(), &[extension]);
         if let Some(folder) = suggestion.parent() {
             dialog = dialog.set_directory(folder);
         }
         let asked = Instant::now();
-        let choice = dialog.save_file();
+        let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match task {
+            FileTask::Save(_) => {
+                if let Some(name) = suggestion.file_name() {
+                    dialog = dialog.set_file_name(name.to_string_lossy());
+                }
+                Box::pin(dialog.save_file())
+            }
+            // The terminal gives checkpoints any name.
+            FileTask::OpenCheckpoint => Box::pin(dialog.add_filter("All files", &["*"]).pick_file()),
+        };
         let wait = move || {
             let answer = match pollster::block_on(choice) {
-                Some(file) => Answer::Chosen(kind, file.path().to_owned()),
-                None if asked.elapsed() < NO_PERSON => Answer::NoDialog(kind),
+                Some(file) => Answer::Chosen(task, file.path().to_owned()),
+                None if asked.elapsed() < NO_PERSON => Answer::NoDialog(task),
                 None => Answer::Cancelled,
             };
             // The window may have closed meanwhile.

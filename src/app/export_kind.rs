@@ -1,8 +1,13 @@
 use std::path::Path;
 
+use thiserror::Error;
+
 use crate::{
     evaluation::{PublishedErrors, Run, RunSettings, error_rows},
-    export::{NetworkFile, NetworkFileError, atomic_write, write_errors, write_loss_curves},
+    export::{
+        CheckpointFile, CheckpointFileError, NetworkFile, NetworkFileError, WriteError, atomic_write, write_errors,
+        write_loss_curves,
+    },
 };
 
 /// What can be written about a training.
@@ -14,11 +19,27 @@ pub enum ExportKind {
     Errors,
     /// The loss curves, as CSV.
     LossCurves,
+    /// The training as it stands, to go on from there.
+    Checkpoint,
+}
+
+/// Why a file is not written.
+#[derive(Debug, Error)]
+pub enum ExportError {
+    /// The network file.
+    #[error(transparent)]
+    Network(#[from] NetworkFileError),
+    /// The checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointFileError),
+    /// A table.
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 impl ExportKind {
     /// In the order offered.
-    pub const ALL: [Self; 3] = [Self::Network, Self::Errors, Self::LossCurves];
+    pub const ALL: [Self; 4] = [Self::Network, Self::Errors, Self::LossCurves, Self::Checkpoint];
 
     /// The word on its button.
     pub fn name(self) -> &'static str {
@@ -26,6 +47,7 @@ impl ExportKind {
             Self::Network => "Network…",
             Self::Errors => "Error table…",
             Self::LossCurves => "Loss curves…",
+            Self::Checkpoint => "Save checkpoint…",
         }
     }
 
@@ -35,6 +57,7 @@ impl ExportKind {
             Self::Network => "network",
             Self::Errors => "error table",
             Self::LossCurves => "loss curves",
+            Self::Checkpoint => "checkpoint",
         }
     }
 
@@ -46,6 +69,10 @@ impl ExportKind {
             }
             Self::Errors => "The table of errors, as CSV.",
             Self::LossCurves => "Training, validation and test error of every epoch, as CSV.",
+            Self::Checkpoint => {
+                "The training as it stands, while paused or at its end: opened here or in a terminal (train --checkpoint \
+                 FILE --resume) it goes on with the same bits."
+            }
         }
     }
 
@@ -54,6 +81,7 @@ impl ExportKind {
         match self {
             Self::Network => "json",
             Self::Errors | Self::LossCurves => "csv",
+            Self::Checkpoint => "checkpoint",
         }
     }
 
@@ -63,11 +91,16 @@ impl ExportKind {
             Self::Network => "network",
             Self::Errors => "errors",
             Self::LossCurves => "loss",
+            Self::Checkpoint => "training",
         };
         let array = settings.sensor.scale.to_string().replace('×', "x");
         let (hidden, method) = (settings.hidden, settings.training.method.short_name());
+        let starts = match settings.starts {
+            1 => String::new(),
+            starts => format!("-starts{starts}"),
+        };
         format!(
-            "{what}-{array}-h{hidden}-{method}-seed{}.{}",
+            "{what}-{array}-h{hidden}-{method}{starts}-seed{}.{}",
             settings.seed,
             self.extension()
         )
@@ -77,7 +110,7 @@ impl ExportKind {
     ///
     /// # Errors
     /// The file cannot be written; nothing is left half-written.
-    pub fn write(self, run: &Run, path: &Path) -> Result<(), NetworkFileError> {
+    pub fn write(self, run: &Run, path: &Path) -> Result<(), ExportError> {
         match self {
             Self::Network => NetworkFile::from_run(run).save(path)?,
             Self::Errors => {
@@ -88,6 +121,7 @@ impl ExportKind {
                 atomic_write(path, |writer| write_errors(&rows, writer))?;
             }
             Self::LossCurves => atomic_write(path, |writer| write_loss_curves(run.leader().history(), writer))?,
+            Self::Checkpoint => CheckpointFile::from_run(run).save(path)?,
         }
         Ok(())
     }

@@ -6,21 +6,26 @@
 
 mod action;
 mod charts;
+mod continuation;
 mod dialogs;
 mod export_kind;
+mod file_task;
 mod open;
 mod panels;
+mod shortcuts;
 mod state;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
+mod ticks;
 mod window;
 mod worker;
 
 pub use action::Action;
 pub use dialogs::DialogKind;
 pub use export_kind::ExportKind;
+pub use file_task::FileTask;
 pub use open::{OpenError, open};
-pub use state::{BottomTab, Frames, Look, Notice, Phase, RightCard, RunResult, RunView, Saving, State};
+pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State};
 pub use test_view::{Frame, TestView};
 pub use window::DecouplerWindow;

@@ -3,14 +3,14 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use ndarray::Array2;
 
 use super::{
-    export_kind::ExportKind,
+    file_task::FileTask,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
     worker::{Began, Progress},
 };
 use crate::{
-    evaluation::{Baselines, Errors, PublishedErrors, RunSettings},
-    training::{EpochRecord, StopReason},
+    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord},
+    training::{EpochRecord, Stage, StopReason},
 };
 
 /// Everything the panels read.
@@ -20,8 +20,8 @@ pub struct State {
     pub draft: RunSettings,
     /// What the worker is doing.
     pub phase: Phase,
-    /// The draft's test set, before it is trained on.
-    pub preview: Option<TestView>,
+    /// What is known about the draft before it is trained.
+    pub preview: Option<Preview>,
     /// The present or last training.
     pub run: Option<RunView>,
     /// How it is looked at.
@@ -32,7 +32,7 @@ pub struct State {
     pub notice: Option<Notice>,
     /// A file waiting for its path.
     pub saving: Option<Saving>,
-    /// The path last typed, offered again for the same kind of file.
+    /// The path last typed, offered again for the same task.
     pub typed: Option<Saving>,
 }
 
@@ -60,21 +60,43 @@ impl Phase {
     }
 }
 
+/// What is known about settings before a training.
+#[derive(Debug)]
+pub struct Preview {
+    /// The settings.
+    pub settings: RunSettings,
+    /// Their test set.
+    pub test: TestView,
+    /// What will stand beside the network, once it is measured.
+    pub baselines: Option<Baselines>,
+}
+
 /// A training as far as the window knows it.
 #[derive(Debug)]
 pub struct RunView {
-    /// What was asked for.
+    /// What it is trained with.
     pub settings: RunSettings,
+    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
+    /// for from where it stood.
+    pub asked: RunSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
     /// Its test set.
     pub test: TestView,
     /// What stands beside the network.
     pub baselines: Baselines,
     /// What the paper reports for this configuration.
     pub published: Option<PublishedErrors>,
-    /// Every epoch so far.
+    /// Every epoch of the leader so far.
     pub history: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stood when last looked at; empty where there is one only.
+    pub starts: Vec<StartRecord>,
     /// What the best network makes of the test set, and what that is worth.
     pub result: Option<RunResult>,
+    /// Why it ended, if it has.
+    pub stop_reason: Option<StopReason>,
 }
 
 /// What the best network so far makes of the test set.
@@ -86,6 +108,10 @@ pub struct RunResult {
     pub errors: Errors,
     /// The epoch of the network.
     pub best_epoch: usize,
+    /// Epochs run by the start that is furthest.
+    pub epochs_run: usize,
+    /// How many starts have ended.
+    pub starts_ended: usize,
     /// Time spent in training.
     pub elapsed: Duration,
     /// Time to decouple one snapshot.
@@ -97,16 +123,22 @@ impl RunView {
     pub fn new(began: Began) -> Self {
         let Began {
             settings,
+            weights,
             test,
             baselines,
         } = began;
         Self {
             published: PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples),
             settings,
+            asked: settings,
+            weights,
             test,
             baselines,
             history: Vec::new(),
+            stages: Vec::new(),
+            starts: Vec::new(),
             result: None,
+            stop_reason: None,
         }
     }
 
@@ -114,18 +146,33 @@ impl RunView {
     pub fn progress(&mut self, progress: Progress) {
         let Progress {
             epochs,
+            stages,
+            starts,
             decoupled_mm,
             errors,
             best_epoch,
+            epochs_run,
+            starts_ended,
             elapsed,
             frame_time,
-            stop_reason: _,
+            stop_reason,
         } = progress;
+        self.stop_reason = stop_reason;
+        // Another start may lead now; then all its epochs come.
+        if let Some(first) = epochs.first() {
+            self.history.truncate(first.epoch);
+        }
         self.history.extend(epochs);
+        self.stages = stages;
+        if let Some(starts) = starts {
+            self.starts = starts;
+        }
         self.result = Some(RunResult {
             decoupled_mm,
             errors,
             best_epoch,
+            epochs_run,
+            starts_ended,
             elapsed,
             frame_time,
         });
@@ -203,8 +250,8 @@ pub enum Notice {
 /// A file waiting for its path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Saving {
-    /// What to write.
-    pub kind: ExportKind,
+    /// What to do with it.
+    pub task: FileTask,
     /// The path typed so far.
     pub path: String,
 }
@@ -235,7 +282,10 @@ impl State {
 
     /// The test set on show: the training's, or the draft's if that has moved on.
     pub fn test(&self) -> Option<&TestView> {
-        self.preview.as_ref().or(self.run.as_ref().map(|run| &run.test))
+        match &self.preview {
+            Some(preview) => Some(&preview.test),
+            None => self.run.as_ref().map(|run| &run.test),
+        }
     }
 
     /// The training on show: none if the draft has moved on to another test set.
@@ -245,6 +295,28 @@ impl State {
         } else {
             self.run.as_ref()
         }
+    }
+
+    /// What the worker is doing while it does nothing: it waits after the last training, or for the first.
+    pub fn phase_at_rest(&self) -> Phase {
+        let ended = self.run.as_ref().and_then(|run| run.stop_reason);
+        ended.map_or(Phase::Idle, Phase::Ended)
+    }
+
+    /// Whether the training on show can go on from its present weights as the settings say: only what its sets and
+    /// networks are made of must be as it was. What is held goes on by itself unless the method or the stopping change.
+    pub fn can_continue(&self) -> bool {
+        let Some(run) = self.shown_run() else { return false };
+        let may_go_on = match self.phase {
+            Phase::Paused => self.draft.training != run.asked.training,
+            Phase::Ended(reason) => reason != StopReason::Diverged,
+            _ => false,
+        };
+        let fixed = RunSettings {
+            training: run.asked.training,
+            ..self.draft
+        };
+        may_go_on && fixed == run.asked
     }
 
     /// The result on show.
@@ -270,11 +342,11 @@ impl State {
     }
 
     /// Where a file goes unless the user says otherwise.
-    pub fn suggested_path(&self, kind: ExportKind) -> PathBuf {
+    pub fn suggested_path(&self, task: FileTask) -> PathBuf {
         let settings = self.run.as_ref().map_or(&self.draft, |run| &run.settings);
         std::env::current_dir()
             .unwrap_or_default()
-            .join(kind.file_name(settings))
+            .join(task.kind().file_name(settings))
     }
 }
 

@@ -1,12 +1,14 @@
 use std::sync::Arc;
 
-use eframe::egui::{self, Context, Frame as PanelFrame, Key, KeyboardShortcut, Margin, Modifiers, Panel, Ui};
+use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     action::Action,
     dialogs::{Answer, DialogKind, Dialogs},
+    file_task::FileTask,
     panels,
-    state::{Notice, Phase, RunView, Saving, State},
+    shortcuts::pressed_shortcuts,
+    state::{Notice, Phase, Preview, RunView, Saving, State},
     theme::{self, Theme, space},
     worker::{Event, Request, Worker},
 };
@@ -35,7 +37,7 @@ impl DecouplerWindow {
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
-        window.worker.ask(Request::Preview(Box::new(window.state.draft)));
+        window.ask_for_what_is_missing();
         Ok(window)
     }
 
@@ -62,8 +64,9 @@ impl DecouplerWindow {
         }
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(kind, path) => self.apply(Action::Export(kind, path)),
-                Answer::NoDialog(kind) => self.apply(Action::TypePath(kind)),
+                Answer::Chosen(FileTask::Save(kind), path) => self.apply(Action::Export(kind, path)),
+                Answer::Chosen(FileTask::OpenCheckpoint, path) => self.apply(Action::OpenCheckpoint(path)),
+                Answer::NoDialog(task) => self.apply(Action::TypePath(task)),
                 Answer::Cancelled => {}
             }
         }
@@ -74,13 +77,25 @@ impl DecouplerWindow {
         match event {
             // Settings that have moved on meanwhile have asked for another test set, or need none.
             Event::Previewed(settings, _) if !have_same_test_set(&settings, &state.draft) => {}
-            Event::Previewed(_, Ok(test)) => {
+            Event::Previewed(settings, Ok(test)) => {
                 if !state.phase.is_busy() {
-                    state.preview = Some(test);
+                    state.preview = Some(Preview {
+                        settings: *settings,
+                        test,
+                        baselines: None,
+                    });
                     state.refresh_frames();
+                    self.ask_for_what_is_missing();
                 }
             }
             Event::Previewed(_, Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
+            Event::Compared(settings, baselines) => {
+                if let Some(preview) = &mut state.preview
+                    && have_same_sets(&settings, &state.draft)
+                {
+                    preview.baselines = baselines;
+                }
+            }
             Event::Began(Ok(began)) => {
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
@@ -88,8 +103,39 @@ impl DecouplerWindow {
                 state.refresh_frames();
             }
             Event::Began(Err(error)) => {
-                state.phase = Phase::Idle;
+                state.phase = state.phase_at_rest();
                 state.notice = Some(Notice::Failed(error.to_string()));
+            }
+            Event::Opened(Ok(began)) => {
+                state.draft = began.settings;
+                state.preview = None;
+                state.run = Some(RunView::new(*began));
+                state.typed = None;
+                // If it has ended, the news of it say so.
+                state.phase = Phase::Paused;
+                state.refresh_frames();
+            }
+            Event::Opened(Err(error)) => {
+                state.phase = state.phase_at_rest();
+                state.notice = Some(Notice::Failed(error));
+            }
+            Event::Continued(Ok(settings)) => {
+                if let Some(run) = &mut state.run {
+                    run.asked = RunSettings {
+                        training: state.draft.training,
+                        ..run.asked
+                    };
+                    run.settings = *settings;
+                    run.stop_reason = None;
+                }
+                state.phase = Phase::Training;
+            }
+            Event::Continued(Err(error)) => {
+                state.phase = match state.phase_at_rest() {
+                    Phase::Idle => Phase::Paused,
+                    ended => ended,
+                };
+                state.notice = Some(Notice::Failed(error));
             }
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
@@ -123,9 +169,19 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Pause);
             }
             Action::Resume => {
+                // The settings on the left are always those that are trained with.
+                if let Some(run) = &state.run {
+                    state.draft.training = run.asked.training;
+                }
                 state.phase = Phase::Training;
                 self.worker.ask(Request::Resume);
             }
+            Action::Continue if state.can_continue() => {
+                state.phase = Phase::Training;
+                state.notice = None;
+                self.worker.ask(Request::Continue(state.draft.training));
+            }
+            Action::Continue => {}
             Action::Stop => self.worker.ask(Request::Stop),
             Action::ShowSnapshot(snapshot) => {
                 state.look.snapshot = snapshot;
@@ -146,16 +202,16 @@ impl DecouplerWindow {
                 state.look.is_dark = is_dark;
                 theme::apply(&self.ctx, is_dark);
             }
-            Action::ChooseFile(kind) => {
+            Action::ChooseFile(task) => {
                 let ctx = self.ctx.clone();
                 self.dialogs
-                    .ask(kind, &state.suggested_path(kind), move || ctx.request_repaint());
+                    .ask(task, &state.suggested_path(task), move || ctx.request_repaint());
             }
-            Action::TypePath(kind) => {
-                let typed = state.typed.clone().filter(|typed| typed.kind == kind);
-                let suggested = || state.suggested_path(kind).display().to_string();
+            Action::TypePath(task) => {
+                let typed = state.typed.clone().filter(|typed| typed.task == task);
+                let suggested = || state.suggested_path(task).display().to_string();
                 state.saving = Some(typed.unwrap_or_else(|| Saving {
-                    kind,
+                    task,
                     path: suggested(),
                 }));
             }
@@ -168,14 +224,23 @@ impl DecouplerWindow {
                 state.typed = state.saving.take();
                 self.worker.ask(Request::Export(kind, path));
             }
+            Action::OpenCheckpoint(path) => {
+                state.typed = state.saving.take();
+                // A training may have begun while the desktop's dialog was open.
+                if !state.phase.is_busy() {
+                    state.phase = Phase::Preparing;
+                    state.notice = None;
+                    self.worker.ask(Request::Open(path));
+                }
+            }
             Action::CancelSave => state.saving = None,
             Action::DismissNotice => state.notice = None,
             Action::RestartWorker => match start_worker(&self.ctx) {
                 Ok(worker) => {
                     self.worker = worker;
-                    state.phase = Phase::Idle;
+                    state.phase = state.phase_at_rest();
                     state.notice = None;
-                    self.worker.ask(Request::Preview(Box::new(state.draft)));
+                    self.ask_for_what_is_missing();
                 }
                 Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
             },
@@ -186,34 +251,44 @@ impl DecouplerWindow {
     fn configure(&mut self, draft: RunSettings) {
         let before = self.state.draft;
         self.state.draft = draft;
-        if have_same_test_set(&before, &draft) {
-            return;
+        let run = self.state.run.as_ref();
+        if run.is_some_and(|run| have_same_test_set(&run.settings, &draft)) {
+            if self.state.preview.take().is_some() {
+                self.state.refresh_frames();
+            }
+        } else if !have_same_sets(&before, &draft) {
+            self.ask_for_what_is_missing();
         }
-        let ran = self
-            .state
-            .run
-            .as_ref()
-            .filter(|run| have_same_test_set(&run.settings, &draft));
-        if ran.is_some() {
-            self.state.preview = None;
-            self.state.refresh_frames();
-        } else {
-            self.worker.ask(Request::Preview(Box::new(draft)));
+    }
+
+    /// Asks for what the settings are to show before a training and the window does not know yet.
+    fn ask_for_what_is_missing(&self) {
+        let state = &self.state;
+        let draft = Box::new(state.draft);
+        match (&state.preview, &state.run) {
+            (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
+                self.worker.ask(Request::Baselines(draft));
+            }
+            (None, Some(run)) if have_same_test_set(&run.settings, &draft) => {}
+            _ => self.worker.ask(Request::Preview(draft)),
         }
     }
 
     /// Lays out the window and applies what the user did.
     pub fn show_ui(&mut self, ui: &mut Ui) {
-        let mut actions = self.pressed_shortcuts(ui.ctx());
         let state = &self.state;
+        let mut actions = pressed_shortcuts(ui.ctx(), state);
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        // Narrow windows give the side panels less, so that the surfaces keep most of the room.
-        let width = ui.available_width();
-        let (left, right) = if width < 1200.0 {
-            (space(60), space(84))
-        } else {
-            (space(68), space(94))
+        let layout = panels::WorkbenchLayout::of_width(ui.available_width());
+        let has_report_beside = layout == panels::WorkbenchLayout::ReportBeside;
+        let left = if has_report_beside { space(68) } else { space(62) };
+        // The strip of the scroll bar is the margin on the right.
+        let side = Margin {
+            left: 12,
+            right: 2,
+            top: 4,
+            bottom: 4,
         };
         Panel::top("top bar")
             .exact_size(space(11))
@@ -226,17 +301,19 @@ impl DecouplerWindow {
         Panel::left("configuration")
             .exact_size(left)
             .resizable(false)
-            .frame(panel(Margin::symmetric(12, 4)))
+            .frame(panel(side))
             .show(ui, |ui| actions.extend(panels::configuration_ui(ui, state)));
-        Panel::right("report")
-            .exact_size(right)
-            .resizable(false)
-            .frame(panel(Margin::symmetric(12, 4)))
-            .show(ui, |ui| actions.extend(panels::report_ui(ui, state)));
+        if has_report_beside {
+            Panel::right("report")
+                .exact_size(space(96))
+                .resizable(false)
+                .frame(panel(side))
+                .show(ui, |ui| actions.extend(panels::report_ui(ui, state)));
+        }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         egui::CentralPanel::default().frame(background).show(ui, |ui| {
             actions.extend(panels::notice_ui(ui, state));
-            actions.extend(panels::workbench_ui(ui, state));
+            actions.extend(panels::workbench_ui(ui, state, layout));
         });
         actions.extend(panels::save_form_ui(ui, state));
         for action in actions {
@@ -244,45 +321,18 @@ impl DecouplerWindow {
             self.ctx.request_repaint();
         }
     }
-
-    fn pressed_shortcuts(&self, ctx: &Context) -> Vec<Action> {
-        let state = &self.state;
-        // The question for a path is to be answered first.
-        if state.saving.is_some() {
-            return Vec::new();
-        }
-        let snapshots = state.test().map_or(0, |test| test.set.snapshots());
-        let shown = state.look.snapshot;
-        let pressed =
-            |modifiers, key| ctx.input_mut(|input| input.consume_shortcut(&KeyboardShortcut::new(modifiers, key)));
-        let mut actions = Vec::new();
-        if pressed(Modifiers::COMMAND, Key::Enter) && !state.phase.is_busy() && state.phase != Phase::Died {
-            actions.push(Action::Train);
-        }
-        if pressed(Modifiers::COMMAND, Key::P) {
-            match state.phase {
-                Phase::Training => actions.push(Action::Pause),
-                Phase::Paused => actions.push(Action::Resume),
-                _ => {}
-            }
-        }
-        if pressed(Modifiers::COMMAND, Key::Period) && state.phase.is_busy() {
-            actions.push(Action::Stop);
-        }
-        if pressed(Modifiers::NONE, Key::PageDown) && shown + 1 < snapshots {
-            actions.push(Action::ShowSnapshot(shown + 1));
-        }
-        if pressed(Modifiers::NONE, Key::PageUp) && shown > 0 {
-            actions.push(Action::ShowSnapshot(shown - 1));
-        }
-        actions
-    }
 }
 
 /// Whether both draw the same test set.
 fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
     let test_set = |settings: &RunSettings| (settings.sensor, settings.scene, settings.test_samples, settings.seed);
     test_set(a) == test_set(b)
+}
+
+/// Whether both draw the same samples, trained on or not.
+fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
+    let samples = |settings: &RunSettings| (settings.samples, settings.validation_samples);
+    have_same_test_set(a, b) && samples(a) == samples(b)
 }
 
 fn start_worker(ctx: &Context) -> std::io::Result<Worker> {
@@ -297,5 +347,102 @@ impl eframe::App for DecouplerWindow {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show_ui(ui);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn window() -> DecouplerWindow {
+        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
+        wait(&mut window, |state| state.test().is_some());
+        let mut small = window.state.draft;
+        small.sensor.scale = "4x4_2x12".parse().unwrap();
+        (small.hidden, small.samples, small.training.stopping.epochs) = (3, 40, 5);
+        window.apply(Action::Configure(Box::new(small)));
+        window.apply(Action::Train);
+        wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
+        window
+    }
+
+    /// Takes news until `holds`; at most a minute.
+    fn wait(window: &mut DecouplerWindow, holds: impl Fn(&State) -> bool) {
+        for _ in 0..12_000 {
+            window.take_news();
+            if holds(&window.state) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("it never came: {:?}", window.state);
+    }
+
+    #[test]
+    fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
+        let mut window = window();
+        let ended = window.state.phase;
+        window.worker = Worker::dead();
+        wait(&mut window, |state| state.phase == Phase::Died);
+        assert!(window.state.result().is_some());
+        window.apply(Action::RestartWorker);
+        std::thread::sleep(Duration::from_millis(300));
+        window.take_news();
+        assert_eq!((window.state.phase, &window.state.notice), (ended, &None));
+        assert!(window.state.result().is_some() && window.state.frames.decoupled.is_some());
+
+        window.apply(Action::Export(super::super::ExportKind::Errors, "errors.csv".into()));
+        wait(&mut window, |state| state.notice.is_some());
+        let lost = "the network was lost when the training thread ended: train again";
+        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        window.apply(Action::DismissNotice);
+        window.apply(Action::Continue);
+        wait(&mut window, |state| state.notice.is_some());
+        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
+        assert_eq!(window.state.phase, ended);
+        window.apply(Action::Train);
+        wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
+    }
+
+    #[test]
+    fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
+        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
+        window.worker = Worker::dead();
+        wait(&mut window, |state| state.phase == Phase::Died);
+        window.apply(Action::RestartWorker);
+        wait(&mut window, |state| {
+            state
+                .preview
+                .as_ref()
+                .is_some_and(|preview| preview.baselines.is_some())
+        });
+    }
+
+    #[test]
+    fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("network.json");
+        let mut window = window();
+        let (ended, shown) = (window.state.phase, window.state.draft);
+        let mut impossible = shown;
+        impossible.training.stopping.goal_mse = f64::NAN;
+        window.apply(Action::Configure(Box::new(impossible)));
+        window.apply(Action::Train);
+        wait(&mut window, |state| state.notice.is_some());
+        assert!(matches!(window.state.notice, Some(Notice::Failed(_))));
+        assert_eq!(window.state.phase, ended, "the training on show has ended so");
+        assert!(window.state.result().is_some());
+
+        window.apply(Action::DismissNotice);
+        window.apply(Action::Export(super::super::ExportKind::Network, path.clone()));
+        wait(&mut window, |state| state.notice.is_some());
+        assert_eq!(
+            window.state.notice,
+            Some(Notice::Done(format!("Saved {}", path.display())))
+        );
+        let file = crate::export::NetworkFile::load(&path).unwrap();
+        assert_eq!(file.settings.hidden, shown.hidden);
     }
 }

@@ -2,7 +2,8 @@
 //! event wakes the window.
 
 use std::{
-    path::PathBuf,
+    collections::VecDeque,
+    path::{Path, PathBuf},
     sync::{
         Arc,
         mpsc::{Receiver, Sender, TryRecvError, channel},
@@ -15,25 +16,36 @@ use ndarray::Array2;
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 use super::{
+    continuation::{continue_run, furthest_epoch},
     export_kind::ExportKind,
     test_view::{TestView, TestViewError},
 };
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunSettings},
-    training::{EpochRecord, StopReason},
+    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
+    export::CheckpointFile,
+    training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainingSettings},
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
 /// between them in which the user is answered at once, also where frames are drawn without a graphics card.
 const REPORT_INTERVAL: Duration = Duration::from_millis(66);
 
+/// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
+const STARTS_INTERVAL: Duration = Duration::from_millis(500);
+
 /// What the window asks of the worker.
 #[derive(Debug)]
 pub enum Request {
     /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
     Preview(Box<RunSettings>),
+    /// Measure what will stand beside the network of these settings. Only the newest one counts.
+    Baselines(Box<RunSettings>),
     /// Begin a training; one in progress is dropped.
     Train(Box<RunSettings>),
+    /// Take up the training saved in this file and hold it; one in progress is dropped.
+    Open(PathBuf),
+    /// Go on from the present weights with this method and this many epochs more.
+    Continue(TrainingSettings),
     /// Step no further until told to resume.
     Pause,
     /// Go on.
@@ -49,8 +61,15 @@ pub enum Request {
 pub enum Event {
     /// The test set of these settings.
     Previewed(Box<RunSettings>, Result<TestView, TestViewError>),
+    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
+    /// training would explain.
+    Compared(Box<RunSettings>, Option<Baselines>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
+    /// A saved training stands where it was saved, or why it cannot.
+    Opened(Result<Box<Began>, String>),
+    /// The training goes on with these settings, or why it cannot.
+    Continued(Result<Box<RunSettings>, String>),
     /// News of the training.
     Progressed(Box<Progress>),
     /// A file was written, or why not.
@@ -62,6 +81,8 @@ pub enum Event {
 pub struct Began {
     /// What was asked for.
     pub settings: RunSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
     /// The test set.
     pub test: TestView,
     /// What stands beside the network.
@@ -71,14 +92,22 @@ pub struct Began {
 /// How a training stands.
 #[derive(Debug)]
 pub struct Progress {
-    /// Epochs since the last report.
+    /// Epochs of the leader since the last report, or all where another start has taken the lead.
     pub epochs: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stands, where there are several; now and then only.
+    pub starts: Option<Vec<StartRecord>>,
     /// What the best network so far makes of the test set: samples × 3·M2.
     pub decoupled_mm: Arc<Array2<f64>>,
     /// Its errors.
     pub errors: Errors,
     /// The epoch of the best network.
     pub best_epoch: usize,
+    /// Epochs run by the start that is furthest.
+    pub epochs_run: usize,
+    /// How many starts have ended.
+    pub starts_ended: usize,
     /// Time spent in training.
     pub elapsed: Duration,
     /// Time to decouple one snapshot.
@@ -115,6 +144,15 @@ impl Worker {
             Labour::new(report).run(&incoming);
         })?;
         Ok(Self { requests, events })
+    }
+
+    /// A worker that has died.
+    #[cfg(test)]
+    pub fn dead() -> Self {
+        Self {
+            requests: channel().0,
+            events: channel().1,
+        }
     }
 
     /// Asks for something. A worker that died is told by [`Self::next_event`].
@@ -172,8 +210,12 @@ struct Labour {
     report: Report,
     run: Option<Run>,
     is_paused: bool,
-    epochs_reported: usize,
+    /// Time spent in training, all starts side by side.
+    elapsed: Duration,
+    /// The start last reported, and how many of its epochs.
+    reported: (usize, usize),
     next_report: Instant,
+    next_starts: Instant,
 }
 
 impl Labour {
@@ -182,27 +224,31 @@ impl Labour {
             report,
             run: None,
             is_paused: false,
-            epochs_reported: 0,
+            elapsed: Duration::ZERO,
+            reported: (0, 0),
             next_report: Instant::now(),
+            next_starts: Instant::now(),
         }
     }
 
     fn run(&mut self, requests: &Receiver<Request>) {
+        let mut queue = VecDeque::new();
         loop {
-            let request = if self.is_training() {
-                match requests.try_recv() {
-                    Ok(request) => Some(request),
-                    Err(TryRecvError::Empty) => None,
-                    Err(TryRecvError::Disconnected) => return,
-                }
-            } else {
+            if queue.is_empty() && !self.is_training() {
                 match requests.recv() {
-                    Ok(request) => Some(request),
+                    Ok(request) => enqueue(&mut queue, request),
                     Err(_) => return,
                 }
+            }
+            let is_window_closed = loop {
+                match requests.try_recv() {
+                    Ok(request) => enqueue(&mut queue, request),
+                    Err(reason) => break reason == TryRecvError::Disconnected,
+                }
             };
-            match request {
-                Some(request) => self.answer(request, requests),
+            match queue.pop_front() {
+                Some(request) => self.answer(request),
+                None if is_window_closed => return,
                 None => self.train_one_epoch(),
             }
         }
@@ -213,27 +259,25 @@ impl Labour {
         unfinished && !self.is_paused
     }
 
-    fn answer(&mut self, request: Request, requests: &Receiver<Request>) {
+    fn answer(&mut self, request: Request) {
         match request {
-            Request::Preview(mut settings) => {
-                // While a slider is dragged many previews queue up; draw only the newest.
-                let mut other = None;
-                while let Ok(next) = requests.try_recv() {
-                    match next {
-                        Request::Preview(newer) => settings = newer,
-                        next => {
-                            other = Some(next);
-                            break;
-                        }
-                    }
-                }
+            Request::Preview(settings) => {
                 let drawn = TestView::draw(&settings);
                 self.report.send(Event::Previewed(settings, drawn));
-                if let Some(next) = other {
-                    self.answer(next, requests);
-                }
             }
-            Request::Train(settings) => self.begin(*settings),
+            Request::Baselines(settings) => {
+                let baselines = baselines(&settings);
+                self.report.send(Event::Compared(settings, baselines));
+            }
+            Request::Train(settings) => match Run::prepare(*settings).map_err(TestViewError::from).and_then(begun) {
+                Ok((run, began)) => self.begin(run, false, Event::Began(Ok(began))),
+                Err(error) => self.report.send(Event::Began(Err(error))),
+            },
+            Request::Open(path) => match opened(&path) {
+                Ok((run, began)) => self.begin(run, true, Event::Opened(Ok(began))),
+                Err(error) => self.report.send(Event::Opened(Err(error))),
+            },
+            Request::Continue(training) => self.go_on(training),
             Request::Pause => {
                 self.is_paused = true;
                 self.report_progress();
@@ -248,38 +292,43 @@ impl Labour {
             Request::Export(kind, path) => {
                 let result = match &self.run {
                     Some(run) => kind.write(run, &path).map(|()| path).map_err(|error| error.to_string()),
-                    None => Err("there is no training to export: train first".to_owned()),
+                    // The window offers no export before a training, so there was one.
+                    None => Err(LOST.to_owned()),
                 };
                 self.report.send(Event::Exported(result));
             }
         }
     }
 
-    fn begin(&mut self, settings: RunSettings) {
-        self.run = None;
-        self.is_paused = false;
-        self.epochs_reported = 0;
-        self.next_report = Instant::now();
-        let prepared = self.prepare(settings);
-        self.report.send(Event::Began(prepared));
+    /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
+    fn begin(&mut self, run: Run, is_paused: bool, event: Event) {
+        self.elapsed = run.leader().elapsed();
+        self.run = Some(run);
+        self.is_paused = is_paused;
+        self.reported = (0, 0);
+        self.next_starts = Instant::now();
+        self.report.send(event);
         self.report_progress();
     }
 
-    fn prepare(&mut self, settings: RunSettings) -> Result<Box<Began>, TestViewError> {
-        let run = Run::prepare(settings)?;
-        let test = TestView::of(&settings, run.test().clone())?;
-        let baselines = *run.baselines();
-        self.run = Some(run);
-        Ok(Box::new(Began {
-            settings,
-            test,
-            baselines,
-        }))
+    fn go_on(&mut self, training: TrainingSettings) {
+        let continued = match &mut self.run {
+            Some(run) => continue_run(run, training).map_err(|error| error.to_string()),
+            None => Err(LOST.to_owned()),
+        };
+        let has_failed = continued.is_err();
+        self.report.send(Event::Continued(continued.map(Box::new)));
+        if !has_failed {
+            self.is_paused = false;
+            self.report_progress();
+        }
     }
 
     fn train_one_epoch(&mut self) {
         let Some(run) = &mut self.run else { return };
+        let begun = Instant::now();
         let ended = run.step().is_some();
+        self.elapsed += begun.elapsed();
         if ended || Instant::now() >= self.next_report {
             self.report_progress();
         }
@@ -288,25 +337,100 @@ impl Labour {
     fn report_progress(&mut self) {
         let Some(run) = &self.run else { return };
         let begun = Instant::now();
-        let trainer = run.leader();
+        let number = run.leader_number();
+        let trainer = &run.trainers()[number];
         let (decoupled_mm, errors) = run.decouple_test();
         let cost = begun.elapsed();
+        let has_several = run.trainers().len() > 1;
+        let is_standing = self.is_paused || run.stop_reason().is_some();
+        let starts = (has_several && (is_standing || begun >= self.next_starts)).then(|| run.starts());
+        if starts.is_some() {
+            // At most a tenth of the time.
+            self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
+        }
+        let reported = match self.reported {
+            (leader, epochs) if leader == number => epochs,
+            _ => 0,
+        };
         let snapshots = u32::try_from(run.test().snapshots()).unwrap_or(u32::MAX).max(1);
         self.report.send(Event::Progressed(Box::new(Progress {
-            epochs: trainer
-                .history()
-                .get(self.epochs_reported..)
-                .unwrap_or_default()
-                .to_vec(),
+            epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
+            stages: trainer.stages().to_vec(),
+            starts,
             decoupled_mm: Arc::new(decoupled_mm),
             errors,
             best_epoch: trainer.best_epoch(),
-            elapsed: trainer.elapsed(),
+            epochs_run: furthest_epoch(run),
+            starts_ended: run
+                .trainers()
+                .iter()
+                .filter(|start| start.stop_reason().is_some())
+                .count(),
+            elapsed: self.elapsed,
             frame_time: cost / snapshots,
             stop_reason: run.stop_reason(),
         })));
-        self.epochs_reported = trainer.history().len();
+        self.reported = (number, trainer.history().len());
         // A large test set takes long to decouple; let it take at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
     }
+}
+
+/// What the window says where the training it shows is not in the worker: only a worker that died lost it.
+const LOST: &str = "the network was lost when the training thread ended: train again";
+
+/// A run, and what the window is to know of it.
+fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
+    let settings = *run.settings();
+    let test = TestView::of(&settings, run.test().clone())?;
+    let baselines = *run.baselines();
+    let began = Began {
+        settings,
+        weights: run.leader().present().shape().weights(),
+        test,
+        baselines,
+    };
+    Ok((run, Box::new(began)))
+}
+
+fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
+    let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+    let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
+    resumed.map_err(|error| format!("'{}': {error}", path.display()))
+}
+
+/// Puts a request at the end of the queue. While a slider is dragged many pictures are asked for; only the newest
+/// counts.
+fn enqueue(queue: &mut VecDeque<Request>, request: Request) {
+    match request {
+        Request::Preview(_) => queue.retain(|older| !matches!(older, Request::Preview(_) | Request::Baselines(_))),
+        Request::Baselines(_) => queue.retain(|older| !matches!(older, Request::Baselines(_))),
+        _ => {}
+    }
+    queue.push_back(request);
+}
+
+/// What stands beside the network, without one; nothing where it would keep the next request waiting.
+fn baselines(settings: &RunSettings) -> Option<Baselines> {
+    /// About a tenth of a second.
+    const MOST_TERMS: usize = 50_000_000;
+    let scale = settings.sensor.scale;
+    let samples = settings.samples + settings.validation_samples + settings.test_samples;
+    let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
+    let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
+    if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
+        return None;
+    }
+    // They depend on neither the network nor its method, so the cheapest ones do.
+    let training = TrainingSettings {
+        method: Method::GradientDescent(GradientDescentSettings::default()),
+        ..TrainingSettings::default()
+    };
+    let cheapest = RunSettings {
+        hidden: 1,
+        starts: 1,
+        training,
+        ..*settings
+    };
+    Run::prepare(cheapest).ok().map(|run| *run.baselines())
 }

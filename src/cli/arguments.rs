@@ -8,7 +8,7 @@ use std::{
 
 use clap::{Parser, Subcommand, error::ErrorKind};
 
-use super::{decode::Decode, failure::Failure, interruption, simulate::Simulate, train::Train};
+use super::{decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, train::Train};
 
 /// Opens the window and returns when it is closed.
 pub type Window = fn() -> Result<(), Box<dyn Error>>;
@@ -28,6 +28,7 @@ enum Command {
     Train(Box<Train>),
     Decode(Decode),
     Simulate(Simulate),
+    Reproduce(Reproduce),
 }
 
 /// Does what `arguments` (the program's name first) ask for. `window` is what a call without a command opens, in
@@ -45,7 +46,7 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
         Err(failure) if !failure.is_broken_pipe() => {
             // Nobody is left to tell if this fails.
             let _ = match &failure {
-                Failure::Interrupted(told) => writeln!(stderr(), "{told}"),
+                Failure::Interrupted(_) | Failure::InterruptedTrials { .. } => writeln!(stderr(), "{failure}"),
                 _ => writeln!(stderr(), "error: {failure}"),
             };
             ExitCode::from(failure.status())
@@ -63,6 +64,7 @@ impl Arguments {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Decode(decode)) => decode.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),
+            Some(Command::Reproduce(reproduce)) => reproduce.run(),
             None => window.ok_or(Failure::NoWindow)?().map_err(Failure::Window),
         }
     }

@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::interruption;
 use crate::{
     dataset::{DatasetError, ReadError},
-    evaluation::RunError,
+    evaluation::{RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError},
     training::SettingError,
 };
@@ -36,6 +36,12 @@ pub(super) enum Failure {
     Resume { path: PathBuf, source: RunError },
     #[error("{0}")]
     Interrupted(Interruption),
+    #[error(transparent)]
+    Threads(ExperimentError),
+    #[error("interrupted after {done} of {trials} trials")]
+    InterruptedTrials { done: usize, trials: usize },
+    #[error("cannot make the folder '{}': {source}", .path.display())]
+    MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("cannot write to standard output: {0}")]
@@ -73,12 +79,21 @@ impl From<SettingError> for Failure {
     }
 }
 
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Threads(_) => Self::Threads(error),
+            _ => Self::Arguments(error.to_string()),
+        }
+    }
+}
+
 impl Failure {
     /// The exit status that says so.
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) => 2,
-            Self::Interrupted(_) => interruption::STATUS,
+            Self::Interrupted(_) | Self::InterruptedTrials { .. } => interruption::STATUS,
             _ => 1,
         }
     }

@@ -1,4 +1,4 @@
-//! The work without a window: `decoupler train`, `decode` and `simulate`.
+//! The work without a window: `decoupler train`, `decode`, `simulate` and `reproduce`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` then first keeps what it has.
@@ -8,6 +8,8 @@ mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
+mod reproduce;
+mod reproduce_report;
 mod simulate;
 mod spread_plot;
 mod train;

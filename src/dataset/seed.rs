@@ -20,6 +20,8 @@ pub enum Stream {
     Start,
     /// Which samples are held out for validation.
     Split,
+    /// Which samples are in which fold of a cross-validation.
+    Folds,
     /// What disturbs the readings of the training (and validation) set.
     TrainingNoise,
     /// What disturbs the readings of the test set.

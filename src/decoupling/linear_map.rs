@@ -23,32 +23,61 @@ impl LinearMap {
     /// # Errors
     /// Values that cannot be scaled.
     pub fn fit(training: &Dataset) -> Result<Self, ScalingError> {
+        // How faer divides a decomposition depends on the number of threads, and with it the last bits.
+        faer::set_global_parallelism(faer::Par::Seq);
         let inputs = MinMax::fit(training.resistances_ohm.view())?;
         let outputs = MinMax::fit(training.coordinates_mm.view())?;
-        let x = inputs.scale(training.resistances_ohm.view());
-        let y = outputs.scale(training.coordinates_mm.view());
-        let n = x.ncols();
-        let a = Mat::from_fn(x.nrows(), n + 1, |s, i| if i < n { x[[s, i]] } else { 1.0 });
-        let y = Mat::from_fn(y.nrows(), y.ncols(), |s, t| y[[s, t]]);
+        let (n1, m) = (inputs.varying().len() + 1, outputs.varying().len());
+        let triangle = triangle(training, &inputs, &outputs);
+        let rows = n1.min(triangle.nrows());
+        let (a, y) = triangle.as_ref().subrows(0, rows).split_at_col(n1);
         // Finite input always converges; a zero map is the honest answer if it ever does not.
         let fitted = a.thin_svd().ok().map(|svd| {
             let singular = svd.S().column_vector();
-            let smallest = f64::EPSILON * a.nrows().max(n + 1) as f64 * singular[0];
-            let mut projected = svd.U().transpose() * &y;
+            let smallest = f64::EPSILON * training.samples().max(n1) as f64 * singular[0];
+            let mut projected = svd.U().transpose() * y;
             for (k, &value) in singular.iter().enumerate() {
                 let inverse = if value > smallest { 1.0 / value } else { 0.0 };
                 projected.row_mut(k).iter_mut().for_each(|entry| *entry *= inverse);
             }
             svd.V() * projected
         });
-        let coefficients =
-            Array2::from_shape_fn((n + 1, y.ncols()), |(i, t)| fitted.as_ref().map_or(0.0, |b| b[(i, t)]));
+        let coefficients = Array2::from_shape_fn((n1, m), |(i, t)| fitted.as_ref().map_or(0.0, |b| b[(i, t)]));
         Ok(Self {
             inputs,
             coefficients,
             outputs,
         })
     }
+}
+
+/// The triangular factor of [inputs, 1, outputs], all scaled: its least-squares problems are those of the whole set. Found
+/// a chunk of samples at a time, each joined to the factor of those before it, so that memory does not grow with
+/// their number (Golub and Van Loan, Matrix Computations, section 6.5.2).
+fn triangle(training: &Dataset, inputs: &MinMax, outputs: &MinMax) -> Mat<f64> {
+    /// Samples of a chunk.
+    const CHUNK: usize = 512;
+    let columns = inputs.varying().len() + 1 + outputs.varying().len();
+    let mut factor = Mat::<f64>::zeros(0, columns);
+    for first in (0..training.samples()).step_by(CHUNK) {
+        let chunk = Slice::from(first..training.samples().min(first + CHUNK));
+        let x = inputs.scale(training.resistances_ohm.slice_axis(Axis(0), chunk));
+        let y = outputs.scale(training.coordinates_mm.slice_axis(Axis(0), chunk));
+        let (before, n) = (factor.nrows(), x.ncols());
+        let joined = Mat::from_fn(before + x.nrows(), columns, |row, column| {
+            if row < before {
+                factor[(row, column)]
+            } else if column < n {
+                x[[row - before, column]]
+            } else if column == n {
+                1.0
+            } else {
+                y[[row - before, column - n - 1]]
+            }
+        });
+        factor = joined.qr().thin_R().to_owned();
+    }
+    factor
 }
 
 impl Decoupler for LinearMap {

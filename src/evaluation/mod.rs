@@ -2,6 +2,7 @@
 //! run from settings to report.
 
 mod errors;
+pub mod experiments;
 mod published;
 mod reference;
 mod row_networks;

@@ -11,7 +11,7 @@ pub struct PublishedErrors {
     pub array: ArrayScale,
     /// Hidden nodes.
     pub hidden: usize,
-    /// Training samples.
+    /// Training samples; in Table 2 all samples, each tested once.
     pub training_samples: usize,
     /// AveZerr.
     pub z_percent: f64,
@@ -30,10 +30,22 @@ pub fn published_errors() -> Vec<PublishedErrors> {
 }
 
 impl PublishedErrors {
+    /// The table that was made by cross-validation.
+    const CROSS_VALIDATION: u8 = 2;
+
     /// What the paper reports for this configuration outside cross-validation, if it does.
     pub fn of(array: ArrayScale, hidden: usize, training_samples: usize) -> Option<Self> {
+        Self::find(array, hidden, training_samples, |table| table != Self::CROSS_VALIDATION)
+    }
+
+    /// What the paper reports for this configuration by cross-validation of all `samples`, if it does.
+    pub fn of_cross_validation(array: ArrayScale, hidden: usize, samples: usize) -> Option<Self> {
+        Self::find(array, hidden, samples, |table| table == Self::CROSS_VALIDATION)
+    }
+
+    fn find(array: ArrayScale, hidden: usize, samples: usize, in_table: impl Fn(u8) -> bool) -> Option<Self> {
         let matches = |row: &Self| {
-            row.table != 2 && (row.array, row.hidden, row.training_samples) == (array, hidden, training_samples)
+            in_table(row.table) && (row.array, row.hidden, row.training_samples) == (array, hidden, samples)
         };
         published_errors().into_iter().find(matches)
     }
@@ -56,5 +68,9 @@ mod tests {
         );
         assert_eq!(PublishedErrors::of(array, 12, 100), None, "Table 2 is cross-validation");
         assert_eq!(PublishedErrors::of(array, 13, 1000), None);
+        let cross_validated = |samples| PublishedErrors::of_cross_validation(array, 12, samples);
+        assert_eq!(cross_validated(1000).unwrap().z_percent, 2.01);
+        assert_eq!(cross_validated(100).unwrap().x_percent, 0.30);
+        assert_eq!(cross_validated(500), None);
     }
 }

@@ -10,8 +10,8 @@ use crate::{
     decoupling::{Decoupler, LinearMap, TrainingMean},
     network::{DecouplingNetwork, MinMax, Shape, nguyen_widrow},
     training::{
-        Examples, Method, NormalEquations, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer,
-        TrainerState, TrainingError,
+        Examples, Method, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState,
+        TrainingError,
     },
 };
 
@@ -48,7 +48,16 @@ impl Run {
     /// # Errors
     /// Settings that are impossible, with the reason.
     pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
-        Self::with_trainers(settings, |problem, shape| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::on_sets(settings, split, test)
+    }
+
+    /// As [`Self::prepare`], on sets that come from elsewhere, such as the folds of a cross-validation.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        Self::with_sets(settings, split, test, |problem, shape| {
             let start = |number| nguyen_widrow(shape, &mut settings.seed.start_rng(number));
             let trainers = (0..settings.starts).into_par_iter().map(|number| {
                 let trainer = Trainer::new(start(number), problem.clone(), settings.training);
@@ -69,7 +78,8 @@ impl Run {
                 expected: settings.starts,
             });
         }
-        Self::with_trainers(settings, |problem, shape| {
+        let (split, test) = Self::draw(&settings)?;
+        Self::with_sets(settings, split, test, |problem, shape| {
             let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
                 let refused = |source| RunError::Resume { start, source };
                 let trainer = Trainer::resume(state, problem.clone()).map_err(refused)?;
@@ -82,22 +92,22 @@ impl Run {
         })
     }
 
-    fn with_trainers(
-        settings: RunSettings,
-        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
-    ) -> Result<Self, RunError> {
+    /// The training and validation set of these settings, and their test set.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn draw(settings: &RunSettings) -> Result<(Split, Dataset), RunError> {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
-        let test = Self::test_set(&settings)?;
+        let test = Self::test_set(settings)?;
         let RunSettings {
             sensor, scene, seed, ..
         } = settings;
         let rows = sensor.scale.rows();
         let held_out = settings.validation_samples.div_ceil(rows);
         let drawn = (settings.samples.div_ceil(rows) + held_out) * rows;
-        let drawn = Dataset::simulate(&sensor, &scene, drawn, &mut seed.rng(Stream::Training))?;
-        let split = hold_out(drawn, held_out, &mut seed.rng(Stream::Split));
-        Self::with_sets(settings, split, test, trainers)
+        let drawn = Dataset::simulate(sensor, scene, drawn, &mut seed.rng(Stream::Training))?;
+        Ok((hold_out(drawn, held_out, &mut seed.rng(Stream::Split)), test))
     }
 
     /// The test set of these settings: what the window shows before anything is trained.
@@ -122,6 +132,7 @@ impl Run {
         test: Dataset,
         trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
     ) -> Result<Self, RunError> {
+        settings.check_counts()?;
         let Split { training, validation } = split;
         let stroke_mm = settings.stroke_mm();
         let score = |decoupler: &dyn Decoupler| {
@@ -142,12 +153,19 @@ impl Run {
             validation: validation.as_ref().map(examples),
             test: Some(examples(&test)),
         };
+        // They are in `problem`, scaled: large sets need not be held twice.
+        drop((training, validation));
         let shape = Shape {
             inputs: problem.training.inputs(),
             hidden: settings.hidden,
             outputs: problem.training.outputs(),
         };
-        check_memory(&settings.training.method, shape, settings.starts)?;
+        check_memory(
+            &settings.training.method,
+            shape,
+            problem.training.samples(),
+            settings.starts,
+        )?;
         let trainers = trainers(&problem, shape)?;
         Ok(Self {
             settings,
@@ -200,7 +218,8 @@ impl Run {
     /// # Errors
     /// A setting out of range, or networks too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
-        check_memory(&method, self.leader().present().shape(), self.trainers.len())?;
+        let shape = self.leader().present().shape();
+        check_memory(&method, shape, self.settings.samples, self.trainers.len())?;
         // The starts have the same shape, so the first is refused or none.
         for trainer in &mut self.trainers {
             trainer.continue_with(method)?;
@@ -289,9 +308,9 @@ impl Run {
 }
 
 /// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.
-fn check_memory(method: &Method, shape: Shape, starts: usize) -> Result<(), RunError> {
-    let bytes = NormalEquations::bytes(shape).saturating_mul(starts);
-    if starts > 1 && method.has_normal_equations() && bytes > LARGEST_EQUATIONS_BYTES {
+fn check_memory(method: &Method, shape: Shape, samples: usize, starts: usize) -> Result<(), RunError> {
+    let bytes = method.equations_bytes(shape, samples).saturating_mul(starts);
+    if starts > 1 && bytes > LARGEST_EQUATIONS_BYTES {
         return Err(RunError::TooManyStarts { starts, bytes });
     }
     Ok(())

@@ -2,7 +2,7 @@ use thiserror::Error;
 
 use super::CountError;
 use crate::{
-    dataset::DatasetError,
+    dataset::{DatasetError, FoldsError},
     network::ScalingError,
     scene::SceneError,
     sensor::SensorError,
@@ -24,6 +24,9 @@ pub enum RunError {
     /// Samples that cannot be drawn.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// Folds that cannot be filled.
+    #[error(transparent)]
+    Folds(#[from] FoldsError),
     /// Samples that cannot be scaled.
     #[error(transparent)]
     Scaling(#[from] ScalingError),

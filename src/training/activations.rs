@@ -1,14 +1,17 @@
+use std::ops::Range;
+
 use faer::{Accum, Mat, MatRef, Par, linalg::matmul::matmul};
 
 use super::{
     Examples,
     elementwise::subtract,
     examples::{BLOCK, Block, column, column_mut},
+    parallel::{for_each_part, parts},
 };
 use crate::network::{Mlp, Shape, tanh_in_place};
 
 /// The most memory for keeping the activations of all blocks; above it they are made anew for each use.
-const LARGEST_KEPT_BYTES: usize = 16 << 20;
+const LARGEST_KEPT_BYTES: usize = 32 << 20;
 
 /// What the layers answer for one block; room that is used again for every block.
 #[derive(Clone, Debug)]
@@ -62,25 +65,28 @@ impl Activations {
 }
 
 /// The activations of every block at the weights last evaluated, so that a step that is accepted need not run the
-/// network a second time. Where they would take too much memory, room for one block.
+/// network a second time. Where they would take too much memory, room for one block of each part of the samples.
 #[derive(Debug)]
 pub(super) struct KeptActivations {
-    blocks: Vec<Activations>,
-    /// Whether there is room for one block only, of several.
+    /// One for each block, or one for each part.
+    rooms: Vec<Activations>,
     made_anew: bool,
+    parts: usize,
     /// The weights evaluated last; empty before the first.
     weights: Vec<f64>,
     squares: f64,
 }
 
 impl KeptActivations {
-    pub(super) fn new(shape: Shape, examples: &Examples) -> Self {
+    /// Room for samples that are worked on in up to `parts` parts.
+    pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
         let bytes = examples.samples() * (shape.hidden + 1 + shape.outputs) * size_of::<f64>();
         let made_anew = bytes > LARGEST_KEPT_BYTES;
-        let blocks = if made_anew { 1 } else { examples.blocks().len() };
+        let rooms = if made_anew { parts } else { examples.blocks().len() };
         Self {
-            blocks: vec![Activations::new(shape); blocks],
+            rooms: vec![Activations::new(shape); rooms],
             made_anew,
+            parts,
             weights: Vec::new(),
             squares: 0.0,
         }
@@ -89,23 +95,84 @@ impl KeptActivations {
     /// Runs the network on all examples; returns the sum of squared errors.
     pub(super) fn evaluate(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         if self.weights != mlp.weights() {
-            self.squares = 0.0;
-            let last = self.blocks.len().saturating_sub(1);
-            for (index, block) in examples.blocks().iter().enumerate() {
-                self.squares += self.blocks[index.min(last)].forward(mlp, block);
-            }
+            self.squares = self.run(mlp, examples);
             self.weights.clear();
             self.weights.extend_from_slice(mlp.weights());
         }
         self.squares
     }
 
-    /// The activations of block number `index` at the weights last evaluated, which are those of `mlp`.
-    pub(super) fn of(&mut self, index: usize, mlp: &Mlp, block: &Block) -> &Activations {
+    fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
+        let blocks = examples.blocks();
+        let mut rooms = self.rooms.as_mut_slice();
+        let part = |blocks: Range<usize>| {
+            let count = if self.made_anew { 1 } else { blocks.len() };
+            let (own, others) = std::mem::take(&mut rooms).split_at_mut(count);
+            rooms = others;
+            (blocks, own, 0.0)
+        };
+        let mut parts: Vec<_> = parts(blocks.len(), self.parts).map(part).collect();
+        for_each_part(&mut parts, |(numbers, rooms, squares)| {
+            for (index, block) in blocks[numbers.clone()].iter().enumerate() {
+                *squares += rooms[index % rooms.len()].forward(mlp, block);
+            }
+        });
+        parts.iter().map(|(.., squares)| squares).sum()
+    }
+
+    /// Does `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided into
+    /// as many parts as there are `sums`, and the blocks of each part, in order, come with that part's own.
+    pub(super) fn for_each_block<S: Send>(
+        &mut self,
+        mlp: &Mlp,
+        examples: &Examples,
+        sums: &mut [S],
+        work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
+    ) {
+        let numbers = parts(examples.blocks().len(), sums.len());
         if self.made_anew {
-            self.blocks[0].forward(mlp, block);
-            return &self.blocks[0];
+            let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.rooms).collect();
+            for_each_part(&mut parts, |((numbers, sums), activations)| {
+                for number in numbers.clone() {
+                    activations.forward(mlp, &examples.blocks()[number]);
+                    work(sums, &BlockNow::new(examples, number, activations));
+                }
+            });
+        } else {
+            let mut parts: Vec<_> = numbers.zip(sums).collect();
+            for_each_part(&mut parts, |(numbers, sums)| {
+                for number in numbers.clone() {
+                    work(sums, &BlockNow::new(examples, number, &self.rooms[number]));
+                }
+            });
         }
-        &self.blocks[index]
+    }
+}
+
+/// A block of samples with what the network makes of it.
+pub(super) struct BlockNow<'a> {
+    /// Which block, from 0.
+    pub(super) number: usize,
+    pub(super) block: &'a Block,
+    activations: &'a Activations,
+}
+
+impl<'a> BlockNow<'a> {
+    fn new(examples: &'a Examples, number: usize, activations: &'a Activations) -> Self {
+        Self {
+            number,
+            block: &examples.blocks()[number],
+            activations,
+        }
+    }
+
+    /// H̃: samples × (hidden + 1).
+    pub(super) fn hidden(&self) -> MatRef<'_, f64> {
+        self.activations.hidden.as_ref().subrows(0, self.block.samples())
+    }
+
+    /// E: samples × outputs.
+    pub(super) fn errors(&self) -> MatRef<'_, f64> {
+        self.activations.errors.as_ref().subrows(0, self.block.samples())
     }
 }

@@ -4,6 +4,7 @@ use super::{
     Evaluation, Examples, NormalEquations, Setting, StopReason,
     algorithm::{Algorithm, MethodState, place},
     levenberg_marquardt::SMALLEST_MU,
+    normal_equations::Way,
 };
 use crate::network::Mlp;
 
@@ -104,7 +105,7 @@ pub struct BayesianState {
 impl BayesianRegularization {
     /// Gathers the normal equations at the start, where all weights are taken as determined by the data.
     pub(super) fn new(settings: BayesianRegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::new(mlp.shape(), examples);
+        let mut equations = NormalEquations::solved_by(Way::Factored, mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let weights = mlp.weights().len();
         let mut method = Self {
@@ -169,7 +170,7 @@ impl Algorithm for BayesianRegularization {
             let damping = (mu + alpha) / beta;
             if self
                 .equations
-                .solve_with_decay(mlp, damping, alpha / beta, &mut self.step)
+                .solve_with_decay(mlp, examples, damping, alpha / beta, &mut self.step)
             {
                 place(&mut self.candidate, mlp, &self.step);
                 let mse = self.equations.mse(&self.candidate, examples);

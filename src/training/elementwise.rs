@@ -1,5 +1,7 @@
 //! Products of columns, entry by entry, in the machine's vector registers.
 
+use pulp::{Simd, WithSimd};
+
 /// Writes `a ∘ b`.
 pub(super) fn multiply_into(product: &mut [f64], a: &[f64], b: &[f64]) {
     pulp::Arch::new().dispatch(|| {
@@ -27,6 +29,33 @@ pub(super) fn multiply(values: &mut [f64], factors: &[f64]) {
     });
 }
 
+/// Multiplies `values` by `factor`.
+pub(super) fn scale(values: &mut [f64], factor: f64) {
+    pulp::Arch::new().dispatch(|| {
+        for value in &mut *values {
+            *value *= factor;
+        }
+    });
+}
+
+/// Adds `factor · a` to `sum`.
+pub(super) fn add_scaled(sum: &mut [f64], factor: f64, a: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (sum, a) in sum.iter_mut().zip(a) {
+            *sum += factor * a;
+        }
+    });
+}
+
+/// Multiplies `values` by the slopes of tanh where its values are `h`: 1 − h².
+pub(super) fn multiply_by_tanh_slopes(values: &mut [f64], h: &[f64]) {
+    pulp::Arch::new().dispatch(|| {
+        for (value, h) in values.iter_mut().zip(h) {
+            *value *= 1.0 - h * h;
+        }
+    });
+}
+
 /// Writes the slope of tanh where its value is `h`: 1 − h².
 pub(super) fn tanh_slopes_into(slopes: &mut [f64], h: &[f64]) {
     pulp::Arch::new().dispatch(|| {
@@ -38,22 +67,34 @@ pub(super) fn tanh_slopes_into(slopes: &mut [f64], h: &[f64]) {
 
 /// Subtracts `targets` from `outputs`; returns the sum of squares, in eight partial sums of fixed order.
 pub(super) fn subtract(outputs: &mut [f64], targets: &[f64]) -> f64 {
-    const LANES: usize = 8;
-    let mut sums = [0.0; LANES];
-    pulp::Arch::new().dispatch(|| {
-        let whole = outputs.len() - outputs.len() % LANES;
-        let (outputs, last_outputs) = outputs.split_at_mut(whole);
-        let (targets, last_targets) = targets.split_at(whole);
-        for (outputs, targets) in outputs.chunks_exact_mut(LANES).zip(targets.chunks_exact(LANES)) {
-            for ((output, target), sum) in outputs.iter_mut().zip(targets).zip(&mut sums) {
-                *output -= target;
-                *sum += *output * *output;
+    pulp::Arch::new().dispatch(Subtraction { outputs, targets })
+}
+
+/// A type rather than a closure, which would be too long to be moved into the code for vector registers.
+struct Subtraction<'a> {
+    outputs: &'a mut [f64],
+    targets: &'a [f64],
+}
+
+impl WithSimd for Subtraction<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        const LANES: usize = 8;
+        let mut sums = [0.0; LANES];
+        let (outputs, last_outputs) = self.outputs.as_chunks_mut::<LANES>();
+        let (targets, last_targets) = self.targets.as_chunks::<LANES>();
+        for (outputs, targets) in outputs.iter_mut().zip(targets) {
+            for lane in 0..LANES {
+                outputs[lane] -= targets[lane];
+                sums[lane] += outputs[lane] * outputs[lane];
             }
         }
         for ((output, target), sum) in last_outputs.iter_mut().zip(last_targets).zip(&mut sums) {
             *output -= target;
             *sum += *output * *output;
         }
-    });
-    sums.iter().sum()
+        sums.iter().sum()
+    }
 }

@@ -16,32 +16,47 @@ const LARGEST_KEPT_BYTES: usize = 32 << 20;
 pub(super) enum InputPairs {
     /// One matrix per block, shared by all trainings on these examples.
     Kept(Examples),
-    /// Room for one block, and for one sample of it.
-    Made(Mat<f64>, Vec<f64>),
+    /// Made anew for each block.
+    Made,
+}
+
+/// Room for the pairs of one block, if they are made anew.
+#[derive(Debug)]
+pub(super) struct PairsRoom {
+    pairs: Mat<f64>,
+    sample: Vec<f64>,
 }
 
 impl InputPairs {
     pub(super) fn new(examples: &Examples) -> Self {
         let n1 = examples.inputs() + 1;
-        let pairs = n1 * (n1 + 1) / 2;
-        if examples.samples() * pairs * size_of::<f64>() > LARGEST_KEPT_BYTES {
-            return Self::Made(Mat::zeros(pairs, BLOCK), vec![0.0; n1]);
+        if examples.samples() * pairs(n1) * size_of::<f64>() > LARGEST_KEPT_BYTES {
+            return Self::Made;
         }
         kept(examples);
         Self::Kept(examples.clone())
     }
 
+    /// Room for [`Self::of`].
+    pub(super) fn room(&self, n1: usize) -> PairsRoom {
+        let samples = match self {
+            Self::Kept(_) => 0,
+            Self::Made => BLOCK,
+        };
+        PairsRoom {
+            pairs: Mat::zeros(pairs(n1), samples),
+            sample: vec![0.0; n1],
+        }
+    }
+
     /// The pairs of block number `index`.
-    pub(super) fn of(&mut self, index: usize, block: &Block) -> MatRef<'_, f64> {
+    pub(super) fn of<'a>(&'a self, index: usize, block: &Block, room: &'a mut PairsRoom) -> MatRef<'a, f64> {
         match self {
             Self::Kept(examples) => kept(examples)[index].as_ref(),
-            Self::Made(room, sample) => {
-                fill(
-                    block.inputs.as_ref(),
-                    sample,
-                    room.as_mut().subcols_mut(0, block.samples()),
-                );
-                room.as_ref().subcols(0, block.samples())
+            Self::Made => {
+                let mut pairs = room.pairs.as_mut().subcols_mut(0, block.samples());
+                fill(block.inputs.as_ref(), &mut room.sample, pairs.as_mut());
+                room.pairs.as_ref().subcols(0, block.samples())
             }
         }
     }
@@ -61,14 +76,18 @@ impl InputPairs {
     }
 }
 
+fn pairs(n1: usize) -> usize {
+    n1 * (n1 + 1) / 2
+}
+
 /// The pairs of all blocks, made when first asked for.
 fn kept(examples: &Examples) -> &[Mat<f64>] {
     examples.input_pairs(|block| {
         let n1 = block.inputs.ncols();
         let mut sample = vec![0.0; n1];
-        let mut pairs = Mat::zeros(n1 * (n1 + 1) / 2, block.samples());
-        fill(block.inputs.as_ref(), &mut sample, pairs.as_mut());
-        pairs
+        let mut kept = Mat::zeros(pairs(n1), block.samples());
+        fill(block.inputs.as_ref(), &mut sample, kept.as_mut());
+        kept
     })
 }
 

@@ -106,7 +106,7 @@ impl LevenbergMarquardt {
 impl Algorithm for LevenbergMarquardt {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         while self.mu <= self.settings.mu_max {
-            if self.equations.solve(mlp, self.mu, &mut self.step) {
+            if self.equations.solve(mlp, examples, self.mu, &mut self.step) {
                 place(&mut self.candidate, mlp, &self.step);
                 let mse = self.equations.mse(&self.candidate, examples);
                 // Written so that NaN is rejected.

@@ -7,21 +7,25 @@ use super::{
     LevenbergMarquardtSettings, MethodState, MomentumSettings, ResilientSettings, ScaledConjugateGradientSettings,
     Setting, SettingError, StepMomentumSettings, VariableProjectionSettings, adaptive_descent::AdaptiveDescent,
     algorithm::Algorithm, bayesian_regularization::BayesianRegularization, gradient_descent::GradientDescent,
-    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, resilient::Resilient,
+    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, normal_equations::Way, resilient::Resilient,
     scaled_conjugate_gradient::ScaledConjugateGradient, step_momentum::StepMomentum,
     variable_projection::VariableProjection,
 };
-use crate::network::Mlp;
+use crate::network::{Mlp, Shape};
 
 /// A training method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Damped Gauss-Newton steps (`trainlm`).
+    /// Damped Gauss-Newton steps (`trainlm`). Their equations are factored, or where it is cheaper, which is for wide
+    /// networks and decided by their shape and the number of samples, solved by conjugate gradients to a relative
+    /// residual of 1e-8: the same steps to about as many digits.
     LevenbergMarquardt(LevenbergMarquardtSettings),
-    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`).
+    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`). Its equations are
+    /// always factored, since it needs the trace of their inverse.
     BayesianRegularization(BayesianRegularizationSettings),
-    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer.
+    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer, their equations solved as those of
+    /// Levenberg-Marquardt.
     VariableProjection(VariableProjectionSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
     ScaledConjugateGradient(ScaledConjugateGradientSettings),
@@ -164,12 +168,19 @@ impl Method {
         copy.settings().iter().try_for_each(Setting::check)
     }
 
-    /// Whether it factors the normal equations, whose memory grows with the square of the hidden weights.
-    pub fn has_normal_equations(&self) -> bool {
-        matches!(
-            self,
-            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_)
-        )
+    /// How it solves the normal equations for a network of this shape and so many samples, if it has any.
+    fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
+        match self {
+            Self::LevenbergMarquardt(_) | Self::VariableProjection(_) => Some(Way::cheaper(shape, samples)),
+            // It needs the trace of the inverse.
+            Self::BayesianRegularization(_) => Some(Way::Factored),
+            _ => None,
+        }
+    }
+
+    /// About how many bytes its equations take for a network of this shape and so many samples.
+    pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
+        self.equations(shape, samples).map_or(0, |way| way.bytes(shape))
     }
 
     /// Puts the method to work from the weights of `mlp`.

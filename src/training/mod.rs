@@ -41,7 +41,7 @@ pub use history::EpochRecord;
 pub use levenberg_marquardt::LevenbergMarquardtSettings;
 pub use method::Method;
 pub use momentum::MomentumSettings;
-pub use normal_equations::NormalEquations;
+use normal_equations::NormalEquations;
 pub use resilient::ResilientSettings;
 pub use scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradientSettings};
 pub use setting::{Setting, SettingError};

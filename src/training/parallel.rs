@@ -1,33 +1,126 @@
-//! Large products on all threads of the present rayon pool.
+//! Work on all threads of the present rayon pool.
 //!
-//! What is divided is the result, by columns, and where it is divided follows from its size alone. So every entry is
-//! summed in the same order, and the bits are the same on any number of threads.
+//! One large product is divided by rows and columns of its result; many small ones, one for each block of samples, by
+//! samples. Where is decided by sizes alone. So every entry is summed in the same order, and the bits are the same on
+//! any number of threads.
 
-use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
+use std::ops::Range;
+
+use faer::{
+    Accum, MatMut, MatRef, Par,
+    linalg::matmul::{
+        matmul,
+        triangular::{self, BlockStructure},
+    },
+};
+use rayon::prelude::*;
 
 /// Multiplications (rows × depth × columns) below which a product is not worth dividing: about a
 /// millisecond of work, many times what waking another thread costs.
-const LARGE: usize = 1 << 25;
-/// Narrower products waste the vector registers.
+pub(super) const LARGE: usize = 1 << 25;
+/// A result is not divided further, since each piece reads its factors anew.
+const MOST_PIECES: usize = 16;
+/// Narrower pieces waste the vector registers.
 const NARROWEST: usize = 16;
+
+/// Samples are not divided further, since each part needs room of its own for its sums.
+const MOST_PARTS: usize = 8;
+/// The most memory for that.
+const LARGEST_PARTS_BYTES: usize = 32 << 20;
+
+/// How much there is to do with some blocks of samples.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work {
+    /// Blocks of samples.
+    pub(super) blocks: usize,
+    /// Multiplications for each of them.
+    pub(super) multiplications: usize,
+    /// Room that each part needs.
+    pub(super) bytes: usize,
+}
+
+impl Work {
+    /// Into how many parts the samples are divided, none with fewer multiplications than `smallest`.
+    pub(super) fn parts(self, smallest: usize) -> usize {
+        let worth = self.blocks.saturating_mul(self.multiplications) / smallest;
+        let room = LARGEST_PARTS_BYTES / self.bytes.max(1);
+        worth.min(self.blocks).min(room).clamp(1, MOST_PARTS)
+    }
+}
+
+/// The blocks of each part.
+pub(super) fn parts(blocks: usize, parts: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..parts).map(move |part| part * blocks / parts..(part + 1) * blocks / parts)
+}
+
+/// Does `work` for each part on any thread.
+pub(super) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sync + Send) {
+    match parts {
+        // Without a detour through the thread pool.
+        [part] => work(part),
+        parts => parts.par_iter_mut().for_each(work),
+    }
+}
 
 /// Whether a product of this many multiplications is divided.
 pub(super) fn is_large(multiplications: usize) -> bool {
     multiplications >= 2 * LARGE
 }
 
+/// Into how many pieces a product of this many multiplications is divided: a power of two.
+pub(super) fn pieces(multiplications: usize) -> usize {
+    let pieces = (multiplications / LARGE).clamp(1, MOST_PIECES);
+    1 << pieces.ilog2()
+}
+
 /// `sum += factor · left · right`.
 pub(super) fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64) {
-    let columns = sum.ncols();
-    if columns < 2 * NARROWEST || !is_large(left.nrows() * left.ncols() * columns) {
+    let pieces = pieces(sum.nrows() * left.ncols() * sum.ncols());
+    add_in_pieces(sum, left, right, factor, pieces);
+}
+
+/// Halves the longer side until there are so many pieces.
+fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64, pieces: usize) {
+    let (rows, columns) = (sum.nrows(), sum.ncols());
+    if pieces == 1 || rows.max(columns) < 2 * NARROWEST {
         matmul(sum, Accum::Add, left, right, factor, Par::Seq);
+    } else if rows > columns {
+        let half = middle(rows);
+        let (above, below) = sum.split_at_row_mut(half);
+        let (left_above, left_below) = left.split_at_row(half);
+        rayon::join(
+            || add_in_pieces(above, left_above, right, factor, pieces / 2),
+            || add_in_pieces(below, left_below, right, factor, pieces / 2),
+        );
+    } else {
+        let half = middle(columns);
+        let (first, second) = sum.split_at_col_mut(half);
+        let (right_first, right_second) = right.split_at_col(half);
+        rayon::join(
+            || add_in_pieces(first, left, right_first, factor, pieces / 2),
+            || add_in_pieces(second, left, right_second, factor, pieces / 2),
+        );
+    }
+}
+
+/// Half of `length` in whole vector registers.
+fn middle(length: usize) -> usize {
+    (length / 2).next_multiple_of(NARROWEST)
+}
+
+/// Subtracts F Fᵀ from the lower triangle of `matrix`.
+pub(super) fn subtract_square(matrix: MatMut<'_, f64>, f: MatRef<'_, f64>) {
+    let order = matrix.nrows();
+    if !is_large(order * order * f.ncols()) {
+        let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        triangular::matmul(matrix, lower, Accum::Add, f, full, f.transpose(), full, -1.0, Par::Seq);
         return;
     }
-    let half = columns / 2;
-    let (first_sum, second_sum) = sum.split_at_col_mut(half);
-    let (first, second) = right.split_at_col(half);
+    let half = middle(order);
+    let (above, _, below, corner) = matrix.split_at_mut(half, half);
+    let (first, second) = f.split_at_row(half);
     rayon::join(
-        || add_product(first_sum, left, first, factor),
-        || add_product(second_sum, left, second, factor),
+        || add_product(below, second, first.transpose(), -1.0),
+        || rayon::join(|| subtract_square(above, first), || subtract_square(corner, second)),
     );
 }

@@ -22,7 +22,7 @@ impl Trainer {
     /// A setting out of range, or a network too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
         method.check()?;
-        check_width(&method, self.mlp.shape())?;
+        check_width(&method, self.mlp.shape(), self.problem.training.samples())?;
         let begun = Instant::now();
         let first_epoch = self.latest().epoch + 1;
         self.stages.retain(|stage| stage.first_epoch < first_epoch);

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, NormalEquations, SettingError, Stage, StopReason, StoppingRules,
+    EpochRecord, Evaluation, Examples, Method, SettingError, Stage, StopReason, StoppingRules,
     activations::Activations, algorithm::Algorithm,
 };
 use crate::network::{Mlp, Shape};
@@ -69,12 +69,8 @@ pub enum TrainingError {
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
-pub(super) fn check_width(method: &Method, shape: Shape) -> Result<(), TrainingError> {
-    let bytes = if method.has_normal_equations() {
-        NormalEquations::bytes(shape)
-    } else {
-        0
-    };
+pub(super) fn check_width(method: &Method, shape: Shape, samples: usize) -> Result<(), TrainingError> {
+    let bytes = method.equations_bytes(shape, samples);
     if bytes > LARGEST_EQUATIONS_BYTES {
         return Err(TrainingError::TooWide { bytes });
     }
@@ -118,7 +114,7 @@ impl Trainer {
         if start.shape().hidden == 0 {
             return Err(TrainingError::NoHiddenNodes);
         }
-        check_width(&settings.method, start.shape())?;
+        check_width(&settings.method, start.shape(), problem.training.samples())?;
         let begun = Instant::now();
         let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {

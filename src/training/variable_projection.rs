@@ -147,7 +147,10 @@ impl Algorithm for VariableProjection {
             }
         }
         while self.state.mu <= self.settings.mu_max {
-            if self.equations.solve_hidden(mlp, self.state.mu, &mut self.step) {
+            if self
+                .equations
+                .solve_hidden(mlp, examples, self.state.mu, &mut self.step)
+            {
                 // The output layer keeps its weights until it is solved for.
                 place(&mut self.candidate, mlp, &self.step);
                 if self.project(examples).is_some_and(|mse| mse < self.now.mse) {

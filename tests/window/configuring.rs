@@ -2,14 +2,14 @@
 
 use decoupler::{
     app::{Action, Phase},
-    evaluation::RunSettings,
+    evaluation::{Run, RunSettings},
     sensor::{ArrayScale, Geometry},
     training::Method,
 };
 use eframe::egui::{Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use crate::driver::{Driver, small};
+use crate::driver::{Driver, small, table_of};
 
 #[test]
 fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
@@ -30,6 +30,47 @@ fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
     );
     assert!(driver.has("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
     assert!(!driver.has("Decoupled surface"));
+}
+
+#[test]
+fn what_a_network_has_to_beat_stands_there_before_a_training() {
+    let mut driver = Driver::open();
+    let has_baselines =
+        |driver: &Driver| matches!(&driver.state().preview, Some(preview) if preview.baselines.is_some());
+    driver.wait("the baselines", has_baselines);
+    let pending = |driver: &Driver| -> Vec<String> {
+        let run = Run::prepare(driver.state().draft).unwrap();
+        let blank = |cell: String| match cell.split_once(": ") {
+            Some((name, _)) if cell.starts_with("network") => format!("{name}: –"),
+            _ => cell,
+        };
+        table_of(&run).into_iter().map(blank).collect()
+    };
+    assert_eq!(driver.table()[..15], pending(&driver));
+    assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
+    assert!(!driver.is_enabled("Network…"), "there is nothing to export yet");
+
+    // Other samples to train on, the same to test on.
+    driver.enter("Training samples", "200");
+    let before = driver.table();
+    driver.wait("the new baselines", |driver| driver.table() != before);
+    assert_eq!(
+        driver.table(),
+        pending(&driver),
+        "and the paper has none for 200 samples"
+    );
+}
+
+#[test]
+fn rules_of_thumb_are_said_in_plain_words() {
+    let mut driver = Driver::open();
+    assert!(driver.has("Rules of thumb: 5, or 9 to 18"));
+    assert!(driver.has("30 inputs, 20 outputs, 632 weights"));
+    assert!(!driver.says("Eq. (12)"));
+    driver.get("Rules of thumb: 5, or 9 to 18").hover();
+    driver.wait("the equations", |driver| {
+        driver.says("(Eq. 12)") && driver.says("(Eq. 13)")
+    });
 }
 
 #[test]
@@ -190,7 +231,8 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
     assert!(!table.is_empty());
     driver.click("10×8");
     driver.wait("the other array's surface", |driver| driver.state().preview.is_some());
-    assert!(driver.table().is_empty() && !driver.has("Decoupled surface"));
+    let networks = driver.table().into_iter().filter(|cell| cell.starts_with("network, "));
+    assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoupled surface"));
     driver.click("10×6");
     assert_eq!(driver.table(), table);
     assert!(driver.has("Decoupled surface"));

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod configuring;
+mod continuing;
 mod driver;
 mod exporting;
 mod extremes;

@@ -61,7 +61,7 @@ fn album(size: Vec2, is_dark: bool) {
     album.driver.click_button("Decoupled");
     album.take("7-top");
     album.driver.click_button("3-D");
-    for tab in ["Training state", "Error histogram", "Regression", "Nodes", "Loss"] {
+    for tab in ["Training state", "Histogram", "Regression", "Nodes", "Loss"] {
         album.driver.click(tab);
         album.take(&format!("8-{}", tab.replace(' ', "-").to_lowercase()));
     }

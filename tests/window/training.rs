@@ -14,7 +14,7 @@ use crate::{
     driver::{Driver, small, table_of, trained},
 };
 
-const TABS: [&str; 5] = ["Loss", "Training state", "Error histogram", "Regression", "Nodes"];
+const TABS: [&str; 5] = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
 
 #[test]
 fn a_training_ends_with_the_librarys_own_numbers() {
@@ -200,6 +200,44 @@ fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
 }
 
 #[test]
+fn the_verdict_names_a_remedy_that_fits_the_end() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Epochs", "3");
+    driver.train();
+    assert!(driver.says("better than this network. Train for more epochs, or with more hidden nodes."));
+    assert!(!driver.says("The settings have changed"));
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    assert!(driver.says("The settings have changed since this training."));
+    driver.enter("Epochs", "200");
+    driver.enter("Hidden nodes", "14");
+    driver.enter("Training samples", "1000");
+    driver.train();
+    assert!(driver.says("times as accurate as the linear map"));
+}
+
+#[test]
+fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Learning rate", "1e6");
+    driver.enter("Validation samples", "0");
+    driver.train();
+    let run = driver.state().run.as_ref().unwrap();
+    let result = run.result.as_ref().unwrap();
+    let nodes = run.test.frame(&result.decoupled_mm, 0).nodes_mm;
+    // The best network is the one before the first step, which knows nothing yet.
+    assert_eq!(result.best_epoch, 0);
+    let (low, high) = (4.0 - 0.08, 5.0 + 0.08);
+    let is_beyond = |node: &&glam::DVec3| !(7.5..=17.5).contains(&node.x) || !(low..=high).contains(&node.z);
+    let count = nodes.iter().filter(is_beyond).count();
+    assert!(count > 1, "{nodes:?}");
+    assert!(driver.says(&format!("{count} nodes beyond the axes are drawn at their edge")));
+}
+
+#[test]
 fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
     let mut driver = Driver::open();
     driver.configure_small();
@@ -211,6 +249,12 @@ fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
     assert!(driver.says("error grew without bound: lower the learning rate"));
+    let verdict = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.contains("shown is the best network before that"));
+    assert!(verdict.is_some_and(|text| text.ends_with("Lower the learning rate.")));
+    assert!(!driver.says("Train for more epochs"), "more of the same would not help");
     for tab in TABS {
         driver.click(tab);
         driver.settle();

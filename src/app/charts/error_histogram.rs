@@ -17,17 +17,26 @@ pub fn error_histogram_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64
     let (counts, width) = histogram(&errors);
     let bars = counts.iter().enumerate().map(|(bin, &count)| {
         let centre = width * (bin as f64 - (BINS / 2) as f64);
-        Bar::new(centre, count as f64)
-            .width(0.92 * width)
-            .name(format!("{} mm", format_number(centre)))
+        Bar::new(centre, count as f64).width(0.92 * width)
     });
-    let chart = BarChart::new("nodes", bars.collect()).color(palette.accent);
-    plot(ui, "error histogram", "error of z (mm)", "nodes of the test set")
-        .include_y(0.0)
-        .show(ui, |plot_ui| {
-            plot_ui.bar_chart(chart);
-            plot_ui.vline(VLine::new("no error", 0.0).color(palette.dim).width(1.0));
-        });
+    let text = |bar: &Bar, _: &BarChart| format!("{} nodes at {} mm", bar.value, format_number(bar.argument));
+    let chart = BarChart::new("nodes", bars.collect())
+        .color(palette.accent)
+        .element_formatter(Box::new(text));
+    let highest = counts.iter().copied().max().unwrap_or(0);
+    plot(
+        ui,
+        "error histogram",
+        "error of z (mm), decoupled − actual",
+        "nodes of the test set",
+    )
+    .include_y(0.0)
+    // Room for the words above the highest bar.
+    .include_y(1.1 * highest as f64)
+    .show(ui, |plot_ui| {
+        plot_ui.bar_chart(chart);
+        plot_ui.vline(VLine::new("no error", 0.0).color(palette.dim).width(1.0));
+    });
 }
 
 /// Counts in [`BINS`] bins symmetric about 0, and the width of a bin.

@@ -1,27 +1,55 @@
 use eframe::egui::{Color32, Ui};
-use egui_plot::{Line, PlotPoints, VLine};
+use egui_plot::{HoverPosition, Line, PlotPoints, VLine};
 
-use super::plot_style::{decade_text, decades, legend, plot, thinned};
-use crate::{app::theme::Theme, export::format_number, training::EpochRecord};
+use super::{
+    legend::{Key, Mark},
+    plot_style::{log_marks, log_text, plot, thinned},
+    stages::stage_marks_ui,
+};
+use crate::{
+    app::theme::{Palette, Theme},
+    export::format_number,
+    training::{EpochRecord, Stage},
+};
 
 /// Picks one of an epoch's errors.
 type ErrorOf = fn(&EpochRecord) -> Option<f64>;
 
-/// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights.
-pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
-    let palette = Theme::of(ui).palette;
-    let curves: [(_, Color32, ErrorOf); 3] = [
+fn curves(palette: &Palette) -> [(&'static str, Color32, ErrorOf); 3] {
+    [
         ("training", palette.training_series, |epoch| Some(epoch.training_mse)),
         ("validation", palette.validation_series, |epoch| epoch.validation_mse),
         ("test", palette.test_series, |epoch| epoch.test_mse),
-    ];
-    plot(ui, "loss", "epoch", "mse (scaled)")
-        .legend(legend())
-        .y_grid_spacer(decades)
-        .y_axis_formatter(|mark, _| decade_text(mark))
+    ]
+}
+
+/// What is in the chart: no validation where nothing was held out.
+pub fn loss_keys(palette: &Palette, history: &[EpochRecord]) -> Vec<Key> {
+    let has_errors = |error: &ErrorOf| history.iter().any(|epoch| error(epoch).is_some());
+    let curves = curves(palette).into_iter().filter(|(_, _, error)| has_errors(error));
+    let curves = curves.map(|(name, colour, _)| Key {
+        name,
+        mark: Mark::Line,
+        colour,
+    });
+    let best = Key {
+        name: "best weights",
+        mark: Mark::Dashes,
+        colour: palette.dim,
+    };
+    curves.chain([best]).collect()
+}
+
+/// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights,
+/// a thin one each change of method.
+pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage], best_epoch: usize) {
+    let palette = Theme::of(ui).palette;
+    let shown = plot(ui, "loss", "epoch", "mse (scaled)")
+        .y_grid_spacer(log_marks)
+        .y_axis_formatter(|mark, _| log_text(mark.value))
         .label_formatter(hover_text)
         .show(ui, |plot_ui| {
-            for (name, colour, error) in curves {
+            for (name, colour, error) in curves(&palette) {
                 let points: Vec<[f64; 2]> = thinned(history)
                     .filter_map(|epoch| Some([epoch.epoch as f64, error(&epoch)?.log10()]))
                     .filter(|point| point[1].is_finite())
@@ -35,17 +63,18 @@ pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], best_epoch: usize) {
                 .width(1.0);
             plot_ui.vline(best.style(egui_plot::LineStyle::dashed_dense()));
         });
+    stage_marks_ui(ui, &shown, stages);
 }
 
-fn hover_text(position: &egui_plot::HoverPosition<'_>) -> Option<String> {
+fn hover_text(position: &HoverPosition<'_>) -> Option<String> {
     match position {
-        egui_plot::HoverPosition::NearDataPoint {
+        HoverPosition::NearDataPoint {
             plot_name, position, ..
         } => Some(format!(
-            "{plot_name}\nepoch {}\nmse {}",
+            "{plot_name}, epoch {}\nmean squared error {}",
             position.x,
             format_number(10.0_f64.powf(position.y))
         )),
-        egui_plot::HoverPosition::Elsewhere { .. } => None,
+        HoverPosition::Elsewhere { .. } => None,
     }
 }

@@ -1,15 +1,21 @@
 //! The charts below the surfaces, one a file.
 
 mod error_histogram;
+mod legend;
 mod loss;
 mod nodes;
 mod plot_style;
 mod regression;
+mod stages;
+mod strip;
 mod test_pairs;
 mod training_state;
 
 pub use error_histogram::error_histogram_ui;
-pub use loss::loss_ui;
-pub use nodes::nodes_ui;
-pub use regression::regression_ui;
-pub use training_state::training_state_ui;
+pub use legend::{Key, legend_ui, legend_width};
+pub use loss::{loss_keys, loss_ui};
+pub use nodes::{nodes_keys, nodes_ui};
+pub use regression::{regression_keys, regression_ui};
+pub use stages::parameter_name;
+pub use strip::{StripChart, strip_ui};
+pub use training_state::{training_state_keys, training_state_ui};

@@ -1,12 +1,37 @@
 use eframe::egui::Ui;
-use egui_plot::{MarkerShape, PlotPoints, Points};
+use egui_plot::{GridInput, GridMark, MarkerShape, PlotPoints, Points};
 use glam::DVec3;
 
-use super::plot_style::{legend, plot};
-use crate::app::{state::Frames, theme::Theme};
+use super::{
+    legend::{Key, Mark},
+    plot_style::plot,
+};
+use crate::app::{
+    state::Frames,
+    theme::{Palette, Theme},
+};
+
+const ACTUAL_RADIUS: f32 = 3.5;
+const DECOUPLED_RADIUS: f32 = 2.5;
+
+/// What is in the chart: nothing decoupled before a training.
+pub fn nodes_keys(palette: &Palette, frames: &Frames) -> Vec<Key> {
+    let actual = Key {
+        name: "actual",
+        mark: Mark::Squares,
+        colour: palette.dim,
+    };
+    let decoupled = Key {
+        name: "decoupled",
+        mark: Mark::Discs,
+        colour: palette.accent,
+    };
+    let decoupled = frames.decoupled.is_some().then_some(decoupled);
+    std::iter::once(actual).chain(decoupled).collect()
+}
 
 /// The nodes of the snapshot, row by row: actual as squares, decoupled as discs, as in the paper's Fig. 6.
-pub fn nodes_ui(ui: &mut Ui, frames: &Frames) {
+pub fn nodes_ui(ui: &mut Ui, frames: &Frames, nodes_per_row: usize) {
     let palette = Theme::of(ui).palette;
     let heights = |nodes_mm: &[DVec3]| -> PlotPoints<'static> {
         nodes_mm
@@ -16,15 +41,32 @@ pub fn nodes_ui(ui: &mut Ui, frames: &Frames) {
             .collect()
     };
     plot(ui, "nodes", "node, row by row", "z (mm)")
-        .legend(legend())
+        .x_grid_spacer(move |input| row_marks(input, nodes_per_row))
         .show(ui, |plot_ui| {
             let actual = Points::new("actual", heights(&frames.actual.nodes_mm))
                 .shape(MarkerShape::Square)
                 .filled(false);
-            plot_ui.points(actual.radius(3.5).color(palette.dim));
+            plot_ui.points(actual.radius(ACTUAL_RADIUS).color(palette.dim));
             if let Some((decoupled, _)) = &frames.decoupled {
                 let discs = Points::new("decoupled", heights(&decoupled.nodes_mm)).shape(MarkerShape::Circle);
-                plot_ui.points(discs.radius(2.5).color(palette.accent));
+                plot_ui.points(discs.radius(DECOUPLED_RADIUS).color(palette.accent));
             }
         });
+}
+
+/// A mark at the last node of a row, of every row or of every so many.
+fn row_marks(input: GridInput, nodes_per_row: usize) -> Vec<GridMark> {
+    /// About as many as are told apart.
+    const MOST: f64 = 12.0;
+    let (low, high) = input.bounds;
+    let row = nodes_per_row.max(1) as f64;
+    if !(low.is_finite() && high.is_finite()) {
+        return Vec::new();
+    }
+    let step = row * ((high - low) / (row * MOST)).ceil().max(1.0);
+    let first = (low / step).ceil().max(0.0);
+    let count = ((high / step).floor() - first).clamp(0.0, MOST) as usize;
+    let marks = (0..=count).map(|index| (first + index as f64) * step);
+    let seen = marks.filter(|mark| (low..=high).contains(mark));
+    seen.map(|value| GridMark { value, step_size: step }).collect()
 }

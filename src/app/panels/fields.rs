@@ -2,9 +2,9 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Align, DragValue, Layout, Response, RichText, Ui, emath::Numeric};
+use eframe::egui::{Align, DragValue, Layout, Response, Ui, emath::Numeric};
 
-use crate::app::theme::{Theme, space};
+use crate::app::theme::space;
 
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
@@ -34,15 +34,16 @@ pub fn quantity_ui(
 }
 
 fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, unit: &str) -> Response {
-    // Right to left: the unit stands behind the number.
-    if !unit.is_empty() {
-        ui.label(RichText::new(unit).color(Theme::of(ui).palette.dim));
-    }
     // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
     let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
     let mut drag = DragValue::new(value)
         .range(range)
         .speed(speed)
+        .suffix(if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {unit}")
+        })
         .update_while_editing(false);
     if !N::INTEGRAL {
         drag = drag

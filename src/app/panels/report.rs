@@ -1,39 +1,83 @@
-use eframe::egui::{Align, Layout, RichText, ScrollArea, Ui, WidgetInfo, accesskit::Role};
+use std::time::Duration;
 
-use super::table::{Column, Row, table_ui};
+use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+
+use super::{
+    spread::spread_ui,
+    table::{Column, Row, table_ui},
+};
 use crate::{
     app::{
         action::Action,
         export_kind::ExportKind,
-        state::{RunResult, RunView, State},
-        theme::{Theme, ghost_button, note_ui, section_heading_ui, space, type_size},
+        file_task::FileTask,
+        state::{Phase, RunResult, RunView, State},
+        theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, Errors, error_rows},
+    evaluation::{ErrorRow, Errors, PublishedErrors, error_rows},
     export::{format_duration, format_number},
+    training::StopReason,
 };
 
-/// The error table, what it cost, and what can be taken away.
+/// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
 pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut actions = Vec::new();
-    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    scrolled_ui(ui, "report", |ui| {
         section_heading_ui(ui, "Errors on the test set");
         let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
-        let dim = Theme::of(ui).palette.dim;
-        let Some((run, result)) = shown else {
-            let text = "Nothing trained for these settings yet. Press Train: the paper's network takes a few seconds.";
-            ui.label(RichText::new(text).size(type_size().note).color(dim));
-            return;
-        };
-        error_table_ui(ui, run, result);
-        verdict_ui(ui, run, result);
-        worst_node_ui(ui, result, &mut actions);
-        section_heading_ui(ui, "Cost");
-        cost_ui(ui, run, result);
+        if let Some((run, result)) = shown {
+            error_table_ui(ui, &error_rows(&result.errors, &run.baselines, run.published.as_ref()));
+            verdict_ui(ui, state, run, result);
+            worst_node_ui(ui, result, &mut actions);
+            effective_parameters_ui(ui, run, result);
+            spread_ui(ui, &run.starts);
+        } else {
+            expectation_ui(ui, state);
+        }
         section_heading_ui(ui, "Export");
-        export_ui(ui, &mut actions);
+        for kind in ExportKind::ALL {
+            // A training under way is held first.
+            let is_standing = kind != ExportKind::Checkpoint || matches!(state.phase, Phase::Paused | Phase::Ended(_));
+            let can_save = shown.is_some() && is_standing;
+            ui.add_enabled_ui(can_save, |ui| file_ui(ui, FileTask::Save(kind), &mut actions));
+        }
+        section_heading_ui(ui, "Open");
+        let can_open = !state.phase.is_busy() && state.phase != Phase::Died;
+        ui.add_enabled_ui(can_open, |ui| file_ui(ui, FileTask::OpenCheckpoint, &mut actions));
+        if let Some((run, result)) = shown {
+            section_heading_ui(ui, "Cost");
+            cost_ui(ui, run, result);
+        }
     });
     actions
 }
+
+/// The table with the network's row still empty.
+fn expectation_ui(ui: &mut Ui, state: &State) {
+    if let Some(baselines) = state.preview.as_ref().and_then(|preview| preview.baselines) {
+        let draft = &state.draft;
+        let published = PublishedErrors::of(draft.sensor.scale, draft.hidden, draft.samples);
+        let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
+        for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
+            *row = ErrorRow {
+                name: NETWORK,
+                z_percent: None,
+                x_percent: None,
+                y_percent: None,
+                z_mm: None,
+                z_full_scale_percent: None,
+                worst_mm: None,
+            };
+        }
+        error_table_ui(ui, &rows);
+        ui.add_space(space(2));
+    }
+    let text = "Press Train to fill in the network's row. The paper's network takes a few seconds.";
+    dim_ui(ui, text);
+}
+
+/// The name of the network's row.
+const NETWORK: &str = "network";
 
 /// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
 const COLUMNS: [Column; 5] = [
@@ -59,37 +103,69 @@ const COLUMNS: [Column; 5] = [
     },
 ];
 
-fn error_table_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let palette = Theme::of(ui).palette;
-    let row = |row: ErrorRow| Row {
+    let row = |row: &ErrorRow| Row {
         name: row.name,
         cells: row.values()[..COLUMNS.len()]
             .iter()
             .map(|value| format_number(*value))
             .collect(),
         colour: match row.name {
-            "network" => palette.accent,
+            NETWORK => palette.accent,
             "published" => palette.dim,
             _ => palette.text,
         },
-        is_strong: row.name == "network",
+        is_strong: row.name == NETWORK,
     };
-    let rows = error_rows(&result.errors, &run.baselines, run.published.as_ref());
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.into_iter().map(row).collect::<Vec<_>>()));
+    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.iter().map(row).collect::<Vec<_>>()));
 }
 
-/// Says plainly where the network loses, and how.
-fn verdict_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let loses_to = |baseline: &Errors| result.errors.z_mm > baseline.z_mm;
-    let text = if loses_to(&run.baselines.mean) {
-        "Always answering the mean of the training set would be better than this network. Train longer, or lower the learning rate."
-    } else if loses_to(&run.baselines.linear) {
-        "A linear map on resistance is better than this network on z. More epochs or more hidden nodes change that."
-    } else {
-        return;
-    };
+/// Says plainly where the network loses, and what would help; or by how much it wins. Nothing while it still learns.
+fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
+    let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
-    note_ui(ui, text);
+    let baselines = &run.baselines;
+    let loses_to = |baseline: &Errors| result.errors.z_mm > baseline.z_mm;
+    let fault = if reason == StopReason::Diverged {
+        let epoch = result.best_epoch;
+        Some(format!(
+            "The error grew without bound; shown is the best network before that, of epoch {epoch}."
+        ))
+    } else if loses_to(&baselines.mean) {
+        Some("Always answering the mean of the training set would be better than this network.".to_owned())
+    } else if loses_to(&baselines.linear) {
+        Some("A linear map of the resistances is better on z than this network.".to_owned())
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        let remedy = remedy(reason, run.settings.training.method.parameter_name());
+        note_ui(ui, &format!("{fault} {remedy}"));
+    } else if result.errors.z_mm > 0.0 {
+        let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
+        dim_ui(ui, &format!("On z {times} times as accurate as the linear map."));
+    }
+    if run.asked != state.draft {
+        dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+/// What to change after a training that ended so.
+fn remedy(reason: StopReason, parameter_name: &str) -> &'static str {
+    match reason {
+        StopReason::Diverged if parameter_name == "learning rate" => "Lower the learning rate.",
+        StopReason::Diverged => "Take another seed or another method.",
+        StopReason::EpochsReached | StopReason::Stopped => "Train for more epochs, or with more hidden nodes.",
+        StopReason::ValidationRose => "Draw more training samples, or take another seed or other hidden nodes.",
+        StopReason::GoalReached => "Set a lower goal.",
+        StopReason::GradientSmall | StopReason::MuLarge => "It is stuck: take another seed, or more hidden nodes.",
+    }
+}
+
+fn dim_ui(ui: &mut Ui, text: &str) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
 fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
@@ -116,14 +192,35 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
     });
 }
 
+/// How many weights the data determine, where the method estimates it.
+fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let best = run.history.get(result.best_epoch);
+    let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
+        return;
+    };
+    let text = format!(
+        "Effective parameters {} of {} weights",
+        format_number(effective),
+        run.weights
+    );
+    ui.label(RichText::new(text).size(type_size().note)).on_hover_text(
+        "How many weights the data determine, as Bayesian regularisation estimates it. Near the number of weights: more \
+         hidden nodes may help; far below: fewer would do.",
+    );
+}
+
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let epochs = run.latest().map_or(0, |latest| latest.epoch);
-    let mut rows = vec![("Training", format_duration(result.elapsed))];
+    let epochs = result.epochs_run;
+    let training = if run.settings.starts > 1 {
+        "Training, all starts"
+    } else {
+        "Training"
+    };
+    let mut rows = vec![(training, format_duration(result.elapsed))];
     if epochs > 0 {
         rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
     }
-    let microseconds = 1e6 * result.frame_time.as_secs_f64();
-    rows.push(("Decoding a snapshot", format!("{} µs", format_number(microseconds))));
+    rows.push(("Decoupling a snapshot", format_short_time(result.frame_time)));
     rows.push(("Best epoch", result.best_epoch.to_string()));
     for (name, value) in rows {
         ui.horizontal(|ui| {
@@ -133,22 +230,30 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
 }
 
-fn export_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
-    for kind in ExportKind::ALL {
-        ui.horizontal(|ui| {
-            let width = ui.available_width() - space(14);
-            let button = ghost_button(theme, kind.name()).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(kind.description()).clicked() {
-                actions.push(Action::ChooseFile(kind));
-            }
-            let path = ui.add(ghost_button(theme, "Path").min_size([space(12), space(7)].into()));
-            path.widget_info(|| {
-                WidgetInfo::labeled(Role::Button, true, format!("Type a path for the {}", kind.file_kind()))
-            });
-            if path.on_hover_text("Type the path instead of choosing it").clicked() {
-                actions.push(Action::TypePath(kind));
-            }
-        });
+/// As [`format_duration`], with microseconds below a millisecond.
+fn format_short_time(time: Duration) -> String {
+    if time < Duration::from_millis(1) {
+        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
+    } else {
+        format_duration(time)
     }
+}
+
+const PATH_BUTTON_WIDTH: f32 = space(24);
+
+fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
+    let theme = Theme::of(ui);
+    ui.horizontal(|ui| {
+        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
+        let button = ghost_button(theme, task.name()).min_size([width, space(7)].into());
+        if ui.add(button).on_hover_text(task.description()).clicked() {
+            actions.push(Action::ChooseFile(task));
+        }
+        let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let is_enabled = path.enabled();
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, task.path_name()));
+        if path.on_hover_text("Type the path instead of choosing it").clicked() {
+            actions.push(Action::TypePath(task));
+        }
+    });
 }

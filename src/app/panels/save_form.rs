@@ -4,6 +4,7 @@ use eframe::egui::{Align, Frame, Id, Layout, Margin, Modal, RichText, TextEdit, 
 
 use crate::app::{
     action::Action,
+    file_task::FileTask,
     state::State,
     theme::{Theme, ghost_button, primary_button, semibold, space, type_size},
 };
@@ -20,9 +21,12 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         .frame(form_frame(ui))
         .show(ui.ctx(), |ui| {
             ui.set_width(space(110));
-            ui.label(RichText::new(format!("Save {}", saving.kind.file_kind())).font(semibold(type_size().title)));
             ui.label(
-                RichText::new(saving.kind.description())
+                RichText::new(format!("{} {}", saving.task.verb(), saving.task.kind().file_kind()))
+                    .font(semibold(type_size().title)),
+            );
+            ui.label(
+                RichText::new(saving.task.description())
                     .size(type_size().note)
                     .color(Theme::of(ui).palette.dim),
             );
@@ -40,8 +44,16 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let theme = Theme::of(ui);
                 let is_named = !path.trim().is_empty();
-                if ui.add_enabled(is_named, primary_button(theme, "Save")).clicked() || (entered && is_named) {
-                    actions.push(Action::Export(saving.kind, PathBuf::from(path.trim())));
+                if ui
+                    .add_enabled(is_named, primary_button(theme, saving.task.verb()))
+                    .clicked()
+                    || (entered && is_named)
+                {
+                    let path = PathBuf::from(path.trim());
+                    actions.push(match saving.task {
+                        FileTask::Save(kind) => Action::Export(kind, path),
+                        FileTask::OpenCheckpoint => Action::OpenCheckpoint(path),
+                    });
                 }
                 if ui.add(ghost_button(theme, "Cancel")).clicked() {
                     actions.push(Action::CancelSave);

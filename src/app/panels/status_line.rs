@@ -7,7 +7,7 @@ use crate::{
         state::{Phase, RunView, State},
         theme::{Theme, space, type_size},
     },
-    export::{format_duration, format_number},
+    export::{format_duration, format_number, format_percent},
     training::StopReason,
 };
 
@@ -54,9 +54,10 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     let (Some(latest), Some(result)) = (run.latest(), &run.result) else {
         return Vec::new();
     };
-    let epochs = run.settings.training.stopping.epochs;
+    let (epochs, epochs_run) = (run.settings.training.stopping.epochs, result.epochs_run);
     let mut parts = vec![
-        format!("Epoch {} of {epochs}", latest.epoch),
+        format!("Epoch {epochs_run} of {epochs}"),
+        format!("z error {}", format_percent(result.errors.z_percent)),
         format!("mse {}", format_number(latest.training_mse)),
         format!(
             "{} {}",
@@ -64,13 +65,19 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             format_number(latest.parameter)
         ),
     ];
-    if latest.epoch > 0 {
-        let per_epoch = result.elapsed.div_f64(latest.epoch as f64);
+    if run.settings.starts > 1 && phase.is_busy() {
+        parts.push(format!(
+            "{} of {} starts ended",
+            result.starts_ended, run.settings.starts
+        ));
+    }
+    if epochs_run > 0 {
+        let per_epoch = result.elapsed.div_f64(epochs_run as f64);
         parts.push(format!("{} an epoch", format_duration(per_epoch)));
         if phase.is_busy() {
             parts.push(format!(
                 "at most {} left",
-                format_duration(time_left(per_epoch, epochs - latest.epoch))
+                format_duration(time_left(per_epoch, epochs.saturating_sub(epochs_run)))
             ));
         } else {
             parts.push(format!("{} in all", format_duration(result.elapsed)));
@@ -85,8 +92,8 @@ fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
 
 fn progress_bar_ui(ui: &mut Ui, run: &RunView) {
     let palette = Theme::of(ui).palette;
-    let share = run.latest().map_or(0.0, |latest| {
-        latest.epoch as f32 / run.settings.training.stopping.epochs as f32
+    let share = run.result.as_ref().map_or(0.0, |result| {
+        result.epochs_run as f32 / run.settings.training.stopping.epochs as f32
     });
     let (rect, response) = ui.allocate_exact_size(Vec2::new(space(40), space(1)), Sense::hover());
     let radius = 0.5 * space(1);

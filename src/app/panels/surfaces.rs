@@ -2,46 +2,27 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
-use super::charts_card::charts_card_ui;
 use crate::{
     app::{
         action::Action,
         state::{RightCard, State},
         surface_view::{ColourBar, Colours, SurfaceView, SurfaceViewResponse, ViewMode},
         test_view::{Frame, TestView},
-        theme::{Theme, card_frame, placeholder_ui, segmented_ui, semibold, space, type_size},
+        theme::{Theme, card_ui, placeholder_ui, segmented_ui, semibold, space, type_size},
     },
     export::format_number,
 };
 
-/// The middle of the window: both surfaces above, the charts below.
-pub fn workbench_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let whole = ui.available_rect_before_wrap();
+/// Both surfaces side by side, and the scale of their colours.
+pub fn surfaces_ui(ui: &mut Ui, rect: Rect, state: &State, actions: &mut Vec<Action>) {
     let gap = space(2);
-    let charts_height = (0.32 * whole.height()).clamp(space(40), space(75));
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - charts_height);
-    let upper = upper.with_max_y(upper.max.y - gap);
-    let (cards, scales) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
+    let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let width = 0.5 * (cards.width() - gap);
     let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
     let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
-    in_card(ui, left, |ui| actual_card_ui(ui, state, &mut actions));
-    in_card(ui, right, |ui| right_card_ui(ui, state, &mut actions));
+    card_ui(ui, left, |ui| actual_card_ui(ui, state, actions));
+    card_ui(ui, right, |ui| right_card_ui(ui, state, actions));
     colour_scales_ui(ui, scales, state);
-    in_card(ui, lower, |ui| actions.extend(charts_card_ui(ui, state)));
-    ui.allocate_rect(whole, eframe::egui::Sense::hover());
-    actions
-}
-
-fn in_card(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
-    let theme = Theme::of(ui);
-    let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
-    card.set_clip_rect(rect.intersect(ui.clip_rect()));
-    card_frame(theme).show(&mut card, |ui| {
-        ui.set_min_size(ui.available_size());
-        contents(ui);
-    });
 }
 
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.
@@ -191,27 +172,26 @@ fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>)
     }
 }
 
-/// The node under the pointer and its values.
+/// The node under the pointer and its values, in two lines that hide little.
 fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
     let Some(actual) = state.frames.actual.nodes_mm.get(node) else {
         return;
     };
+    ui.spacing_mut().item_spacing.y = 0.0;
     let per_row = test.sensor.scale.nodes_per_row();
-    ui.label(
-        RichText::new(format!("Row {}, node {}", node / per_row + 1, node % per_row + 1))
-            .font(semibold(type_size().body)),
-    );
-    let line = |ui: &mut Ui, name: &str, value: f64| ui.label(format!("{name} {} mm", format_number(value)));
-    ui.label(format!(
-        "x {} mm, y {} mm",
-        format_number(actual.x),
-        format_number(actual.y)
-    ));
-    line(ui, "actual z", actual.z);
+    ui.horizontal(|ui| {
+        let name = format!("Row {}, node {}", node / per_row + 1, node % per_row + 1);
+        ui.label(RichText::new(name).font(semibold(type_size().note)));
+        let [x, y] = [actual.x, actual.y].map(format_number);
+        let place = RichText::new(format!("x {x}, y {y} mm")).size(type_size().note);
+        ui.label(place.color(Theme::of(ui).palette.dim));
+    });
+    let mut text = format!("z {} mm", format_number(actual.z));
     if let Some((decoupled, error)) = &state.frames.decoupled
         && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
     {
-        line(ui, "decoupled z", decoupled.z);
-        line(ui, "error", error.z);
+        let [decoupled, error] = [decoupled.z, error.z].map(format_number);
+        text += &format!(", decoupled {decoupled} mm, error {error} mm");
     }
+    ui.label(RichText::new(text).size(type_size().note));
 }

@@ -80,11 +80,22 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     }
     let can_train = !is_busy && state.phase != Phase::Died;
     let train = ui.add_enabled(can_train, primary_button(theme, "▶ Train"));
-    if train
-        .on_hover_text("Draw the sets and train the network (Ctrl+Enter)")
-        .clicked()
-    {
+    let can_continue = state.can_continue();
+    let hint = if can_continue {
+        "Begin anew: draw the sets and train the network (Ctrl+Enter)"
+    } else {
+        "Draw the sets and train the network (Ctrl+Enter)"
+    };
+    if train.on_hover_text(hint).clicked() {
         actions.push(Action::Train);
+    }
+    if can_continue {
+        let hint = "Go on from the present weights with the method and the epochs on the left, counted from here; Train \
+                    begins anew";
+        let go_on = ui.add(ghost_button(theme, "Continue"));
+        if go_on.on_hover_text(hint).clicked() {
+            actions.push(Action::Continue);
+        }
     }
 }
 

@@ -9,8 +9,8 @@ use super::camera::OrbitCamera;
 use super::edge::{Edge, GAP, SHORTEST_AXIS, TICK, to_egui, to_glam};
 use super::labels::Labels;
 use super::projection::{Bounds, PlotBox, Projection};
-use super::ticks::tick_text;
 use crate::app::theme::Theme;
+use crate::app::ticks::tick_text;
 
 /// A laid-out box.
 pub(super) struct SpaceAxes {

@@ -6,9 +6,9 @@ use eframe::egui::{self, Mesh, Rect, Response, Sense, Stroke, StrokeKind, Ui, Wi
 
 use super::edge::TICK;
 use super::labels::Labels;
-use super::ticks::{multiples, round_steps, tick_text};
 use super::view::Colours;
 use crate::app::theme::Theme;
+use crate::app::ticks::{multiples, round_steps, tick_text};
 
 const BAR_WIDTH: f32 = 12.0;
 const STRIPS: usize = 128;

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::labels::Labels;
 use super::projection::Projection;
-use super::ticks::{multiples, round_steps, tick_text};
+use crate::app::ticks::{multiples, round_steps, tick_text};
 
 /// Length of a tick, in points.
 pub(super) const TICK: f32 = 4.0;

@@ -9,11 +9,12 @@ use crate::app::theme::type_size;
 /// Room kept free around every label, in points.
 const CLEARANCE: f32 = 4.0;
 
-/// The labels of one plot, in the order in which they claimed their places.
+/// The labels of one plot, in the order in which they claimed their places. They are kept as text: laid-out text holds
+/// only until the font's texture is made anew.
 pub(super) struct Labels {
     font: FontId,
     colour: Color32,
-    placed: Vec<(Rect, Arc<Galley>)>,
+    placed: Vec<(Rect, String)>,
 }
 
 impl Labels {
@@ -45,8 +46,7 @@ impl Labels {
         slide: f32,
         text: &str,
     ) -> bool {
-        let galley = self.galley(painter, text);
-        let size = galley.size();
+        let size = self.size(painter, text);
         // How far the text reaches from its middle towards the anchor.
         let reach = 0.5 * (away.x.abs() * size.x + away.y.abs() * size.y);
         let mut slid = 0.0;
@@ -57,7 +57,7 @@ impl Labels {
                 .iter()
                 .any(|(other, _)| other.expand(CLEARANCE).intersects(rect))
             {
-                self.placed.push((rect, galley));
+                self.placed.push((rect, text.to_owned()));
                 return true;
             }
             slid += 4.0;
@@ -79,10 +79,10 @@ impl Labels {
 
     pub(super) fn paint(&self, painter: &Painter) {
         let pixel = painter.pixels_per_point();
-        for (rect, galley) in &self.placed {
+        for (rect, text) in &self.placed {
             // Whole pixels keep small text crisp.
             let corner = ((rect.min.to_vec2() * pixel).round() / pixel).to_pos2();
-            painter.galley(corner, galley.clone(), self.colour);
+            painter.galley(corner, self.galley(painter, text), self.colour);
         }
     }
 }

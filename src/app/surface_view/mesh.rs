@@ -3,15 +3,15 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{Color32, Mesh, Pos2};
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::contour::cross_cell;
 use super::edge::to_egui;
 use super::plan::PlanAxes;
 use super::projection::Projection;
 use super::ribbon;
-use super::ticks::{multiples, step_for};
 use crate::app::theme::ColourMap;
+use crate::app::ticks::{multiples, step_for};
 use crate::surface::Grid;
 
 /// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
@@ -20,7 +20,6 @@ const AMBIENT: f32 = 0.66;
 const DIRECT: f32 = 0.38;
 const CONTOUR_LEVELS: usize = 10;
 const CONTOUR_OPACITY: f32 = 0.34;
-const BORDER_OPACITY: f32 = 0.4;
 
 /// How places become points.
 pub(super) enum Stage<'a> {
@@ -31,14 +30,11 @@ pub(super) enum Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// Where a place with a value is on the screen. Values beyond the box are drawn at its top or bottom.
-    pub(super) fn point(&self, x_mm: f64, y_mm: f64, value: f64) -> Pos2 {
+    /// Where a place with a value is on the screen.
+    pub(super) fn point(&self, place: DVec3) -> Pos2 {
         match self {
-            Self::Space(projection) => {
-                let (low, high) = (projection.plot_box.min_mm.z, projection.plot_box.max_mm.z);
-                to_egui(projection.point(DVec3::new(x_mm, y_mm, value.clamp(low, high))))
-            }
-            Self::Plan(plan) => plan.point(DVec2::new(x_mm, y_mm)),
+            Self::Space(projection) => to_egui(projection.point(place)),
+            Self::Plan(plan) => plan.point(place.truncate()),
         }
     }
 
@@ -63,7 +59,17 @@ pub(super) struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// The surface with its contour lines and a line around the nodes' rectangle.
+    /// Two corners of the box: the grid, and the values that it has room for.
+    pub(super) fn box_mm(&self) -> (DVec3, DVec3) {
+        let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
+        let ((x0, x1), (y0, y1)) = (ends(self.grid.x_mm()), ends(self.grid.y_mm()));
+        (
+            DVec3::new(x0, y0, *self.shown.start()),
+            DVec3::new(x1, y1, *self.shown.end()),
+        )
+    }
+
+    /// The surface with its contour lines.
     pub(super) fn mesh(&self, stage: &Stage<'_>) -> Mesh {
         let (nx, ny) = (self.grid.x_mm().len(), self.grid.y_mm().len());
         let mut mesh = Mesh::default();
@@ -173,7 +179,7 @@ impl Surface<'_> {
         }
     }
 
-    /// Contour lines and the nodes' border in the strip of cells at `ix`.
+    /// Contour lines in the strip of cells at `ix`.
     fn lines(&self, mesh: &mut Mesh, ix: usize, rows: &[usize], levels: &[f64]) {
         for &iy in rows {
             let corners = self.corners(ix, iy);
@@ -189,39 +195,13 @@ impl Surface<'_> {
                 .color
                 .a()
                 .min(mesh.vertices[corners[2]].color.a());
-            let ink = |opacity_part: f32, value: f64| {
-                contrast(self.colour(value)).gamma_multiply(opacity_part * f32::from(opacity) / 255.0)
-            };
+            let ink =
+                |value: f64| contrast(self.colour(value)).gamma_multiply(CONTOUR_OPACITY * f32::from(opacity) / 255.0);
             for &level in levels.iter().filter(|level| (low..high).contains(level)) {
                 cross_cell(values, level, |ends| {
                     let [from, to] = ends.map(|(a, b, part)| places[a].lerp(places[b], part));
-                    ribbon::line(mesh, from, to, ink(CONTOUR_OPACITY, level));
+                    ribbon::line(mesh, from, to, ink(level));
                 });
-            }
-            let (inside_x, inside_y) = (self.grid.inside_x(), self.grid.inside_y());
-            if inside_y.contains(&iy) && iy < *inside_y.end() {
-                for side in [(ix == *inside_x.start(), 0, 3), (ix + 1 == *inside_x.end(), 1, 2)] {
-                    if side.0 {
-                        ribbon::line(
-                            mesh,
-                            places[side.1],
-                            places[side.2],
-                            ink(BORDER_OPACITY, values[side.1]),
-                        );
-                    }
-                }
-            }
-            if inside_x.contains(&ix) && ix < *inside_x.end() {
-                for side in [(iy == *inside_y.start(), 0, 1), (iy + 1 == *inside_y.end(), 3, 2)] {
-                    if side.0 {
-                        ribbon::line(
-                            mesh,
-                            places[side.1],
-                            places[side.2],
-                            ink(BORDER_OPACITY, values[side.1]),
-                        );
-                    }
-                }
             }
         }
     }

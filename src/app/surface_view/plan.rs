@@ -5,8 +5,8 @@ use glam::DVec2;
 
 use super::edge::{GAP, TICK};
 use super::labels::Labels;
-use super::ticks::{multiples, round_steps, tick_text};
 use crate::app::theme::Theme;
+use crate::app::ticks::{multiples, round_steps, tick_text};
 
 /// A laid-out plan: x to the right, y upwards.
 pub(super) struct PlanAxes {

@@ -3,26 +3,16 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    self, EventFilter, Key, Modifiers, PointerButton, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Tooltip, Ui,
-    Vec2, WidgetInfo,
+    self, EventFilter, Key, Label, Modifiers, PointerButton, Pos2, Rect, RectAlign, Response, RichText, Sense, Stroke,
+    StrokeKind, Tooltip, Ui, Vec2, WidgetInfo,
 };
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use super::axes::SpaceAxes;
 use super::camera::OrbitCamera;
-use super::mesh::{Stage, Surface};
-use super::nodes;
-use super::plan::PlanAxes;
-use super::projection::PlotBox;
-use super::ticks::tick_text;
-use crate::app::theme::{ColourMap, Theme};
+use super::nodes::{self, Dot};
+use crate::app::theme::{ColourMap, Theme, type_size};
+use crate::app::ticks::tick_text;
 use crate::surface::Grid;
-
-/// Room for overshoots of the surface above and below the range, as a part of it.
-const HEADROOM: f64 = 0.08;
-
-/// Room that the labels of a box usually take, in points.
-const LABELS: Vec2 = Vec2::new(72.0, 56.0);
 
 /// What the values mean, and with it their colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,13 +87,26 @@ pub struct SurfaceViewResponse {
 }
 
 impl SurfaceViewResponse {
-    /// Shows a tooltip beside the hovered node, if there is one: `content` gets the node's index.
+    /// Shows a tooltip above the hovered node, if there is one: `content` gets the node's index. Above, because what
+    /// the surface rises to is the node itself; beside it where the window ends.
     pub fn node_tooltip_ui(&self, content: impl FnOnce(&mut Ui, usize)) {
         if let (Some(node), Some(at)) = (self.hovered_node, self.hovered_at) {
             let anchor = Rect::from_center_size(at, Vec2::splat(20.0));
             let (ctx, layer) = (self.response.ctx.clone(), self.response.layer_id);
-            Tooltip::always_open(ctx, layer, self.response.id.with("node"), anchor).show(|ui| content(ui, node));
+            let mut tooltip = Tooltip::always_open(ctx, layer, self.response.id.with("node"), anchor).gap(12.0);
+            let beside = &[RectAlign::RIGHT, RectAlign::LEFT, RectAlign::BOTTOM];
+            tooltip.popup = tooltip.popup.align(RectAlign::TOP).align_alternatives(beside);
+            tooltip.show(|ui| content(ui, node));
         }
+    }
+}
+
+/// Says of nodes beyond the axes that they are drawn at their edge.
+fn beyond_text(dots: &[Option<Dot>]) -> Option<String> {
+    match nodes::beyond(dots) {
+        0 => None,
+        1 => Some("1 node beyond the axes is drawn at their edge".to_owned()),
+        count => Some(format!("{count} nodes beyond the axes are drawn at their edge")),
     }
 }
 
@@ -133,66 +136,26 @@ impl SurfaceView<'_> {
         shown
     }
 
-    fn paint(&self, ui: &Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
+    fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
         let painter = ui.painter_at(rect);
-        let is_usable = self.values_mm.len() == self.grid.len();
-        let range_mm = usable_range(&self.range_mm);
-        let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
-        let ((x0, x1), (y0, y1)) = (ends(self.grid.x_mm()), ends(self.grid.y_mm()));
-        let names = ["x (mm)", "y (mm)", self.colours.title()];
-        let headroom = HEADROOM * (range_mm.end() - range_mm.start());
-        let shown_mm = range_mm.start() - headroom..=range_mm.end() + headroom;
-        let surface = Surface {
-            grid: self.grid,
-            values: self.values_mm,
-            range: &range_mm,
-            shown: shown_mm.clone(),
-            colours: self.colours.map(self.theme),
-        };
-        let draw = |stage: &Stage<'_>, shown: &mut SurfaceViewResponse| {
-            if !is_usable {
-                return;
-            }
-            painter.add(surface.mesh(stage));
-            let dots = nodes::dots(self.nodes_mm, &surface, stage);
-            let is_idle = !shown.response.dragged();
-            let pointer = shown.response.hover_pos().filter(|_| is_idle);
-            shown.hovered_node = pointer.and_then(|pointer| nodes::nearest(&dots, pointer));
-            shown.hovered_at = shown.hovered_node.and_then(|node| nodes::position(&dots, node));
-            nodes::paint(&painter, &dots, shown.hovered_node.or(self.highlight), self.theme);
-        };
-        match self.mode {
-            ViewMode::ThreeD => {
-                let plot_box = PlotBox::new(
-                    DVec3::new(x0, y0, *shown_mm.start()),
-                    DVec3::new(x1, y1, *shown_mm.end()),
-                    (rect.height() - LABELS.y).max(1.0) / (rect.width() - LABELS.x).max(1.0),
-                );
-                let axes = SpaceAxes::new(
-                    &painter,
-                    rect.shrink(8.0),
-                    plot_box,
-                    shown.camera,
-                    &range_mm,
-                    names,
-                    self.theme,
-                );
-                axes.paint(&painter, self.theme);
-                draw(&Stage::Space(&axes.projection), shown);
-            }
-            ViewMode::Top => {
-                let (min_mm, max_mm) = (DVec2::new(x0, y0), DVec2::new(x1, y1));
-                let plan = PlanAxes::new(
-                    &painter,
-                    rect.shrink(8.0),
-                    min_mm,
-                    max_mm,
-                    [names[0], names[1]],
-                    self.theme,
-                );
-                plan.paint(&painter, self.theme);
-                draw(&Stage::Plan(&plan), shown);
-            }
+        let drawing = self.drawing(ui, &painter, rect, shown);
+        drawing.paint(&painter, self.theme);
+        let is_idle = !shown.response.dragged();
+        let pointer = shown.response.hover_pos().filter(|_| is_idle);
+        shown.hovered_node = pointer.and_then(|pointer| nodes::nearest(&drawing.dots, pointer));
+        shown.hovered_at = shown.hovered_node.and_then(|node| nodes::position(&drawing.dots, node));
+        nodes::paint(
+            &painter,
+            &drawing.dots,
+            shown.hovered_node.or(self.highlight),
+            self.theme,
+        );
+        if let Some(note) = beyond_text(&drawing.dots) {
+            // Below the axes, partly in the margin of the card, so that the picture keeps its size.
+            let size = type_size().small;
+            let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
+            let text = RichText::new(note).size(size).color(self.theme.palette.warning);
+            ui.put(line, Label::new(text).truncate());
         }
     }
 
@@ -216,18 +179,6 @@ impl SurfaceView<'_> {
                 "no values".to_owned()
             });
         });
-    }
-}
-
-/// A range that can be divided by, whatever was given.
-fn usable_range(range: &RangeInclusive<f64>) -> RangeInclusive<f64> {
-    let (low, high) = (*range.start(), *range.end());
-    if !(low.is_finite() && high.is_finite()) {
-        0.0..=1.0
-    } else if high - low > 1e-9 * low.abs().max(1e-3) {
-        low..=high
-    } else {
-        low - 0.5..=low + 0.5
     }
 }
 

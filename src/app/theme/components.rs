@@ -1,8 +1,8 @@
 //! The few components that egui lacks, each reachable by its label.
 
 use eframe::egui::{
-    self, Button, Color32, CornerRadius, Frame, Id, Label, Margin, Response, RichText, Stroke, Ui, Widget, WidgetText,
-    vec2,
+    self, Align, Button, Color32, CornerRadius, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea,
+    Stroke, Ui, UiBuilder, Widget, WidgetText, vec2,
 };
 
 use super::Theme;
@@ -22,12 +22,31 @@ pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
     response
 }
 
-/// A card on the background.
-pub fn card_frame(theme: &Theme) -> Frame {
-    Frame::new()
-        .fill(theme.palette.panel)
+/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own beside
+/// them.
+pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
+    let strip = Margin {
+        right: 10,
+        ..Margin::ZERO
+    };
+    ScrollArea::vertical()
+        .id_salt(id)
+        .auto_shrink(false)
+        .show(ui, |ui| Frame::new().inner_margin(strip).show(ui, contents));
+}
+
+/// A card on the background that fills `rect`.
+pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
+    let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
+    card.set_clip_rect(rect.intersect(ui.clip_rect()));
+    let frame = Frame::new()
+        .fill(Theme::of(ui).palette.panel)
         .corner_radius(radius())
-        .inner_margin(Margin::same(12))
+        .inner_margin(Margin::same(12));
+    frame.show(&mut card, |ui| {
+        ui.set_min_size(ui.available_size());
+        contents(ui);
+    });
 }
 
 /// The one button that matters most.
@@ -130,8 +149,21 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
     let mut picked = None;
     let response = ui
         .horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = space(1);
-            for &(tab, text) in reading_order(ui, tabs) {
+            // As wide as when selected, so that no tab moves; nearer to each other where there is little room.
+            let width = |text: &str| {
+                let galley = ui
+                    .painter()
+                    .layout_no_wrap(text.to_owned(), semibold(type_size().body), palette.text);
+                galley.size().x
+            };
+            let widths: Vec<f32> = tabs.iter().map(|(_, text)| width(text)).collect();
+            let spare = ui.available_width() - widths.iter().sum::<f32>();
+            let padding = (0.5 * spare / tabs.len() as f32)
+                .floor()
+                .clamp(space(1), space(2) + 2.0);
+            ui.spacing_mut().item_spacing.x = 0.0;
+            ui.spacing_mut().button_padding.x = padding;
+            for (&(tab, text), width) in tabs.iter().zip(widths) {
                 let is_selected = tab == selected;
                 let colour = if is_selected { palette.text } else { palette.dim };
                 let text = RichText::new(text).color(colour);
@@ -140,17 +172,20 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
                 } else {
                     text
                 };
-                let button = Button::new(text).fill(Color32::TRANSPARENT).stroke(Stroke::NONE);
+                let button = Button::new(text)
+                    .fill(Color32::TRANSPARENT)
+                    .stroke(Stroke::NONE)
+                    .min_size(vec2(width + 2.0 * padding, 0.0));
                 let tab_response = ui.add(button);
                 tab_response.widget_info(|| {
                     egui::WidgetInfo::selected(egui::accesskit::Role::Tab, true, is_selected, tabs_text(tabs, tab))
                 });
                 if is_selected {
-                    let line = tab_response.rect.x_range().shrink(space(2));
+                    let line = tab_response.rect.x_range().shrink(padding);
                     ui.painter()
                         .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.accent));
                 } else if tab_response.hovered() {
-                    let line = tab_response.rect.x_range().shrink(space(2));
+                    let line = tab_response.rect.x_range().shrink(padding);
                     ui.painter()
                         .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.line));
                 }

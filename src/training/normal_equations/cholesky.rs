@@ -1,22 +1,21 @@
 use faer::{
     Accum, MatMut, MatRef, Par,
     dyn_stack::{MemBuffer, MemStack},
-    linalg::{
-        cholesky::llt,
-        matmul::triangular::{self, BlockStructure},
-        triangular_solve::solve_lower_triangular_in_place,
-    },
+    linalg::{cholesky::llt, matmul::matmul, triangular_solve::solve_lower_triangular_in_place},
 };
 
-use crate::training::parallel::{add_product, is_large};
+use crate::training::parallel::{pieces, subtract_square};
 
-/// Columns that are factored together. Smaller matrices are factored whole.
-const PANEL: usize = 256;
+/// Up to this order a matrix is factored whole.
+const LARGEST_WHOLE: usize = 512;
+/// Up to this order a triangular system is solved whole.
+const LARGEST_SOLVED_WHOLE: usize = 128;
 
 /// Room for the Cholesky factorisation of a symmetric matrix, in place, on all threads if it is large.
 ///
-/// Panel by panel: the panel's own block is factored, the rows below are solved against it, and the rest is reduced by
-/// their product, divided by columns (Golub and Van Loan, Matrix Computations, section 4.2.9).
+/// By halves: the first half is factored, the rows below are solved against it, the rest is reduced by their square and
+/// factored in turn. So nearly all of the work is in a few large products (Gustavson 1997, IBM Journal of Research and
+/// Development 41).
 pub(super) struct Cholesky {
     memory: MemBuffer,
 }
@@ -24,7 +23,7 @@ pub(super) struct Cholesky {
 impl Cholesky {
     /// Room for matrices of up to `order` rows.
     pub(super) fn new(order: usize) -> Self {
-        let order = order.min(2 * PANEL);
+        let order = order.min(LARGEST_WHOLE);
         let memory = llt::factor::cholesky_in_place_scratch::<f64>(order, Par::Seq, Default::default());
         Self {
             memory: MemBuffer::new(memory),
@@ -33,22 +32,20 @@ impl Cholesky {
 
     /// Replaces the lower triangle of `matrix` by its Cholesky factor; false if it is not positive definite.
     pub(super) fn factor(&mut self, matrix: MatMut<'_, f64>) -> bool {
-        let mut rest = matrix;
-        while rest.nrows() > 2 * PANEL {
-            let (mut block, _, mut below, mut corner) = rest.split_at_mut(PANEL, PANEL);
-            if !self.factor_block(block.as_mut()) {
-                return false;
-            }
-            solve_rows(block.as_ref(), below.as_mut());
-            subtract_square(corner.as_mut(), below.as_ref());
-            rest = corner;
+        let order = matrix.nrows();
+        if order <= LARGEST_WHOLE {
+            let memory = MemStack::new(&mut self.memory);
+            return llt::factor::cholesky_in_place(matrix, Default::default(), Par::Seq, memory, Default::default())
+                .is_ok();
         }
-        self.factor_block(rest)
-    }
-
-    fn factor_block(&mut self, block: MatMut<'_, f64>) -> bool {
-        let memory = MemStack::new(&mut self.memory);
-        llt::factor::cholesky_in_place(block, Default::default(), Par::Seq, memory, Default::default()).is_ok()
+        let half = half(order);
+        let (mut first, _, mut below, mut corner) = matrix.split_at_mut(half, half);
+        if !self.factor(first.as_mut()) {
+            return false;
+        }
+        solve_rows(first.as_ref(), below.as_mut());
+        subtract_square(corner.as_mut(), below.as_ref());
+        self.factor(corner)
     }
 }
 
@@ -58,37 +55,49 @@ pub(super) fn substitute(factor: MatRef<'_, f64>, right: MatMut<'_, f64>) {
     llt::solve::solve_in_place(factor, right, Par::Seq, MemStack::new(&mut []));
 }
 
-/// Replaces each row r of `rows` by r L⁻ᵀ.
-fn solve_rows(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
+/// Replaces each row r of `rows` by r L⁻ᵀ; rows are divided among the threads if there is enough to do.
+pub(super) fn solve_rows(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
+    let (count, order) = (rows.nrows(), factor.nrows());
+    solve_in_pieces(factor, rows, pieces(count * order * order / 2));
+}
+
+fn solve_in_pieces(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>, pieces: usize) {
     let count = rows.nrows();
-    if count <= PANEL || !is_large(count * factor.nrows() * factor.nrows()) {
-        solve_lower_triangular_in_place(factor, rows.transpose_mut(), Par::Seq);
+    if pieces == 1 || count == 1 {
+        solve_by_halves(factor, rows);
         return;
     }
     let (first, second) = rows.split_at_row_mut(count / 2);
-    rayon::join(|| solve_rows(factor, first), || solve_rows(factor, second));
+    rayon::join(
+        || solve_in_pieces(factor, first, pieces / 2),
+        || solve_in_pieces(factor, second, pieces / 2),
+    );
 }
 
-/// Subtracts F Fᵀ from the lower triangle of `matrix`.
-fn subtract_square(matrix: MatMut<'_, f64>, f: MatRef<'_, f64>) {
-    let order = matrix.nrows();
-    if order <= PANEL {
-        let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-        triangular::matmul(matrix, lower, Accum::Add, f, full, f.transpose(), full, -1.0, Par::Seq);
+fn solve_by_halves(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
+    let order = factor.nrows();
+    if order <= LARGEST_SOLVED_WHOLE {
+        solve_lower_triangular_in_place(factor, rows.transpose_mut(), Par::Seq);
         return;
     }
-    let half = order / 2;
-    let (above, _, below, corner) = matrix.split_at_mut(half, half);
-    let (first, second) = f.split_at_row(half);
-    rayon::join(
-        || subtract_square(above, first),
-        || {
-            rayon::join(
-                || add_product(below, second, first.transpose(), -1.0),
-                || subtract_square(corner, second),
-            )
-        },
+    let half = half(order);
+    let (above, _, below, corner) = factor.split_at(half, half);
+    let (mut first, mut second) = rows.split_at_col_mut(half);
+    solve_by_halves(above, first.as_mut());
+    matmul(
+        second.as_mut(),
+        Accum::Add,
+        first.as_ref(),
+        below.transpose(),
+        -1.0,
+        Par::Seq,
     );
+    solve_by_halves(corner, second);
+}
+
+/// Half of `order`, where the blocks keep whole vector registers.
+fn half(order: usize) -> usize {
+    (order / 2).next_multiple_of(16)
 }
 
 #[cfg(test)]
@@ -99,7 +108,7 @@ mod tests {
 
     #[test]
     fn panels_give_the_factor() {
-        let order = 3 * PANEL + 7;
+        let order = 3 * LARGEST_WHOLE / 2 + 7;
         let entry = |row: usize, column: usize| ((row * 31 + column * 17 + row * column) as f64).sin();
         let root = Mat::from_fn(order, order, entry);
         let matrix = &root * root.transpose() + Mat::<f64>::identity(order, order);
@@ -114,7 +123,7 @@ mod tests {
 
     #[test]
     fn what_is_not_positive_definite_is_refused() {
-        let order = 2 * PANEL + 50;
+        let order = LARGEST_WHOLE + 50;
         let mut matrix = Mat::<f64>::identity(order, order);
         matrix[(order - 3, order - 3)] = -1.0;
         assert!(!Cholesky::new(order).factor(matrix.as_mut()));

@@ -1,9 +1,12 @@
 use faer::MatRef;
 
 use super::{
+    conjugate::{ConjugateGradient, System},
+    cost::{Way, pushing_parts},
+    elimination::{Elimination, output_weights, write_negative},
     output_layer::{OutputLayer, ridge},
     products::Products,
-    schur::{Damping, SchurComplement},
+    schur::SchurComplement,
 };
 use crate::{
     network::{Mlp, Shape},
@@ -11,69 +14,139 @@ use crate::{
 };
 
 /// The normal equations of a network and its examples: evaluated, gathered, and solved for any damping.
-pub struct NormalEquations {
-    shape: Shape,
+pub(in crate::training) struct NormalEquations {
     activations: KeptActivations,
     products: Products,
-    schur: SchurComplement,
+    elimination: Elimination,
+    hidden: HiddenLayer,
     projection: OutputLayer,
+    /// The hidden layer's right-hand side, then its negative step, node by node.
+    right: Vec<f64>,
+}
+
+/// How the equations of the hidden layer are solved.
+enum HiddenLayer {
+    Factored(SchurComplement),
+    Iterated(ConjugateGradient),
 }
 
 impl NormalEquations {
-    /// Room for a network of this shape and these examples.
-    pub fn new(shape: Shape, examples: &Examples) -> Self {
-        Self {
-            shape,
-            activations: KeptActivations::new(shape, examples),
-            products: Products::new(shape, examples),
-            schur: SchurComplement::new(shape),
-            projection: OutputLayer::new(shape),
-        }
+    /// Room for a network of this shape and these examples, solved in the way that is cheaper.
+    pub(in crate::training) fn new(shape: Shape, examples: &Examples) -> Self {
+        Self::solved_by(Way::cheaper(shape, examples.samples()), shape, examples)
     }
 
-    /// About how much memory the equations of a network of this shape take: S, and BᵀB packed.
-    pub fn bytes(shape: Shape) -> usize {
-        let (n1, h, order) = (shape.inputs + 1, shape.hidden, shape.hidden_weights());
-        let gram = (n1 * (n1 + 1) / 2).saturating_mul(h * (h + 1) / 2);
-        order
-            .saturating_mul(order)
-            .saturating_add(gram)
-            .saturating_mul(size_of::<f64>())
+    /// Room for a network of this shape and these examples, solved in the given way. The trace of the inverse needs
+    /// [`Way::Factored`].
+    pub(in crate::training) fn solved_by(way: Way, shape: Shape, examples: &Examples) -> Self {
+        let blocks = examples.blocks().len();
+        let (gathering, pushing) = (way.gathering_parts(shape, blocks), pushing_parts(shape, blocks));
+        let (hidden, parts) = match way {
+            Way::Factored => (HiddenLayer::Factored(SchurComplement::new(shape)), gathering),
+            Way::Iterated => {
+                let conjugate = ConjugateGradient::new(shape, pushing);
+                (HiddenLayer::Iterated(conjugate), gathering.max(pushing))
+            }
+        };
+        Self {
+            activations: KeptActivations::new(shape, examples, parts),
+            products: Products::new(shape, examples, way.gram_part(), gathering),
+            elimination: Elimination::new(shape),
+            hidden,
+            projection: OutputLayer::new(shape, gathering),
+            right: vec![0.0; shape.hidden_weights()],
+        }
     }
 
     /// Mean squared error at the weights of `mlp`. To gather at the same weights next costs no second run of the
     /// network.
-    pub fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
+    pub(in crate::training) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         self.activations.evaluate(mlp, examples) / examples.errors()
     }
 
     /// Gathers all products at the weights of `mlp`.
-    pub fn gather(&mut self, mlp: &Mlp, examples: &Examples) -> Evaluation {
+    pub(in crate::training) fn gather(&mut self, mlp: &Mlp, examples: &Examples) -> Evaluation {
         self.products.gather(mlp, examples, &mut self.activations)
     }
 
     /// Solves for the step at damping `mu` from what was last gathered, at the same `mlp`; writes it in the order of
     /// [`Mlp::weights`]. Returns false, with `step` unspecified, if the damped matrix is not positive definite in
     /// the arithmetic: a larger `mu` is needed.
-    pub fn solve(&mut self, mlp: &Mlp, mu: f64, step: &mut [f64]) -> bool {
-        self.solve_with_decay(mlp, mu, 0.0, step)
+    pub(in crate::training) fn solve(&mut self, mlp: &Mlp, examples: &Examples, mu: f64, step: &mut [f64]) -> bool {
+        self.solve_with_decay(mlp, examples, mu, 0.0, step)
     }
 
     /// As [`Self::solve`] for errors to whose sum of squares `decay`·Σw² is added: solves
     /// `(JᵀJ + damping·I) δ = −(Jᵀe + decay·w)`. The `damping` includes the `decay`.
-    pub fn solve_with_decay(&mut self, mlp: &Mlp, damping: f64, decay: f64, step: &mut [f64]) -> bool {
-        let damping = Damping {
-            hidden: damping,
-            output: damping,
-        };
-        if !self
-            .schur
-            .factor(&self.products, output_weights(self.shape, mlp), damping)
-        {
+    pub(in crate::training) fn solve_with_decay(
+        &mut self,
+        mlp: &Mlp,
+        examples: &Examples,
+        damping: f64,
+        decay: f64,
+        step: &mut [f64],
+    ) -> bool {
+        if !self.elimination.factor(self.products.sums(), damping) {
             return false;
         }
-        self.schur.solve(&self.products, mlp, decay, step);
+        self.elimination
+            .reduce(self.products.sums(), mlp, decay, &mut self.right);
+        if !self.solve_for_hidden(mlp, examples, damping) {
+            return false;
+        }
+        self.elimination
+            .complete(self.products.sums(), mlp, decay, &self.right, step);
         step.iter().all(|value| value.is_finite())
+    }
+
+    /// Solves for the step of the hidden layer alone, the output layer being the best one for it at every point.
+    pub(in crate::training) fn solve_hidden(
+        &mut self,
+        mlp: &Mlp,
+        examples: &Examples,
+        mu: f64,
+        step: &mut [f64],
+    ) -> bool {
+        let sums = self.products.sums();
+        if !self.elimination.factor(sums, ridge(&sums.g)) {
+            return false;
+        }
+        let gradient = sums.gradient_w.col_iter().flat_map(|column| column.iter());
+        self.right
+            .iter_mut()
+            .zip(gradient)
+            .for_each(|(right, gradient)| *right = *gradient);
+        if !self.solve_for_hidden(mlp, examples, mu) {
+            return false;
+        }
+        let shape = mlp.shape();
+        let right = MatRef::from_column_major_slice(&self.right, shape.inputs + 1, shape.hidden);
+        write_negative(right, step);
+        step.iter().all(|value| value.is_finite())
+    }
+
+    /// Replaces the right-hand side of the hidden layer by its solution.
+    fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: f64) -> bool {
+        let (sums, elimination) = (self.products.sums(), &self.elimination);
+        match &mut self.hidden {
+            HiddenLayer::Factored(schur) => {
+                let factored = schur.factor(sums, elimination.f.as_ref(), output_weights(mlp), damping);
+                if factored {
+                    schur.solve(&mut self.right);
+                }
+                factored
+            }
+            HiddenLayer::Iterated(conjugate) => {
+                let system = System {
+                    mlp,
+                    examples,
+                    sums,
+                    elimination,
+                    damping,
+                };
+                conjugate.solve(system, &mut self.activations, &mut self.right)
+            }
+        }
     }
 
     /// Length of Jᵀe + decay·w from what was last gathered.
@@ -88,37 +161,21 @@ impl NormalEquations {
                 .map(|(gradient, weight)| gradient + decay * weight)
                 .fold(0.0, f64::hypot)
         };
-        let w = length(self.products.gradient_w.as_ref(), w);
-        w.hypot(length(self.products.gradient_v.as_ref(), v))
+        let w = length(self.products.sums().gradient_w.as_ref(), w);
+        w.hypot(length(self.products.sums().gradient_v.as_ref(), v))
     }
 
     /// tr (JᵀJ + damping·I)⁻¹ from what was last gathered; `None` if the matrix is not positive definite in the
-    /// arithmetic.
+    /// arithmetic, or was never to be formed.
     pub(in crate::training) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
-        let v = output_weights(self.shape, mlp);
-        let damping = Damping {
-            hidden: damping,
-            output: damping,
+        let HiddenLayer::Factored(schur) = &mut self.hidden else {
+            return None;
         };
-        let factored = self.schur.factor(&self.products, v, damping);
-        let trace = factored.then(|| self.schur.trace_of_inverse(v))?;
+        let (sums, v) = (self.products.sums(), output_weights(mlp));
+        let factored =
+            self.elimination.factor(sums, damping) && schur.factor(sums, self.elimination.f.as_ref(), v, damping);
+        let trace = factored.then(|| schur.trace_of_inverse(&mut self.elimination, v))?;
         trace.is_finite().then_some(trace)
-    }
-
-    /// Solves for the step of the hidden layer alone, the output layer being the best one for it at every point.
-    pub(in crate::training) fn solve_hidden(&mut self, mlp: &Mlp, mu: f64, step: &mut [f64]) -> bool {
-        let damping = Damping {
-            hidden: mu,
-            output: ridge(&self.products.g),
-        };
-        if !self
-            .schur
-            .factor(&self.products, output_weights(self.shape, mlp), damping)
-        {
-            return false;
-        }
-        self.schur.solve_hidden(&self.products, step);
-        step.iter().all(|value| value.is_finite())
     }
 
     /// Gives `mlp` the output layer of least squared error for its hidden layer; false if there is none in the
@@ -126,11 +183,6 @@ impl NormalEquations {
     pub(in crate::training) fn solve_outputs(&mut self, mlp: &mut Mlp, examples: &Examples) -> bool {
         self.projection.solve(mlp, examples, &mut self.activations)
     }
-}
-
-/// V̄: h × outputs.
-fn output_weights(shape: Shape, mlp: &Mlp) -> MatRef<'_, f64> {
-    MatRef::from_row_major_slice(mlp.layers().1, shape.hidden + 1, shape.outputs).subrows(0, shape.hidden)
 }
 
 #[cfg(test)]
@@ -182,28 +234,56 @@ mod tests {
         (0..weights).map(|k| -step[(k, 0)]).collect()
     }
 
+    /// The largest difference of the step, solved in this way, from the dense one, relative to its largest entry.
+    fn distance_from_dense(way: Way, mlp: &Mlp, examples: &Examples, mu: f64) -> f64 {
+        let mut equations = NormalEquations::solved_by(way, mlp.shape(), examples);
+        equations.gather(mlp, examples);
+        // As after a rejected step: another network was evaluated since.
+        equations.mse(&Mlp::zeros(mlp.shape()), examples);
+        let mut step = vec![0.0; mlp.weights().len()];
+        assert!(equations.solve(mlp, examples, mu, &mut step));
+        let dense = dense_step(mlp, examples, mu);
+        let largest = dense.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let differences = step.iter().zip(&dense).map(|(ours, dense)| (ours - dense).abs());
+        differences.fold(0.0, f64::max) / largest
+    }
+
     #[test]
     fn the_step_is_that_of_the_dense_jacobian() {
         for (inputs, hidden, outputs, samples) in [(5, 4, 3, 300), (1, 1, 1, 3), (7, 2, 1, 40), (12, 6, 5, 513)] {
             let mlp = random_mlp(inputs, hidden, outputs, 1);
             let examples = random_examples(samples, inputs, outputs, 2);
-            let mut equations = NormalEquations::new(mlp.shape(), &examples);
-            equations.gather(&mlp, &examples);
             for mu in [1e-3, 1.0, 1e6] {
-                let mut step = vec![0.0; mlp.weights().len()];
-                assert!(equations.solve(&mlp, mu, &mut step));
-                let dense = dense_step(&mlp, &examples, mu);
-                let largest = dense.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-                let error = step
-                    .iter()
-                    .zip(&dense)
-                    .map(|(ours, dense)| (ours - dense).abs())
-                    .fold(0.0, f64::max);
-                assert!(
-                    error < 1e-12 * largest,
-                    "{inputs}-{hidden}-{outputs}, mu {mu}: {error} of {largest}"
-                );
+                for (way, close) in [(Way::Factored, 1e-12), (Way::Iterated, 1e-6)] {
+                    let distance = distance_from_dense(way, &mlp, &examples, mu);
+                    let what = format!("{way:?}, {inputs}-{hidden}-{outputs}, mu {mu}");
+                    assert!(distance < close, "{what}: {distance:e}");
+                }
             }
+        }
+    }
+
+    /// Enough samples that they are divided into parts.
+    #[test]
+    fn parts_of_the_samples_add_up() {
+        let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
+        for way in [Way::Factored, Way::Iterated] {
+            assert!(way.gathering_parts(mlp.shape(), examples.blocks().len()) > 1);
+            let mut equations = NormalEquations::solved_by(way, mlp.shape(), &examples);
+            let expected = crate::training::backpropagation::Backpropagation::new(&mlp).evaluate(&mlp, &examples);
+            let ours = equations.gather(&mlp, &examples);
+            assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-13);
+        }
+        let step = |way| {
+            let mut equations = NormalEquations::solved_by(way, mlp.shape(), &examples);
+            equations.gather(&mlp, &examples);
+            let mut step = vec![0.0; mlp.weights().len()];
+            assert!(equations.solve(&mlp, &examples, 1.0, &mut step));
+            step
+        };
+        let (factored, iterated) = (step(Way::Factored), step(Way::Iterated));
+        for (a, b) in factored.iter().zip(&iterated) {
+            assert!((a - b).abs() < 1e-6 * a.abs().max(1e-3), "{a} {b}");
         }
     }
 
@@ -225,12 +305,14 @@ mod tests {
             outputs: 2,
         });
         let examples = random_examples(2, 3, 2, 5);
-        let mut equations = NormalEquations::new(mlp.shape(), &examples);
-        equations.gather(&mlp, &examples);
-        for mu in [0.0, 1e-300, 1e-3, 1e300] {
-            let mut step = vec![0.0; mlp.weights().len()];
-            if equations.solve(&mlp, mu, &mut step) {
-                assert!(step.iter().all(|value| value.is_finite()), "mu {mu}");
+        for way in [Way::Factored, Way::Iterated] {
+            let mut equations = NormalEquations::solved_by(way, mlp.shape(), &examples);
+            equations.gather(&mlp, &examples);
+            for mu in [0.0, 1e-300, 1e-3, 1e300] {
+                let mut step = vec![0.0; mlp.weights().len()];
+                if equations.solve(&mlp, &examples, mu, &mut step) {
+                    assert!(step.iter().all(|value| value.is_finite()), "{way:?}, mu {mu}");
+                }
             }
         }
     }

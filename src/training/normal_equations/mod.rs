@@ -8,12 +8,19 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
+//! For the usual networks S is formed and factored. Its order is h·n1, so that for wide ones conjugate gradients are
+//! cheaper, to a relative residual of 1e-8, and S is never formed: [`Way`] decides by the number of multiplications.
+//!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
 mod cholesky;
+mod conjugate;
+mod cost;
+mod elimination;
 mod equations;
 mod output_layer;
 mod products;
 mod schur;
 
-pub use equations::NormalEquations;
+pub(super) use cost::Way;
+pub(super) use equations::NormalEquations;

@@ -11,52 +11,63 @@ use crate::{
 /// Solved as a correction of the present V from its errors, G δV = −H̃ᵀE, so that rounding in G is corrected and not
 /// repeated.
 pub(super) struct OutputLayer {
-    g: Mat<f64>,
-    right: Mat<f64>,
+    /// One for each part of the samples; once gathered, the first has the sums of all.
+    parts: Vec<Sums>,
     cholesky: Cholesky,
 }
 
+struct Sums {
+    /// H̃ᵀH̃.
+    g: Mat<f64>,
+    /// H̃ᵀE.
+    right: Mat<f64>,
+}
+
 impl OutputLayer {
-    pub(super) fn new(shape: Shape) -> Self {
+    /// Room for samples in so many `parts`.
+    pub(super) fn new(shape: Shape, parts: usize) -> Self {
         let h1 = shape.hidden + 1;
-        Self {
+        let sums = || Sums {
             g: Mat::zeros(h1, h1),
             right: Mat::zeros(h1, shape.outputs),
+        };
+        Self {
+            parts: (0..parts).map(|_| sums()).collect(),
             cholesky: Cholesky::new(h1),
         }
     }
 
     pub(super) fn solve(&mut self, mlp: &mut Mlp, examples: &Examples, kept: &mut KeptActivations) -> bool {
         kept.evaluate(mlp, examples);
-        self.g.fill(0.0);
-        self.right.fill(0.0);
-        for (index, block) in examples.blocks().iter().enumerate() {
-            let activations = kept.of(index, mlp, block);
-            let hidden = activations.hidden.as_ref().subrows(0, block.samples());
-            let errors = activations.errors.as_ref().subrows(0, block.samples());
-            matmul(self.g.as_mut(), Accum::Add, hidden.transpose(), hidden, 1.0, Par::Seq);
-            matmul(
-                self.right.as_mut(),
-                Accum::Add,
-                hidden.transpose(),
-                errors,
-                1.0,
-                Par::Seq,
-            );
+        for sums in &mut self.parts {
+            sums.g.fill(0.0);
+            sums.right.fill(0.0);
         }
-        let ridge = ridge(&self.g);
-        for node in 0..self.g.nrows() {
-            self.g[(node, node)] += ridge;
+        kept.for_each_block(mlp, examples, &mut self.parts, |sums, now| {
+            let (hidden, errors) = (now.hidden(), now.errors());
+            let (add, alone) = (Accum::Add, Par::Seq);
+            matmul(sums.g.as_mut(), add, hidden.transpose(), hidden, 1.0, alone);
+            matmul(sums.right.as_mut(), add, hidden.transpose(), errors, 1.0, alone);
+        });
+        let (first, others) = self.parts.split_at_mut(1);
+        let Sums { g, right } = &mut first[0];
+        for other in others {
+            *g += &other.g;
+            *right += &other.right;
         }
-        if !self.cholesky.factor(self.g.as_mut()) {
+        let ridge = ridge(g);
+        for node in 0..g.nrows() {
+            g[(node, node)] += ridge;
+        }
+        if !self.cholesky.factor(g.as_mut()) {
             return false;
         }
-        substitute(self.g.as_ref(), self.right.as_mut());
+        substitute(g.as_ref(), right.as_mut());
         let Shape { outputs, .. } = mlp.shape();
         let hidden_weights = mlp.shape().hidden_weights();
         let (_, v) = mlp.weights_mut().split_at_mut(hidden_weights);
         for (index, weight) in v.iter_mut().enumerate() {
-            *weight -= self.right[(index / outputs, index % outputs)];
+            *weight -= right[(index / outputs, index % outputs)];
         }
         v.iter().all(|weight| weight.is_finite())
     }

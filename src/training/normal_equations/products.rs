@@ -1,24 +1,58 @@
-use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+use faer::{
+    Accum, Mat, MatMut, MatRef, Par,
+    linalg::matmul::{
+        matmul,
+        triangular::{self, BlockStructure},
+    },
+};
 
 use crate::{
     network::{Mlp, Shape},
     training::{
         Evaluation, Examples,
-        activations::{Activations, KeptActivations},
+        activations::{BlockNow, KeptActivations},
         elementwise::{multiply, multiply_into, tanh_slopes_into},
-        examples::{BLOCK, Block, column, column_mut},
-        input_pairs::InputPairs,
-        parallel::add_product,
+        examples::{BLOCK, column, column_mut},
+        input_pairs::{InputPairs, PairsRoom},
+        parallel::{add_product, for_each_part},
     },
 };
 
-/// The products from which the equations are made, summed over blocks of samples.
-///
-/// BᵀB is symmetric in the hidden nodes and in the inputs, so it is one product of pairs: (pairs of columns of A)ᵀ ×
-/// (pairs of columns of D).
+/// Columns that are filled at a time, so that they stay in the cache.
+const CHUNK: usize = 512;
+
+/// How much of BᵀB is gathered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum GramPart {
+    /// All of it, packed: pairs of inputs × pairs of hidden nodes, pair (i, j ≤ i) at i(i+1)/2 + j. BᵀB is symmetric in
+    /// both, so it is one product of pairs: (pairs of columns of A)ᵀ × (pairs of columns of D).
+    All,
+    /// The block of each hidden node with itself, the lower triangle: n1 × h·n1.
+    NodeBlocks,
+}
+
+impl GramPart {
+    /// Rows and columns of what is gathered.
+    pub(super) fn size(self, shape: Shape) -> (usize, usize) {
+        let (h, n1) = (shape.hidden, shape.inputs + 1);
+        match self {
+            Self::All => (n1 * (n1 + 1) / 2, h * (h + 1) / 2),
+            Self::NodeBlocks => (n1, h * n1),
+        }
+    }
+}
+
+/// The products from which the equations are made, gathered from the samples.
 pub(super) struct Products {
-    pub(super) shape: Shape,
-    /// BᵀB, packed: pairs of inputs × pairs of hidden nodes, pair (i, j ≤ i) at i(i+1)/2 + j.
+    input_pairs: Option<InputPairs>,
+    /// One for each part of the samples; once gathered, the first has the sums of all.
+    parts: Vec<(Sums, BlockRoom)>,
+}
+
+/// Sums over samples.
+pub(super) struct Sums {
+    shape: Shape,
+    /// As much of BᵀB as [`GramPart`] says.
     pub(super) gram: Mat<f64>,
     /// C: h·n1 × (h+1), column by column without gaps, so that it is also n1 × h(h+1).
     c: Vec<f64>,
@@ -28,36 +62,91 @@ pub(super) struct Products {
     pub(super) gradient_w: Mat<f64>,
     /// Jvᵀe: (h+1) × outputs.
     pub(super) gradient_v: Mat<f64>,
-    input_pairs: InputPairs,
-    room: BlockRoom,
 }
 
 /// Room for one block of samples.
 struct BlockRoom {
-    /// Products of two slopes: block × h(h+1)/2.
-    slope_pairs: Mat<f64>,
-    /// Dᵢ∘H̃_q: block × h(h+1), column q·h + i; the last h columns are D itself.
-    slope_hidden: Mat<f64>,
+    input_pairs: Option<PairsRoom>,
+    /// D: block × h.
+    slopes: Mat<f64>,
+    /// Some columns that enter a product: block × up to [`CHUNK`] or a little more.
+    columns: Mat<f64>,
     /// Error at the hidden nodes' net input: block × h.
     delta: Mat<f64>,
 }
 
+impl BlockRoom {
+    fn new(shape: Shape, input_pairs: Option<&InputPairs>) -> Self {
+        let (h, n1) = (shape.hidden, shape.inputs + 1);
+        Self {
+            input_pairs: input_pairs.map(|pairs| pairs.room(n1)),
+            slopes: Mat::zeros(BLOCK, h),
+            columns: Mat::zeros(BLOCK, (h * (h + 1)).min(CHUNK + h).max(n1)),
+            delta: Mat::zeros(BLOCK, h),
+        }
+    }
+}
+
 impl Products {
-    pub(super) fn new(shape: Shape, examples: &Examples) -> Self {
+    /// Room for samples in so many `parts`.
+    pub(super) fn new(shape: Shape, examples: &Examples, gram_part: GramPart, parts: usize) -> Self {
+        let input_pairs = (gram_part == GramPart::All).then(|| InputPairs::new(examples));
+        let part = |_| {
+            let room = BlockRoom::new(shape, input_pairs.as_ref());
+            (Sums::new(shape, gram_part), room)
+        };
+        Self {
+            parts: (0..parts).map(part).collect(),
+            input_pairs,
+        }
+    }
+
+    /// About how many bytes each part of the samples takes.
+    pub(super) fn bytes(shape: Shape, gram_part: GramPart) -> usize {
+        let (h, n1) = (shape.hidden, shape.inputs + 1);
+        let (rows, columns) = gram_part.size(shape);
+        let pairs = if gram_part == GramPart::All { rows } else { 0 };
+        let room = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + pairs);
+        size_of::<f64>() * (rows * columns + shape.hidden_weights() * (h + 1) + room)
+    }
+
+    /// What was last gathered.
+    pub(super) fn sums(&self) -> &Sums {
+        &self.parts[0].0
+    }
+
+    /// Gathers all products at the weights of `mlp`, block by block of samples.
+    pub(super) fn gather(&mut self, mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) -> Evaluation {
+        let squares = kept.evaluate(mlp, examples);
+        for_each_part(&mut self.parts, |(sums, _)| sums.clear());
+        let input_pairs = self.input_pairs.as_ref();
+        kept.for_each_block(mlp, examples, &mut self.parts, |(sums, room), now| {
+            sums.add_second_order(now, input_pairs, room);
+            sums.add_gradient(now, mlp, room);
+        });
+        if let [(sums, _), others @ ..] = self.parts.as_mut_slice() {
+            others.iter().for_each(|(other, _)| sums.add(other));
+        }
+        let sums = self.sums();
+        let length = sums.gradient_w.squared_norm_l2() + sums.gradient_v.squared_norm_l2();
+        Evaluation {
+            mse: squares / examples.errors(),
+            gradient_norm: 2.0 * length.sqrt() / examples.errors(),
+        }
+    }
+}
+
+impl Sums {
+    fn new(shape: Shape, gram_part: GramPart) -> Self {
         let (h, n1, h1) = (shape.hidden, shape.inputs + 1, shape.hidden + 1);
+        let (rows, columns) = gram_part.size(shape);
         Self {
             shape,
-            gram: Mat::zeros(n1 * (n1 + 1) / 2, h * h1 / 2),
+            gram: Mat::zeros(rows, columns),
             c: vec![0.0; h * n1 * h1],
             g: Mat::zeros(h1, h1),
             gradient_w: Mat::zeros(n1, h),
             gradient_v: Mat::zeros(h1, shape.outputs),
-            input_pairs: InputPairs::new(examples),
-            room: BlockRoom {
-                slope_pairs: Mat::zeros(BLOCK, h * h1 / 2),
-                slope_hidden: Mat::zeros(BLOCK, h * h1),
-                delta: Mat::zeros(BLOCK, h),
-            },
         }
     }
 
@@ -67,83 +156,122 @@ impl Products {
         MatRef::from_column_major_slice(&self.c, self.shape.hidden_weights(), h1)
     }
 
-    /// Gathers all products at the weights of `mlp`, block by block of samples.
-    pub(super) fn gather(&mut self, mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) -> Evaluation {
-        let squares = kept.evaluate(mlp, examples);
-        self.gram.fill(0.0);
+    fn clear(&mut self) {
         self.c.fill(0.0);
-        self.g.fill(0.0);
-        self.gradient_w.fill(0.0);
-        self.gradient_v.fill(0.0);
-        for (index, block) in examples.blocks().iter().enumerate() {
-            let activations = kept.of(index, mlp, block);
-            self.add_second_order(index, block, activations);
-            self.add_gradient(mlp, block, activations);
-        }
-        let length = self.gradient_w.squared_norm_l2() + self.gradient_v.squared_norm_l2();
-        Evaluation {
-            mse: squares / examples.errors(),
-            gradient_norm: 2.0 * length.sqrt() / examples.errors(),
+        for sum in [&mut self.gram, &mut self.g, &mut self.gradient_w, &mut self.gradient_v] {
+            sum.fill(0.0);
         }
     }
 
-    /// Adds one block to BᵀB, C and H̃ᵀH̃.
-    fn add_second_order(&mut self, index: usize, block: &Block, activations: &Activations) {
-        let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
-        let samples = block.samples();
-        let hidden = activations.hidden.as_ref().subrows(0, samples);
-        let mut slope_hidden = self.room.slope_hidden.as_mut().subrows_mut(0, samples);
-        fill_slope_products(hidden, slope_hidden.as_mut());
-        let slope_hidden = slope_hidden.as_ref();
-        let mut slope_pairs = self.room.slope_pairs.as_mut().subrows_mut(0, samples);
-        fill_slope_pairs(slope_hidden.subcols(h * h, h), slope_pairs.as_mut());
-        let input_pairs = self.input_pairs.of(index, block);
-        add_product(self.gram.as_mut(), input_pairs, slope_pairs.as_ref(), 1.0);
-        let c = MatMut::from_column_major_slice_mut(&mut self.c, n1, h * h1);
-        add_product(c, block.inputs.transpose(), slope_hidden, 1.0);
+    /// Adds the sums of another part.
+    fn add(&mut self, other: &Self) {
+        self.c.iter_mut().zip(&other.c).for_each(|(sum, value)| *sum += value);
+        self.gram += &other.gram;
+        self.g += &other.g;
+        self.gradient_w += &other.gradient_w;
+        self.gradient_v += &other.gradient_v;
+    }
+
+    /// Adds a block to BᵀB, C and H̃ᵀH̃; leaves its slopes in their room.
+    fn add_second_order(&mut self, now: &BlockNow<'_>, input_pairs: Option<&InputPairs>, room: &mut BlockRoom) {
+        let h = self.shape.hidden;
+        let (hidden, samples) = (now.hidden(), now.block.samples());
+        let mut slopes = room.slopes.as_mut().subrows_mut(0, samples);
+        for i in 0..h {
+            tanh_slopes_into(column_mut(slopes.as_mut(), i), column(hidden, i));
+        }
+        let slopes = slopes.as_ref();
+        let columns = room.columns.as_mut().subrows_mut(0, samples);
+        match input_pairs.zip(room.input_pairs.as_mut()) {
+            Some((pairs, room)) => self.add_all(pairs.of(now.number, now.block, room), slopes, columns),
+            None => self.add_node_blocks(now.block.inputs.as_ref(), slopes, columns),
+        }
+        let columns = room.columns.as_mut().subrows_mut(0, samples);
+        self.add_c(now.block.inputs.as_ref(), hidden, slopes, columns);
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
     }
 
-    /// Adds one block to Jwᵀe and Jvᵀe; the slopes are still in their room.
-    fn add_gradient(&mut self, mlp: &Mlp, block: &Block, activations: &Activations) {
+    /// Adds to BᵀB by pairs Dᵢ∘Dⱼ.
+    fn add_all(&mut self, input_pairs: MatRef<'_, f64>, slopes: MatRef<'_, f64>, mut columns: MatMut<'_, f64>) {
+        let (mut first, mut filled) = (0, 0);
+        for i in 0..slopes.ncols() {
+            for j in 0..=i {
+                multiply_into(
+                    column_mut(columns.as_mut(), filled + j),
+                    column(slopes, i),
+                    column(slopes, j),
+                );
+            }
+            filled += i + 1;
+            if filled >= CHUNK || i + 1 == slopes.ncols() {
+                let sum = self.gram.as_mut().subcols_mut(first, filled);
+                add_product(sum, input_pairs, columns.as_ref().subcols(0, filled), 1.0);
+                (first, filled) = (first + filled, 0);
+            }
+        }
+    }
+
+    /// Adds to the blocks AᵀDᵢ²A.
+    fn add_node_blocks(&mut self, inputs: MatRef<'_, f64>, slopes: MatRef<'_, f64>, columns: MatMut<'_, f64>) {
+        let n1 = inputs.ncols();
+        let mut weighted = columns.subcols_mut(0, n1);
+        for i in 0..slopes.ncols() {
+            for a in 0..n1 {
+                multiply_into(column_mut(weighted.as_mut(), a), column(slopes, i), column(inputs, a));
+            }
+            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            let sum = self.gram.as_mut().subcols_mut(i * n1, n1);
+            let (left, right) = (weighted.as_ref().transpose(), weighted.as_ref());
+            triangular::matmul(sum, lower, Accum::Add, left, full, right, full, 1.0, Par::Seq);
+        }
+    }
+
+    /// Adds to C by columns Dᵢ∘H̃_q, column q·h + i.
+    fn add_c(
+        &mut self,
+        inputs: MatRef<'_, f64>,
+        hidden: MatRef<'_, f64>,
+        slopes: MatRef<'_, f64>,
+        mut columns: MatMut<'_, f64>,
+    ) {
+        let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
+        let (mut first, mut filled) = (0, 0);
+        for q in 0..h1 {
+            for i in 0..h {
+                multiply_into(
+                    column_mut(columns.as_mut(), filled + i),
+                    column(slopes, i),
+                    column(hidden, q),
+                );
+            }
+            filled += h;
+            if filled >= CHUNK || q == h {
+                let c = MatMut::from_column_major_slice_mut(&mut self.c, n1, h * h1);
+                let sum = c.subcols_mut(first, filled);
+                add_product(sum, inputs.transpose(), columns.as_ref().subcols(0, filled), 1.0);
+                (first, filled) = (first + filled, 0);
+            }
+        }
+    }
+
+    /// Adds a block to Jwᵀe and Jvᵀe; its slopes are still in their room.
+    fn add_gradient(&mut self, now: &BlockNow<'_>, mlp: &Mlp, room: &mut BlockRoom) {
         let Shape { hidden: h, outputs, .. } = self.shape;
-        let samples = block.samples();
+        let (hidden, errors, samples) = (now.hidden(), now.errors(), now.block.samples());
         let v = MatRef::from_row_major_slice(mlp.layers().1, h + 1, outputs);
-        let hidden = activations.hidden.as_ref().subrows(0, samples);
-        let errors = activations.errors.as_ref().subrows(0, samples);
         add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
-        let mut delta = self.room.delta.as_mut().subrows_mut(0, samples);
+        let mut delta = room.delta.as_mut().subrows_mut(0, samples);
         let v_without_bias = v.subrows(0, h).transpose();
         matmul(delta.as_mut(), Accum::Replace, errors, v_without_bias, 1.0, Par::Seq);
-        let slopes = self.room.slope_hidden.as_ref().subrows(0, samples).subcols(h * h, h);
+        let slopes = room.slopes.as_ref().subrows(0, samples);
         for node in 0..h {
             multiply(column_mut(delta.as_mut(), node), column(slopes, node));
         }
-        add_product(self.gradient_w.as_mut(), block.inputs.transpose(), delta.as_ref(), 1.0);
-    }
-}
-
-/// Fills Dᵢ∘H̃_q = (1 − Hᵢ²)∘H̃_q, column q·h + i, from H̃.
-fn fill_slope_products(hidden: MatRef<'_, f64>, products: MatMut<'_, f64>) {
-    let h = hidden.ncols() - 1;
-    let (mut products, mut slopes) = products.split_at_col_mut(h * h);
-    for i in 0..h {
-        tanh_slopes_into(column_mut(slopes.as_mut(), i), column(hidden, i));
-    }
-    for q in 0..h {
-        for i in 0..h {
-            let product = column_mut(products.as_mut(), q * h + i);
-            multiply_into(product, column(slopes.as_ref(), i), column(hidden, q));
-        }
-    }
-}
-
-/// Fills Dᵢ∘Dⱼ, column i(i+1)/2 + j for j ≤ i.
-fn fill_slope_pairs(slopes: MatRef<'_, f64>, mut pairs: MatMut<'_, f64>) {
-    for i in 0..slopes.ncols() {
-        for j in 0..=i {
-            let pair = column_mut(pairs.as_mut(), i * (i + 1) / 2 + j);
-            multiply_into(pair, column(slopes, i), column(slopes, j));
-        }
+        add_product(
+            self.gradient_w.as_mut(),
+            now.block.inputs.transpose(),
+            delta.as_ref(),
+            1.0,
+        );
     }
 }

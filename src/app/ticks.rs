@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 /// Steps of 1, 2 and 5 times a power of ten, ascending from at least `smallest`.
-pub(super) fn round_steps(smallest: f64) -> impl Iterator<Item = f64> {
+pub(crate) fn round_steps(smallest: f64) -> impl Iterator<Item = f64> {
     let decade = smallest.log10().floor() as i32;
     (decade..decade + 20)
         .flat_map(|power| [1.0, 2.0, 5.0].map(|factor| factor * 10_f64.powi(power)))
@@ -11,14 +11,14 @@ pub(super) fn round_steps(smallest: f64) -> impl Iterator<Item = f64> {
 }
 
 /// The multiples of `step` in a range.
-pub(super) fn multiples(range: &RangeInclusive<f64>, step: f64) -> Vec<f64> {
+pub(crate) fn multiples(range: &RangeInclusive<f64>, step: f64) -> Vec<f64> {
     let first = (range.start() / step - 1e-6).ceil() as i64;
     let last = (range.end() / step + 1e-6).floor() as i64;
     (first..=last).map(|multiple| multiple as f64 * step).collect()
 }
 
 /// A round step that divides a range into at most `parts`.
-pub(super) fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
+pub(crate) fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
     let width = range.end() - range.start();
     if width > 0.0 && width.is_finite() {
         round_steps(width / parts as f64).next().unwrap_or(width)
@@ -28,7 +28,7 @@ pub(super) fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
 }
 
 /// A tick's number, with as many decimals as its step needs and a true minus sign.
-pub(super) fn tick_text(value: f64, step: f64) -> String {
+pub(crate) fn tick_text(value: f64, step: f64) -> String {
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
     let value = if value.abs() < 0.5 * 10_f64.powi(-(decimals as i32)) {
         0.0

@@ -1,0 +1,237 @@
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::{
+    arguments::{count, seed},
+    failure::Failure,
+    interruption::Graceful,
+    reproduce_report::{Reproduced, conditions, heading, print_json, print_text},
+};
+use crate::{
+    dataset::{FoldUnit, Seed},
+    evaluation::{
+        MOST_STARTS,
+        experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
+    },
+    export::{
+        WriteError, atomic_write, check_writable, format_duration, write_cells, write_experiment_markdown, write_trials,
+    },
+    network::LARGEST_HIDDEN,
+    sensor::ArrayScale,
+    training::StoppingRules,
+};
+
+/// Redo the paper's tables beside the published figures
+///
+/// Runs every cell with several seeds on all cores and prints the published error beside the median, least and largest
+/// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
+/// finished.
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Reproduce {
+    /// Table to redo
+    #[arg(long, default_value = "all")]
+    table: Tables,
+    /// Seeds in succession for each cell
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
+    seeds: usize,
+    /// First seed
+    #[arg(long, default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Most epochs", |experiment| experiment.base.training.stopping.epochs))]
+    epochs: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Starts of each network; the best by validation error counts", |experiment| experiment.base.starts))]
+    starts: Option<usize>,
+    /// Hidden nodes of Table 1 [default: 6,8,10,12,14,16]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = count(1..=LARGEST_HIDDEN))]
+    hidden: Vec<usize>,
+    /// Array scales of Table 3 [default: 10x6_3x18,10x8_4x24,10x10_5x30]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    arrays: Vec<ArrayScale>,
+    /// What Table 2 deals to folds: samples, as the paper, or whole snapshots, so that nothing of a test sample's
+    /// moment is known
+    #[arg(long, value_enum, default_value = "sample")]
+    folds: Unit,
+    /// Folds of Table 2
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
+    k: usize,
+    /// How often Table 2 deals the folds anew, for each seed
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
+    repeats: usize,
+    /// Folder for CSV and Markdown files of each table; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object instead of text and progress
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Tables {
+    #[value(name = "1")]
+    One,
+    #[value(name = "2")]
+    Two,
+    #[value(name = "3")]
+    Three,
+    All,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Unit {
+    Sample,
+    Snapshot,
+}
+
+/// Help that states the default of each table.
+fn defaults_help(what: &str, value: fn(&Experiment) -> usize) -> String {
+    let of = |table: PaperTable| format!("{} in Table {}", value(&table.experiment()), table.number());
+    let defaults = PaperTable::ALL.map(of).join(", ");
+    format!("{what} [default: {defaults}]")
+}
+
+impl Reproduce {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        let tables = self.tables();
+        let experiments: Vec<Experiment> = tables.iter().map(|&table| self.experiment(table)).collect();
+        experiments.iter().try_for_each(Experiment::check)?;
+        if let Some(folder) = &self.out {
+            prepare_folder(folder, &tables)?;
+        }
+        let begun = Instant::now();
+        let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
+        let trials = results
+            .iter()
+            .flat_map(|results| &results.cells)
+            .map(|cell| cell.expected)
+            .sum();
+        let bar = self.progress_bar(trials);
+        let graceful = Graceful::begin();
+        let mut done = 0;
+        run_experiments(
+            &experiments,
+            worker_threads(false),
+            || graceful.is_end_requested(),
+            |finished| {
+                results[finished.experiment].record(finished.cell, finished.outcome);
+                done = finished.done;
+                bar.set_position(done as u64);
+                if let Some(time) = finished.time_left {
+                    bar.set_message(format!("about {} left", format_duration(time)));
+                }
+            },
+        )?;
+        bar.finish_and_clear();
+        drop(graceful);
+        let reproduced: Vec<Reproduced> = tables
+            .into_iter()
+            .zip(results)
+            .map(|(table, results)| Reproduced {
+                table,
+                verdicts: verdicts(&results),
+                results,
+            })
+            .collect();
+        if let Some(folder) = &self.out {
+            reproduced.iter().try_for_each(|table| write_files(folder, table))?;
+        }
+        if self.json {
+            print_json(&reproduced, begun.elapsed())?;
+        } else {
+            print_text(&reproduced, begun.elapsed())?;
+        }
+        if done < trials {
+            return Err(Failure::InterruptedTrials { done, trials });
+        }
+        Ok(())
+    }
+
+    fn tables(&self) -> Vec<PaperTable> {
+        match self.table {
+            Tables::One => vec![PaperTable::HiddenNodes],
+            Tables::Two => vec![PaperTable::CrossValidation],
+            Tables::Three => vec![PaperTable::ArrayScales],
+            Tables::All => PaperTable::ALL.to_vec(),
+        }
+    }
+
+    fn experiment(&self, table: PaperTable) -> Experiment {
+        let mut experiment = table.experiment();
+        experiment.seeds = self.seeds;
+        experiment.base.seed = Seed(self.seed);
+        if let Some(epochs) = self.epochs {
+            experiment.base.training.stopping.epochs = epochs;
+        }
+        if let Some(starts) = self.starts {
+            experiment.base.starts = starts;
+        }
+        match &mut experiment.axis {
+            Axis::Hidden(hidden) if !self.hidden.is_empty() => hidden.clone_from(&self.hidden),
+            Axis::Array(arrays) if !self.arrays.is_empty() => arrays.clone_from(&self.arrays),
+            _ => {}
+        }
+        if let Some(cross_validation) = &mut experiment.cross_validation {
+            cross_validation.folds = self.k;
+            cross_validation.repeats = self.repeats;
+            cross_validation.unit = match self.folds {
+                Unit::Sample => FoldUnit::Sample,
+                Unit::Snapshot => FoldUnit::Snapshot,
+            };
+        }
+        experiment
+    }
+
+    fn progress_bar(&self, trials: usize) -> ProgressBar {
+        if self.json {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(trials as u64);
+        let style = ProgressStyle::with_template("{bar:30} {pos} of {len} trials, {elapsed} gone, {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_message("the time left is not known yet");
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}
+
+/// The files of a table: its cells, every trial, and all of it for reading.
+fn files(folder: &Path, table: PaperTable) -> [PathBuf; 3] {
+    let number = table.number();
+    [
+        format!("table_{number}.csv"),
+        format!("table_{number}_trials.csv"),
+        format!("table_{number}.md"),
+    ]
+    .map(|name| folder.join(name))
+}
+
+/// Makes the folder and sees that everything can be written, before the work.
+fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let paths = tables.iter().flat_map(|&table| files(folder, table));
+    Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
+}
+
+fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), WriteError> {
+    let Reproduced {
+        table,
+        results,
+        verdicts,
+    } = reproduced;
+    let [cells, trials, markdown] = files(folder, *table);
+    atomic_write(&cells, |writer| write_cells(results, writer))?;
+    atomic_write(&trials, |writer| write_trials(results, writer))?;
+    atomic_write(&markdown, |writer| {
+        let (title, conditions) = (heading(*table), conditions(&results.experiment));
+        write_experiment_markdown(&title, &conditions, results, verdicts, writer)
+    })
+}

@@ -1,0 +1,188 @@
+use std::{
+    io::{self, Write, stdout},
+    time::Duration,
+};
+
+use serde::Serialize;
+
+use super::failure::Failure;
+use crate::{
+    evaluation::experiments::{Axis, CellSummary, CrossValidation, Experiment, ExperimentResults, PaperTable, Verdict},
+    export::{ExperimentTable, format_duration},
+    network::HiddenSuggestions,
+    sensor::Geometry,
+};
+
+/// A table of the paper, redone.
+pub(super) struct Reproduced {
+    pub(super) table: PaperTable,
+    pub(super) results: ExperimentResults,
+    pub(super) verdicts: Vec<Verdict>,
+}
+
+/// What `reproduce --json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    seconds: f64,
+    is_complete: bool,
+    tables: Vec<TableReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct TableReport<'a> {
+    table: u8,
+    title: &'static str,
+    conditions: String,
+    seeds: usize,
+    cross_validation: Option<CrossValidation>,
+    is_complete: bool,
+    cells: Vec<CellSummary>,
+    failures: Vec<String>,
+    verdicts: &'a [Verdict],
+}
+
+/// Prints one JSON object.
+pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
+    let table = |reproduced| {
+        let Reproduced {
+            table,
+            results,
+            verdicts,
+        }: &Reproduced = reproduced;
+        TableReport {
+            table: table.number(),
+            title: table.title(),
+            conditions: conditions(&results.experiment),
+            seeds: results.experiment.seeds,
+            cross_validation: results.experiment.cross_validation,
+            is_complete: results.is_complete(),
+            cells: results.summaries(),
+            failures: failures(results),
+            verdicts,
+        }
+    };
+    let report = Report {
+        seconds: took.as_secs_f64(),
+        is_complete: reproduced.iter().all(|table| table.results.is_complete()),
+        tables: reproduced.iter().map(table).collect(),
+    };
+    let mut output = stdout().lock();
+    let written = serde_json::to_writer(&mut output, &report)
+        .map_err(io::Error::from)
+        .and_then(|()| writeln!(output));
+    written.map_err(Failure::Output)
+}
+
+/// Prints each table with its conditions and verdicts.
+pub(super) fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
+    write_text(reproduced, took, &mut stdout().lock()).map_err(Failure::Output)
+}
+
+fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -> io::Result<()> {
+    for Reproduced {
+        table,
+        results,
+        verdicts,
+    } in reproduced
+    {
+        writeln!(out, "{}\n{}\n", heading(*table), conditions(&results.experiment))?;
+        write_aligned(&ExperimentTable::new(results), out)?;
+        writeln!(out)?;
+        for Verdict {
+            claim,
+            standing,
+            finding,
+        } in verdicts
+        {
+            writeln!(out, "{claim}: {standing}. {finding}")?;
+        }
+        for failure in failures(results) {
+            writeln!(out, "{failure}")?;
+        }
+        writeln!(out)?;
+    }
+    writeln!(out, "{}", ExperimentTable::NOTE)?;
+    writeln!(out, "{}", Geometry::ASSUMPTION)?;
+    writeln!(out, "Took {}", format_duration(took))
+}
+
+fn write_aligned(table: &ExperimentTable, out: &mut impl Write) -> io::Result<()> {
+    let width = |column: usize, heading: &str| {
+        let cells = table.rows.iter().map(|row| row[column].chars().count());
+        cells.max().unwrap_or(0).max(heading.chars().count())
+    };
+    let widths: Vec<_> = table
+        .headings
+        .iter()
+        .enumerate()
+        .map(|(column, heading)| width(column, heading))
+        .collect();
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        let padded = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
+        padded.collect::<Vec<_>>().join("  ")
+    };
+    writeln!(out, "{}", line(&mut table.headings.iter().copied()))?;
+    for row in &table.rows {
+        writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
+    }
+    Ok(())
+}
+
+/// The title of a table.
+pub(super) fn heading(table: PaperTable) -> String {
+    format!("Table {}: {}", table.number(), table.title())
+}
+
+/// How an experiment is carried out, for its reader.
+pub(super) fn conditions(experiment: &Experiment) -> String {
+    let base = &experiment.base;
+    let mut said = vec![base.training.method.name().to_owned()];
+    if !matches!(experiment.axis, Axis::Array(_)) {
+        said.push(base.sensor.scale.to_string());
+    }
+    if !matches!(experiment.axis, Axis::Hidden(_)) {
+        said.push(format!("{} hidden nodes", base.hidden));
+    }
+    said.push(format!("{} epochs", base.training.stopping.epochs));
+    said.push(match base.starts {
+        1 => "one start".to_owned(),
+        starts => format!("best of {starts} starts by validation error"),
+    });
+    said.push(match experiment.seeds {
+        1 => format!("seed {}", base.seed),
+        seeds => format!("{seeds} seeds from {}", base.seed),
+    });
+    said.push(match experiment.cross_validation {
+        None => format!(
+            "{} training samples, {} more for validation, {} for test",
+            base.samples, base.validation_samples, base.test_samples
+        ),
+        Some(CrossValidation { folds, repeats, unit }) => {
+            let validation = match folds {
+                2 => "nothing held out for validation",
+                _ => "of the folds not tested one is held out for validation",
+            };
+            format!("{folds} folds by {unit}, {validation}, {repeats} repeats")
+        }
+    });
+    let mut conditions = said.join(", ");
+    if matches!(experiment.axis, Axis::Hidden(_)) {
+        let scale = base.sensor.scale;
+        let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
+        let (root, logarithm) = (suggested.square_root, suggested.logarithm);
+        let (fewest, most) = (root.start(), root.end());
+        conditions += &format!(". Eq. (12) suggests {fewest} to {most} hidden nodes, Eq. (13) {logarithm}");
+    }
+    conditions
+}
+
+/// What could not be carried out, a sentence each.
+fn failures(results: &ExperimentResults) -> Vec<String> {
+    let of_cell = |cell| {
+        let label = results.cell_labels(cell).join(", ");
+        cell.failures
+            .iter()
+            .map(move |failure| format!("Failed at {label}, {failure}"))
+    };
+    results.cells.iter().flat_map(of_cell).collect()
+}

@@ -1,0 +1,183 @@
+use std::fmt;
+
+use rand::{Rng, seq::SliceRandom};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Dataset;
+
+/// What is dealt to the folds of a cross-validation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FoldUnit {
+    /// Single samples, as the paper does. Rows of one snapshot then stand on both sides.
+    #[default]
+    Sample,
+    /// Whole snapshots, so that no test sample shares its moment with a training sample.
+    Snapshot,
+}
+
+impl fmt::Display for FoldUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Sample => "sample",
+            Self::Snapshot => "snapshot",
+        })
+    }
+}
+
+/// The k subsets of a k-fold cross-validation: every sample is in exactly one. Their sizes differ by at most one
+/// sample (or snapshot).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folds {
+    /// The samples of each fold, in ascending order.
+    folds: Vec<Vec<usize>>,
+}
+
+/// A number of folds that the set cannot be divided into.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
+pub struct FoldsError {
+    /// Folds asked for.
+    pub folds: usize,
+    /// What there is to deal.
+    pub units: usize,
+    /// Of what kind.
+    pub unit: FoldUnit,
+}
+
+impl Folds {
+    /// Deals the samples of `set` to `folds` subsets at random.
+    ///
+    /// # Errors
+    /// Fewer than two folds, or more than there are units.
+    pub fn deal(set: &Dataset, folds: usize, unit: FoldUnit, rng: &mut impl Rng) -> Result<Self, FoldsError> {
+        let samples_per_unit = match unit {
+            FoldUnit::Sample => 1,
+            FoldUnit::Snapshot => set.rows(),
+        };
+        let units = set.samples() / samples_per_unit;
+        if !(2..=units).contains(&folds) {
+            return Err(FoldsError { folds, units, unit });
+        }
+        let mut order: Vec<usize> = (0..units).collect();
+        order.shuffle(rng);
+        let deal = |fold: usize| {
+            let mut dealt: Vec<usize> = order.iter().copied().skip(fold).step_by(folds).collect();
+            dealt.sort_unstable();
+            let samples = dealt
+                .iter()
+                .flat_map(|unit| unit * samples_per_unit..(unit + 1) * samples_per_unit);
+            samples.collect()
+        };
+        Ok(Self {
+            folds: (0..folds).map(deal).collect(),
+        })
+    }
+
+    /// k, the number of folds.
+    pub fn count(&self) -> usize {
+        self.folds.len()
+    }
+
+    /// The samples that fold `fold` is tested on.
+    pub fn test(&self, fold: usize) -> &[usize] {
+        &self.folds[fold]
+    }
+
+    /// The samples of all folds but those named, in ascending order.
+    pub fn without(&self, folds: &[usize]) -> Vec<usize> {
+        let kept = self.folds.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
+        let mut samples: Vec<usize> = kept.flat_map(|(_, samples)| samples).copied().collect();
+        samples.sort_unstable();
+        samples
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    fn set(samples: usize) -> Dataset {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap()
+    }
+
+    fn deal(set: &Dataset, folds: usize, unit: FoldUnit, seed: u64) -> Folds {
+        Folds::deal(set, folds, unit, &mut Seed(seed).rng(Stream::Split)).unwrap()
+    }
+
+    #[test]
+    fn every_sample_is_in_exactly_one_test_fold_and_never_in_its_own_training() {
+        let set = set(130);
+        for (folds, unit) in [
+            (10, FoldUnit::Sample),
+            (7, FoldUnit::Sample),
+            (4, FoldUnit::Snapshot),
+            (13, FoldUnit::Snapshot),
+        ] {
+            let dealt = deal(&set, folds, unit, 1);
+            let mut tested = vec![0; set.samples()];
+            for fold in 0..dealt.count() {
+                let training = dealt.without(&[fold]);
+                for &sample in dealt.test(fold) {
+                    tested[sample] += 1;
+                    assert!(!training.contains(&sample));
+                }
+                assert_eq!(training.len() + dealt.test(fold).len(), set.samples());
+            }
+            assert!(tested.iter().all(|&times| times == 1), "{folds} folds by {unit}");
+            let sizes = (0..folds).map(|fold| dealt.test(fold).len());
+            let unit_size = if unit == FoldUnit::Sample { 1 } else { 10 };
+            assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= unit_size);
+        }
+    }
+
+    #[test]
+    fn folds_by_snapshot_never_split_one() {
+        let set = set(130);
+        let dealt = deal(&set, 5, FoldUnit::Snapshot, 2);
+        for fold in 0..5 {
+            for snapshot in dealt.test(fold).chunks(10) {
+                assert_eq!(snapshot[0] % 10, 0);
+                assert!(snapshot.windows(2).all(|pair| pair[0] + 1 == pair[1]));
+            }
+        }
+        let by_sample = deal(&set, 5, FoldUnit::Sample, 2);
+        let splits = |samples: &[usize]| {
+            samples
+                .iter()
+                .any(|sample| sample % 10 != 0 && !samples.contains(&(sample - 1)))
+        };
+        assert!(splits(by_sample.test(0)), "folds by sample do split snapshots");
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_folds_and_another_gives_others() {
+        let set = set(100);
+        for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+            assert_eq!(deal(&set, 5, unit, 3), deal(&set, 5, unit, 3));
+            assert_ne!(deal(&set, 5, unit, 3), deal(&set, 5, unit, 4));
+        }
+    }
+
+    #[test]
+    fn folds_that_cannot_be_filled_are_refused() {
+        let set = set(100);
+        for (folds, unit) in [
+            (0, FoldUnit::Sample),
+            (1, FoldUnit::Sample),
+            (101, FoldUnit::Sample),
+            (11, FoldUnit::Snapshot),
+        ] {
+            let error = Folds::deal(&set, folds, unit, &mut Seed(0).rng(Stream::Split)).unwrap_err();
+            assert!(error.to_string().contains(&folds.to_string()), "{error}");
+        }
+        assert_eq!(deal(&set, 100, FoldUnit::Sample, 0).test(0).len(), 1);
+    }
+}

@@ -1,0 +1,108 @@
+use faer::Mat;
+use ndarray::{Array1, Array2, ArrayView2, Axis};
+
+use crate::network::{MinMax, ScalingError};
+
+/// What a hidden layer of h nodes can carry at most, whatever its inputs, weights and training.
+///
+/// The output is an affine function of h hidden values, so its deviations from their mean span at most h directions.
+/// Among all such answers the projection of the true targets on their first h principal components has the least mean
+/// squared error (Eckart and Young, 1936). It holds for the scaled targets that it was fitted to, the training set's;
+/// other sets are projected on the same components.
+#[derive(Clone, Debug)]
+pub struct Bottleneck {
+    outputs: MinMax,
+    mean: Array1<f64>,
+    /// Varying outputs × components kept, orthonormal.
+    components: Array2<f64>,
+    least_mse: f64,
+}
+
+impl Bottleneck {
+    /// Fits the components of `coordinates_mm` (samples × 3·M2) for `hidden` nodes.
+    ///
+    /// # Errors
+    /// Coordinates that cannot be scaled.
+    pub fn fit(coordinates_mm: ArrayView2<'_, f64>, hidden: usize) -> Result<Self, ScalingError> {
+        // How faer divides a decomposition depends on the number of threads, and with it the last bits.
+        faer::set_global_parallelism(faer::Par::Seq);
+        let outputs = MinMax::fit(coordinates_mm)?;
+        let targets = outputs.scale(coordinates_mm);
+        let (samples, channels) = targets.dim();
+        let mean = targets.mean_axis(Axis(0)).ok_or(ScalingError::Empty)?;
+        let deviations = Mat::from_fn(samples, channels, |s, t| targets[[s, t]] - mean[t]);
+        let kept = hidden.min(samples).min(channels);
+        // Finite values always converge; no component, which bounds nothing from below, is the answer if they ever do
+        // not.
+        let (components, left_out) = match deviations.thin_svd() {
+            Ok(svd) => {
+                let components = Array2::from_shape_fn((channels, kept), |(t, k)| svd.V()[(t, k)]);
+                let singular = svd.S().column_vector();
+                (components, singular.iter().skip(kept).map(|value| value * value).sum())
+            }
+            Err(_) => (Array2::eye(channels), 0.0),
+        };
+        Ok(Self {
+            outputs,
+            mean,
+            components,
+            least_mse: left_out / (samples * channels).max(1) as f64,
+        })
+    }
+
+    /// The mean squared error, scaled, that no network with so few hidden nodes gets below on the set it was fitted
+    /// to.
+    pub fn least_mse(&self) -> f64 {
+        self.least_mse
+    }
+
+    /// The best that can be answered where `coordinates_mm` (samples × 3·M2) are true, in millimetres.
+    pub fn reconstruct(&self, coordinates_mm: ArrayView2<'_, f64>) -> Array2<f64> {
+        let deviations = self.outputs.scale(coordinates_mm) - &self.mean;
+        let projected = deviations.dot(&self.components).dot(&self.components.t()) + &self.mean;
+        self.outputs.restore(projected.view())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    /// Corners of a cube: every direction varies equally, and min-max scaling leaves them as they are.
+    fn cube() -> Array2<f64> {
+        Array2::from_shape_fn(
+            (8, 3),
+            |(corner, axis)| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 },
+        )
+    }
+
+    #[test]
+    fn where_all_directions_vary_alike_each_hidden_node_carries_its_share() {
+        for hidden in 0..=4 {
+            let bottleneck = Bottleneck::fit(cube().view(), hidden).unwrap();
+            let expected = 1.0 - hidden.min(3) as f64 / 3.0;
+            assert!((bottleneck.least_mse() - expected).abs() < 1e-12, "{hidden} hidden");
+            let reconstructed = bottleneck.reconstruct(cube().view());
+            let mse = (reconstructed - cube()).mapv(|error| error * error).mean().unwrap();
+            assert!((mse - expected).abs() < 1e-12, "{hidden} hidden");
+        }
+    }
+
+    #[test]
+    fn channels_that_vary_together_need_one_node() {
+        let line = array![[0.0, 5.0, 2.0], [1.0, 5.0, 4.0], [3.0, 5.0, 8.0]];
+        let bottleneck = Bottleneck::fit(line.view(), 1).unwrap();
+        assert!(bottleneck.least_mse() < 1e-30);
+        let difference = bottleneck.reconstruct(line.view()) - line;
+        assert!(difference.iter().all(|error| error.abs() < 1e-14));
+    }
+
+    #[test]
+    fn nothing_that_varies_needs_nothing() {
+        let bottleneck = Bottleneck::fit(array![[1.0, 2.0], [1.0, 2.0]].view(), 3).unwrap();
+        assert_eq!(bottleneck.least_mse(), 0.0);
+        assert_eq!(bottleneck.reconstruct(array![[1.0, 2.0]].view()), array![[1.0, 2.0]]);
+    }
+}

@@ -1,0 +1,358 @@
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Axis;
+use crate::{
+    dataset::{FoldUnit, FoldsError, Seed},
+    evaluation::{CountError, PublishedErrors, RunSettings},
+    sensor::ArrayScale,
+    training::{SettingError, StoppingRules},
+};
+
+/// A grid of cells over one or two axes, each cell tried with several seeds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// What all cells share; its seed is the first of [`Self::seeds`].
+    pub base: RunSettings,
+    /// What is varied.
+    pub axis: Axis,
+    /// What else is varied.
+    pub second_axis: Option<Axis>,
+    /// How many seeds in succession each cell is tried with; 1 where the seed is an axis.
+    pub seeds: usize,
+    /// Test by cross-validation, instead of on samples drawn for the test.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+/// A k-fold cross-validation, repeated with the samples dealt anew.
+///
+/// Fold by fold, the network is tested on the fold, the next fold chooses the best weights and ends the training, and
+/// the others are fitted. With two folds none is left to choose by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrossValidation {
+    /// k.
+    pub folds: usize,
+    /// How often the samples are dealt anew.
+    pub repeats: usize,
+    /// What is dealt.
+    pub unit: FoldUnit,
+}
+
+impl Default for CrossValidation {
+    /// As the paper: 10 folds of samples, 10 repeats.
+    fn default() -> Self {
+        Self {
+            folds: 10,
+            repeats: 10,
+            unit: FoldUnit::Sample,
+        }
+    }
+}
+
+/// A place in the grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Index of its value on the first axis.
+    pub column: usize,
+    /// Index of its value on the second axis; 0 if there is none.
+    pub row: usize,
+    /// What is run there, with the first seed.
+    pub settings: RunSettings,
+    /// What the paper reports for it, if it does.
+    pub published: Option<PublishedErrors>,
+}
+
+/// Why an experiment cannot be run.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ExperimentError {
+    /// An axis has no values.
+    #[error("there are no values for {0}: give at least one")]
+    Empty(&'static str),
+    /// Both axes vary the same.
+    #[error("both axes vary {0}: choose two different ones")]
+    SameAxes(&'static str),
+    /// A number out of range.
+    #[error(transparent)]
+    Count(#[from] CountError),
+    /// A setting of the method out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// Folds that cannot be filled.
+    #[error(transparent)]
+    Folds(#[from] FoldsError),
+    /// More trainings than anybody waits for.
+    #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MOST_TRAININGS}")]
+    TooMany(usize),
+    /// The system gives no threads.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
+}
+
+/// The most trainings of one experiment.
+const MOST_TRAININGS: usize = 1_000_000;
+
+/// The most seeds, starts or repeats.
+const MOST_TRIALS: usize = 1000;
+
+impl Experiment {
+    /// Its cells, row by row; at least one if [`Self::check`] finds nothing wrong.
+    pub fn cells(&self) -> Vec<Cell> {
+        let rows = self.second_axis.as_ref().map_or(1, Axis::len);
+        let places = (0..rows).flat_map(|row| (0..self.axis.len()).map(move |column| (row, column)));
+        places.map(|(row, column)| self.cell(row, column)).collect()
+    }
+
+    fn cell(&self, row: usize, column: usize) -> Cell {
+        let mut settings = self.base;
+        self.axis.apply(column, &mut settings);
+        if let Some(axis) = &self.second_axis {
+            axis.apply(row, &mut settings);
+        }
+        let published = match self.cross_validation {
+            None => PublishedErrors::of,
+            Some(_) => PublishedErrors::of_cross_validation,
+        };
+        let published = published(settings.sensor.scale, settings.hidden, settings.samples);
+        Cell {
+            column,
+            row,
+            settings,
+            published,
+        }
+    }
+
+    /// The axes: one or two.
+    pub fn axes(&self) -> impl Iterator<Item = &Axis> {
+        std::iter::once(&self.axis).chain(&self.second_axis)
+    }
+
+    /// The seeds that the cell with these settings is tried with.
+    pub(super) fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
+        let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
+            1
+        } else {
+            self.seeds
+        };
+        let first = settings.seed.0;
+        (0..seeds as u64).map(move |offset| Seed(first.wrapping_add(offset)))
+    }
+
+    /// How often each seed is tried.
+    pub(super) fn repeats(&self) -> usize {
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.repeats)
+    }
+
+    /// Networks that each trial trains, each from as many starts as the settings say.
+    pub(super) fn folds(&self) -> usize {
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.folds)
+    }
+
+    /// Checks everything that can be known before a sample is drawn.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), ExperimentError> {
+        if let Some(empty) = self.axes().find(|axis| axis.is_empty()) {
+            return Err(ExperimentError::Empty(empty.name()));
+        }
+        if self
+            .second_axis
+            .as_ref()
+            .is_some_and(|second| second.is_same_kind(&self.axis))
+        {
+            return Err(ExperimentError::SameAxes(self.axis.name()));
+        }
+        for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
+            let allowed = 1..=MOST_TRIALS;
+            if !allowed.contains(&count) {
+                return Err(CountError { what, count, allowed }.into());
+            }
+        }
+        let cells = self
+            .axes()
+            .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
+        let factors = [self.seeds, self.repeats(), self.folds(), self.base.starts];
+        let trainings = factors.into_iter().fold(cells, usize::saturating_mul);
+        if trainings > MOST_TRAININGS {
+            return Err(ExperimentError::TooMany(trainings));
+        }
+        for cell in self.cells() {
+            self.check_cell(&cell.settings)?;
+        }
+        Ok(())
+    }
+
+    fn check_cell(&self, settings: &RunSettings) -> Result<(), ExperimentError> {
+        settings.check_counts()?;
+        settings.training.check()?;
+        let Some(CrossValidation { folds, unit, .. }) = self.cross_validation else {
+            return Ok(());
+        };
+        let rows = settings.sensor.scale.rows();
+        let snapshots = settings.samples.div_ceil(rows);
+        let units = match unit {
+            FoldUnit::Sample => snapshots * rows,
+            FoldUnit::Snapshot => snapshots,
+        };
+        if (2..=units).contains(&folds) {
+            Ok(())
+        } else {
+            Err(FoldsError { folds, units, unit }.into())
+        }
+    }
+}
+
+/// The tables of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PaperTable {
+    /// Table 1: different numbers of hidden nodes.
+    HiddenNodes,
+    /// Table 2 and Fig. 5: 10-fold cross-validation of a large and a small dataset.
+    CrossValidation,
+    /// Table 3: different array scales.
+    ArrayScales,
+}
+
+impl PaperTable {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 3] = [Self::HiddenNodes, Self::CrossValidation, Self::ArrayScales];
+
+    /// Its number in the paper.
+    pub fn number(self) -> u8 {
+        match self {
+            Self::HiddenNodes => 1,
+            Self::CrossValidation => 2,
+            Self::ArrayScales => 3,
+        }
+    }
+
+    /// What it shows.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::HiddenNodes => "Errors with different numbers of hidden nodes",
+            Self::CrossValidation => "Errors by cross-validation of a large and a small dataset",
+            Self::ArrayScales => "Errors with different array scales",
+        }
+    }
+
+    /// The experiment that redoes it. The paper does not say how long it trained: epochs and starts are those that
+    /// redo all tables in about a minute on two cores. All epochs are run; the validation set only chooses the weights.
+    pub fn experiment(self) -> Experiment {
+        let with = |axis, epochs, starts, cross_validation| {
+            let mut base = RunSettings::default();
+            base.training.stopping.epochs = epochs;
+            base.training.stopping.max_fail = StoppingRules::MOST_EPOCHS;
+            base.starts = starts;
+            Experiment {
+                base,
+                axis,
+                second_axis: None,
+                seeds: 5,
+                cross_validation,
+            }
+        };
+        match self {
+            Self::HiddenNodes => with(Axis::Hidden(vec![6, 8, 10, 12, 14, 16]), 300, 3, None),
+            Self::CrossValidation => {
+                let sizes = Axis::Samples(vec![1000, 100]);
+                with(sizes, 80, 1, Some(CrossValidation::default()))
+            }
+            Self::ArrayScales => with(Axis::Array(ArrayScale::PRESETS.to_vec()), 300, 3, None),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::Method;
+
+    #[test]
+    fn the_papers_tables_meet_all_published_figures() {
+        let mut published = 0;
+        for table in PaperTable::ALL {
+            let experiment = table.experiment();
+            experiment.check().unwrap();
+            for cell in experiment.cells() {
+                published += usize::from(cell.published.is_some());
+                assert_eq!(
+                    cell.published.unwrap().table == 2,
+                    table == PaperTable::CrossValidation,
+                    "{cell:?}"
+                );
+            }
+        }
+        assert_eq!(published, 11);
+    }
+
+    #[test]
+    fn cells_are_the_product_of_the_axes() {
+        let experiment = Experiment {
+            second_axis: Some(Axis::Method(Method::all()[..2].to_vec())),
+            ..PaperTable::ArrayScales.experiment()
+        };
+        let cells = experiment.cells();
+        assert_eq!(cells.len(), 6);
+        for (index, cell) in cells.iter().enumerate() {
+            assert_eq!((cell.row, cell.column), (index / 3, index % 3));
+            assert_eq!(cell.settings.sensor.scale, ArrayScale::PRESETS[cell.column]);
+            assert_eq!(cell.settings.training.method, Method::all()[cell.row]);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_named_before_anything_is() {
+        let table = |change: fn(&mut Experiment)| {
+            let mut experiment = PaperTable::CrossValidation.experiment();
+            change(&mut experiment);
+            experiment.check().unwrap_err().to_string()
+        };
+        let cases = [
+            (table(|e| e.axis = Axis::Hidden(vec![])), "no values for hidden nodes"),
+            (table(|e| e.axis = Axis::Hidden(vec![6, 0])), "hidden nodes: 0"),
+            (
+                table(|e| e.second_axis = Some(Axis::Samples(vec![10]))),
+                "both axes vary samples",
+            ),
+            (table(|e| e.seeds = 0), "seeds: 0"),
+            (table(|e| e.base.starts = 0), "starts: 0"),
+            (table(|e| e.base.training.stopping.epochs = 0), "epochs"),
+            (
+                table(|e| {
+                    e.cross_validation = Some(CrossValidation {
+                        folds: 11,
+                        unit: FoldUnit::Snapshot,
+                        repeats: 1,
+                    });
+                }),
+                "11 folds of 10 snapshots",
+            ),
+            (
+                table(|e| {
+                    e.axis = Axis::Hidden((1..=500).collect());
+                    e.seeds = 1000;
+                }),
+                "50000000 trainings",
+            ),
+        ];
+        for (message, expected) in cases {
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_seed_axis_takes_the_place_of_the_seeds() {
+        let experiment = Experiment {
+            axis: Axis::Seed(vec![Seed(4), Seed(9)]),
+            ..PaperTable::HiddenNodes.experiment()
+        };
+        for (cell, seed) in experiment.cells().iter().zip([4, 9]) {
+            assert_eq!(experiment.seeds_of(&cell.settings).collect::<Vec<_>>(), [Seed(seed)]);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+/// How a positive quantity t grows with a size x: how closely a polynomial law and an exponential one describe it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
+    /// d in t = a + b·x^d: the one of 1, 2 and 3 that fits best, with a and b not negative.
+    pub degree: i32,
+    /// How far that law is off: root mean square of the residuals of ln t, so 0.01 is about one percent.
+    pub polynomial_residual: f64,
+    /// By which factor t grows with each unit of x in t = a·c^x.
+    pub factor_per_unit: f64,
+    /// How far that law is off.
+    pub exponential_residual: f64,
+}
+
+/// A law of growth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GrowthLaw {
+    /// t = a + b·x^d.
+    Polynomial,
+    /// t = a·c^x.
+    Exponential,
+}
+
+impl Growth {
+    /// Fits points (x, t); `None` without three different x, or if a number is not positive and finite.
+    pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
+        let is_sound = |&(x, t): &(f64, f64)| x > 0.0 && t > 0.0 && x.is_finite() && t.is_finite();
+        let mut sizes: Vec<f64> = points.iter().map(|point| point.0).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.dedup();
+        if sizes.len() < 3 || !points.iter().all(is_sound) {
+            return None;
+        }
+        let polynomials = [1, 2, 3].map(|degree| (degree, polynomial_residual(points, degree)));
+        let (degree, polynomial_residual) = polynomials
+            .into_iter()
+            .min_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        let (factor_per_unit, exponential_residual) = exponential(points);
+        Some(Self {
+            degree,
+            polynomial_residual,
+            factor_per_unit,
+            exponential_residual,
+        })
+    }
+
+    /// The law that lies clearly closer to the points; `None` if both are about equally close.
+    pub fn law(&self) -> Option<GrowthLaw> {
+        /// Residuals nearer to each other than this ratio decide nothing.
+        const CLEARLY: f64 = 1.25;
+        let (polynomial, exponential) = (self.polynomial_residual, self.exponential_residual);
+        if polynomial * CLEARLY < exponential {
+            Some(GrowthLaw::Polynomial)
+        } else if exponential * CLEARLY < polynomial {
+            Some(GrowthLaw::Exponential)
+        } else {
+            None
+        }
+    }
+}
+
+/// Root mean square of ln(model / t).
+fn residual(points: &[(f64, f64)], model: impl Fn(f64) -> f64) -> f64 {
+    let squares = points.iter().map(|(x, t)| (model(*x) / t).ln().powi(2));
+    (squares.sum::<f64>() / points.len() as f64).sqrt()
+}
+
+/// What a + b·x^d leaves, with the a and b of the least relative errors in the least-squares sense.
+fn polynomial_residual(points: &[(f64, f64)], degree: i32) -> f64 {
+    let sum =
+        |term: fn(f64, f64) -> f64| -> f64 { points.iter().map(|(x, t)| term(1.0 / t, x.powi(degree) / t)).sum() };
+    let (uu, uv, vv) = (sum(|u, _| u * u), sum(|u, v| u * v), sum(|_, v| v * v));
+    let (u, v) = (sum(|u, _| u), sum(|_, v| v));
+    let determinant = uu * vv - uv * uv;
+    let (a, b) = ((u * vv - v * uv) / determinant, (v * uu - u * uv) / determinant);
+    if b < 0.0 {
+        residual(points, |_| u / uu)
+    } else if a < 0.0 {
+        residual(points, |x| v / vv * x.powi(degree))
+    } else {
+        residual(points, |x| a + b * x.powi(degree))
+    }
+}
+
+/// c of the line of least squares through ln t, and what it leaves.
+fn exponential(points: &[(f64, f64)]) -> (f64, f64) {
+    let count = points.len() as f64;
+    let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / count;
+    let mean_ln = points.iter().map(|(_, t)| t.ln()).sum::<f64>() / count;
+    let above: f64 = points.iter().map(|(x, t)| (x - mean_x) * (t.ln() - mean_ln)).sum();
+    let below: f64 = points.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
+    let rate = above / below;
+    (rate.exp(), residual(points, |x| (mean_ln + rate * (x - mean_x)).exp()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fit(law: impl Fn(f64) -> f64) -> Growth {
+        Growth::fit(&[6.0, 8.0, 10.0, 12.0, 16.0].map(|x| (x, law(x)))).unwrap()
+    }
+
+    #[test]
+    fn either_law_is_recognised() {
+        for degree in 1..=3 {
+            let polynomial = fit(|x| 3.0 + 0.2 * x.powi(degree));
+            assert_eq!(polynomial.law(), Some(GrowthLaw::Polynomial));
+            assert_eq!(polynomial.degree, degree);
+            assert!(polynomial.polynomial_residual < 1e-10, "{polynomial:?}");
+        }
+        let exponential = fit(|x| 0.3 * 1.25_f64.powf(x));
+        assert_eq!(exponential.law(), Some(GrowthLaw::Exponential));
+        assert!((exponential.factor_per_unit - 1.25).abs() < 1e-12 && exponential.exponential_residual < 1e-12);
+    }
+
+    #[test]
+    fn a_quantity_that_does_not_grow_follows_no_law_of_growth() {
+        assert_eq!(fit(|x| if x == 10.0 { 2.1 } else { 2.0 }).law(), None);
+        let falling = fit(|x| 1.0 / x);
+        assert!(falling.factor_per_unit < 1.0 && falling.polynomial_residual.is_finite());
+    }
+
+    #[test]
+    fn too_little_to_go_by_gives_no_fit() {
+        assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, 4.0), (2.0, 4.1)]), None);
+        assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, 0.0), (3.0, 4.0)]), None);
+        assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, f64::NAN), (3.0, 4.0)]), None);
+    }
+}

@@ -1,0 +1,253 @@
+use faer::{
+    Accum, Mat, MatMut, MatRef, Par,
+    linalg::matmul::{
+        matmul,
+        triangular::{self, BlockStructure},
+    },
+};
+
+use super::{
+    cholesky::{Cholesky, substitute},
+    elimination::{Elimination, output_weights},
+    products::Sums,
+};
+use crate::{
+    network::{Mlp, Shape},
+    training::{
+        Examples,
+        activations::{BlockNow, KeptActivations},
+        elementwise::{add_scaled, multiply_by_tanh_slopes, scale},
+        examples::{BLOCK, column, column_mut},
+        parallel::for_each_part,
+    },
+};
+
+/// The residual, relative to the right-hand side and both measured by the preconditioner, at which a step is good enough.
+/// Steps then agree with those of the factored equations to about as many digits.
+const TOLERANCE: f64 = 1e-8;
+/// What is added to the diagonals of the preconditioner, relative to their largest entry, against rounding.
+const RIDGE: f64 = 1e-13;
+/// A step that is not that good by then is taken as it is: it still lowers the error of the linearised network.
+const MOST_ITERATIONS: usize = 500;
+
+/// Solves S δ = r on W by preconditioned conjugate gradients (Hestenes and Stiefel 1952), never forming S. With P the
+/// vector as n1 × h,
+///
+/// ```text
+/// S P = μP + Aᵀ(D ∘ ((D ∘ AP) V̄V̄ᵀ)) − F (FᵀP V̄V̄ᵀ)        F node by node
+/// ```
+///
+/// so a product costs two products with the samples and memory only for vectors. The preconditioner is made of the
+/// blocks of S of each hidden node with itself, factored: nodes share few directions, so that some tens of iterations
+/// are enough.
+pub(super) struct ConjugateGradient {
+    shape: Shape,
+    /// V̄V̄ᵀ.
+    mixing: Mat<f64>,
+    /// Cholesky factors of the blocks of S on its diagonal: n1 × h·n1.
+    blocks: Mat<f64>,
+    /// F with the entries of each node together: n1 × h·(h+1).
+    f: Mat<f64>,
+    cholesky: Cholesky,
+    /// One for each part of the samples; the first gets the sum.
+    parts: Vec<PartRoom>,
+    /// FᵀP and that times V̄V̄ᵀ: (h+1) × h.
+    eliminated: [Mat<f64>; 2],
+    residual: Vec<f64>,
+    preconditioned: Vec<f64>,
+    direction: Vec<f64>,
+}
+
+/// Room for one part of the samples.
+struct PartRoom {
+    /// n1 × h.
+    sum: Mat<f64>,
+    /// D ∘ AP, and that times V̄V̄ᵀ: block × h.
+    hidden: [Mat<f64>; 2],
+}
+
+/// What the matrix S is made of.
+#[derive(Clone, Copy)]
+pub(super) struct System<'a> {
+    pub(super) mlp: &'a Mlp,
+    pub(super) examples: &'a Examples,
+    pub(super) sums: &'a Sums,
+    pub(super) elimination: &'a Elimination,
+    /// What is added to the diagonal of JwᵀJw.
+    pub(super) damping: f64,
+}
+
+impl ConjugateGradient {
+    /// Room for samples in so many `parts`.
+    pub(super) fn new(shape: Shape, parts: usize) -> Self {
+        let (h, n1, order) = (shape.hidden, shape.inputs + 1, shape.hidden_weights());
+        let room = |_| PartRoom {
+            sum: Mat::zeros(n1, h),
+            hidden: [const { BLOCK }; 2].map(|block| Mat::zeros(block, h)),
+        };
+        Self {
+            shape,
+            mixing: Mat::zeros(h, h),
+            blocks: Mat::zeros(n1, order),
+            f: Mat::zeros(n1, h * (h + 1)),
+            cholesky: Cholesky::new(n1),
+            parts: (0..parts).map(room).collect(),
+            eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
+            residual: vec![0.0; order],
+            preconditioned: vec![0.0; order],
+            direction: vec![0.0; order],
+        }
+    }
+
+    /// About how many bytes each part of the samples takes.
+    pub(super) fn bytes(shape: Shape) -> usize {
+        size_of::<f64>() * (shape.hidden_weights() + 2 * BLOCK * shape.hidden)
+    }
+
+    /// Replaces `right` by the solution; false if a block of S is not positive definite in the arithmetic.
+    pub(super) fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> bool {
+        let v = output_weights(system.mlp);
+        matmul(self.mixing.as_mut(), Accum::Replace, v, v.transpose(), 1.0, Par::Seq);
+        // A rejected candidate was evaluated since.
+        kept.evaluate(system.mlp, system.examples);
+        if !self.factor_blocks(system) {
+            return false;
+        }
+        let solution = right;
+        self.residual.copy_from_slice(solution);
+        solution.fill(0.0);
+        let mut length = self.precondition();
+        self.direction.copy_from_slice(&self.preconditioned);
+        let goal = TOLERANCE * TOLERANCE * length;
+        for iteration in 0..MOST_ITERATIONS {
+            self.apply(system, kept);
+            let product = self.parts[0].sum.as_ref();
+            let product = || product.col_iter().flat_map(|column| column.iter());
+            let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
+            // Rounding has taken over, or the right-hand side is zero.
+            if !(curvature > 0.0 && length > goal) {
+                break;
+            }
+            let distance = length / curvature;
+            for (value, direction) in solution.iter_mut().zip(&self.direction) {
+                *value += distance * direction;
+            }
+            for (residual, product) in self.residual.iter_mut().zip(product()) {
+                *residual -= distance * product;
+            }
+            let before = length;
+            length = self.precondition();
+            if length <= goal {
+                if std::env::var("COUNT").is_ok() {
+                    eprint!("[{}] ", iteration + 1);
+                }
+                break;
+            }
+            for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {
+                *direction = value + length / before * *direction;
+            }
+        }
+        true
+    }
+
+    /// Writes S·direction to the first part's sum.
+    fn apply(&mut self, system: System<'_>, kept: &mut KeptActivations) {
+        let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
+        let direction = MatRef::from_column_major_slice(&self.direction, n1, h);
+        let mixing = self.mixing.as_ref();
+        for_each_part(&mut self.parts, |part| part.sum.fill(0.0));
+        kept.for_each_block(system.mlp, system.examples, &mut self.parts, |part, now| {
+            part.add(now, direction, mixing);
+        });
+        let (first, others) = self.parts.split_at_mut(1);
+        let sum = &mut first[0].sum;
+        others.iter().for_each(|other| *sum += &other.sum);
+        let f = |node: usize| self.f.as_ref().subcols(node * h1, h1);
+        let [reduced, mixed] = &mut self.eliminated;
+        for node in 0..h {
+            let (f, p) = (f(node), direction.subcols(node, 1));
+            let reduced = reduced.as_mut().subcols_mut(node, 1);
+            matmul(reduced, Accum::Replace, f.transpose(), p, 1.0, Par::Seq);
+        }
+        matmul(mixed.as_mut(), Accum::Replace, reduced.as_ref(), mixing, 1.0, Par::Seq);
+        for node in 0..h {
+            let mut sum = sum.as_mut().subcols_mut(node, 1);
+            let (f, mixed) = (f(node), mixed.as_ref().subcols(node, 1));
+            matmul(sum.as_mut(), Accum::Add, f, mixed, -1.0, Par::Seq);
+            add_scaled(column_mut(sum, 0), system.damping, column(direction, node));
+        }
+    }
+
+    /// Gathers F by nodes, and factors the blocks of S of each node with itself.
+    fn factor_blocks(&mut self, system: System<'_>) -> bool {
+        let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
+        self.blocks.copy_from(&system.sums.gram);
+        for node in 0..self.shape.hidden {
+            let mut block = self.blocks.as_mut().subcols_mut(node * n1, n1);
+            let weight = self.mixing[(node, node)];
+            let largest = (0..n1).fold(0.0, |largest: f64, index| largest.max(block[(index, index)]));
+            let mut f = self.f.as_mut().subcols_mut(node * h1, h1);
+            f.copy_from(system.elimination.f.as_ref().subrows(node * n1, n1));
+            let f = f.as_ref();
+            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            triangular::matmul(
+                block.as_mut(),
+                lower,
+                Accum::Add,
+                f,
+                full,
+                f.transpose(),
+                full,
+                -1.0,
+                Par::Seq,
+            );
+            for index in 0..n1 {
+                scale(&mut column_mut(block.as_mut(), index)[index..], weight);
+                block[(index, index)] += system.damping + RIDGE * weight * largest;
+            }
+            if !self.cholesky.factor(block) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Solves with the preconditioner for the residual; returns the residual's square as the preconditioner measures it.
+    fn precondition(&mut self) -> f64 {
+        let n1 = self.shape.inputs + 1;
+        self.preconditioned.copy_from_slice(&self.residual);
+        for (node, part) in self.preconditioned.chunks_exact_mut(n1).enumerate() {
+            let factor = self.blocks.as_ref().subcols(node * n1, n1);
+            substitute(factor, MatMut::from_column_major_slice_mut(part, n1, 1));
+        }
+        let pairs = self.residual.iter().zip(&self.preconditioned);
+        pairs.map(|(a, b)| a * b).sum()
+    }
+}
+
+impl PartRoom {
+    /// Adds Aᵀ(D ∘ ((D ∘ AP) V̄V̄ᵀ)) of one block.
+    fn add(&mut self, now: &BlockNow<'_>, p: MatRef<'_, f64>, mixing: MatRef<'_, f64>) {
+        let (inputs, samples) = (now.block.inputs.as_ref(), now.block.samples());
+        let [pushed, mixed] = &mut self.hidden;
+        let mut pushed = pushed.as_mut().subrows_mut(0, samples);
+        let mut mixed = mixed.as_mut().subrows_mut(0, samples);
+        let slope = |mut values: MatMut<'_, f64>| {
+            for node in 0..mixing.ncols() {
+                multiply_by_tanh_slopes(column_mut(values.as_mut(), node), column(now.hidden(), node));
+            }
+        };
+        matmul(pushed.as_mut(), Accum::Replace, inputs, p, 1.0, Par::Seq);
+        slope(pushed.as_mut());
+        matmul(mixed.as_mut(), Accum::Replace, pushed.as_ref(), mixing, 1.0, Par::Seq);
+        slope(mixed.as_mut());
+        matmul(
+            self.sum.as_mut(),
+            Accum::Add,
+            inputs.transpose(),
+            mixed.as_ref(),
+            1.0,
+            Par::Seq,
+        );
+    }
+}

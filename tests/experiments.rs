@@ -1,0 +1,348 @@
+//! The paper's experiments and sweeps, through the library and the terminal.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{
+    fs,
+    num::NonZero,
+    path::Path,
+    process::{Command, Output},
+    sync::atomic::{AtomicBool, AtomicUsize, Ordering},
+};
+
+use decoupler::{
+    dataset::{FoldUnit, Seed},
+    evaluation::{
+        Run, RunSettings,
+        experiments::{Axis, Bottleneck, CrossValidation, Experiment, ExperimentResults, Trial, run_experiments},
+    },
+    sensor::{ArrayScale, SensorModel},
+    training::Method,
+};
+use serde_json::Value;
+
+/// Of a second at most: a small array, few samples, few epochs.
+fn small(axis: Axis) -> Experiment {
+    let mut base = RunSettings {
+        sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
+        samples: 40,
+        validation_samples: 12,
+        test_samples: 20,
+        hidden: 3,
+        starts: 2,
+        ..RunSettings::default()
+    };
+    base.training.stopping.epochs = 8;
+    Experiment {
+        base,
+        axis,
+        second_axis: None,
+        seeds: 3,
+        cross_validation: None,
+    }
+}
+
+fn cross_validated(unit: FoldUnit) -> Experiment {
+    Experiment {
+        cross_validation: Some(CrossValidation {
+            folds: 4,
+            repeats: 2,
+            unit,
+        }),
+        ..small(Axis::Samples(vec![40, 20]))
+    }
+}
+
+fn threads(count: usize) -> NonZero<usize> {
+    NonZero::new(count).unwrap()
+}
+
+fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
+    let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
+    run_experiments(
+        experiments,
+        threads(thread_count),
+        || false,
+        |finished| {
+            results[finished.experiment].record(finished.cell, finished.outcome);
+        },
+    )
+    .unwrap();
+    results
+}
+
+/// The trials of every cell, without their times.
+fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
+    let cells = results.iter().flat_map(|results| &results.cells);
+    let trials = cells.map(|cell| {
+        let timeless = |trial: &Trial| Trial {
+            seconds: 0.0,
+            least_epoch_seconds: 0.0,
+            ..trial.clone()
+        };
+        cell.trials.iter().map(timeless).collect()
+    });
+    trials.collect()
+}
+
+#[test]
+fn results_are_the_same_on_any_number_of_threads() {
+    let experiments = [
+        Experiment {
+            second_axis: Some(Axis::Method(Method::all()[..4].to_vec())),
+            ..small(Axis::Hidden(vec![2, 5]))
+        },
+        cross_validated(FoldUnit::Sample),
+        cross_validated(FoldUnit::Snapshot),
+    ];
+    let alone = run(&experiments, 1);
+    assert!(alone.iter().all(ExperimentResults::is_complete));
+    assert_eq!(timeless(&alone), timeless(&run(&experiments, 3)));
+    let counts: Vec<_> = timeless(&alone).iter().map(Vec::len).collect();
+    assert_eq!(counts, [vec![3; 8], vec![6; 4]].concat());
+}
+
+#[test]
+fn a_trial_is_the_run_that_its_settings_describe() {
+    let experiment = small(Axis::Hidden(vec![2, 4]));
+    for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
+        let mut z_percent = Vec::new();
+        for (trial, seed) in cell.trials.iter().zip(0..3) {
+            let mut alone = Run::prepare(RunSettings {
+                seed: Seed(seed),
+                ..cell.cell.settings
+            })
+            .unwrap();
+            while alone.step().is_none() {}
+            assert_eq!(trial.seed, Seed(seed));
+            assert_eq!(trial.errors, alone.decouple_test().1);
+            assert_eq!(trial.baselines, *alone.baselines());
+            assert_eq!(trial.network, Some(alone.network()));
+            z_percent.push(alone.decouple_test().1.z_percent.unwrap());
+        }
+        z_percent.sort_by(f64::total_cmp);
+        let summary = cell.summary();
+        let z = &summary.z_percent;
+        assert_eq!([z.min, z.median, z.max].map(Option::unwrap), z_percent[..]);
+        let median = cell.median_trial().unwrap();
+        assert_eq!(median.errors.z_percent, Some(z_percent[1]));
+    }
+}
+
+#[test]
+fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
+    for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+        let mut experiment = cross_validated(unit);
+        // As many hidden nodes as coordinates vary: nothing is lost in them.
+        experiment.base.hidden = 6;
+        for cell in &run(&[experiment], 2)[0].cells {
+            for trial in &cell.trials {
+                // A sample left out would be decoupled as (0, 0, 0), 4 mm below any node.
+                assert!(trial.baselines.mean.worst_mm < 1.0, "{unit}: {trial:?}");
+                assert!(trial.errors.worst_mm < 4.0, "{unit}: {trial:?}");
+                assert!(trial.bottleneck.worst_mm < 1e-12, "{unit}: {trial:?}");
+                assert_eq!((trial.networks, trial.network.is_none()), (4, true));
+            }
+            let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
+            assert_eq!(first.seed, second.seed);
+            assert_ne!(first.errors, second.errors, "each repeat deals anew");
+        }
+    }
+}
+
+#[test]
+fn cancelling_keeps_what_is_finished() {
+    let experiment = small(Axis::Hidden(vec![2, 3, 4]));
+    let cancel = AtomicBool::new(false);
+    let mut results = ExperimentResults::new(experiment.clone());
+    let mut finished = 0;
+    run_experiments(
+        std::slice::from_ref(&experiment),
+        threads(1),
+        || cancel.load(Ordering::Relaxed),
+        |one| {
+            assert_eq!((one.trials, one.experiment), (9, 0));
+            finished += 1;
+            assert_eq!(one.done, finished);
+            cancel.store(finished == 4, Ordering::Relaxed);
+            results.record(one.cell, one.outcome);
+        },
+    )
+    .unwrap();
+    assert!((4..9).contains(&finished) && !results.is_complete());
+    let kept = timeless(std::slice::from_ref(&results));
+    assert_eq!(kept.iter().map(Vec::len).sum::<usize>(), finished);
+    let whole = timeless(&run(&[experiment], 2));
+    for (kept, whole) in kept.iter().zip(&whole) {
+        assert!(kept.iter().all(|trial| whole.contains(trial)));
+    }
+    assert!(
+        kept.iter().all(|trials| !trials.is_empty()),
+        "every cell is tried once before any twice"
+    );
+}
+
+#[test]
+fn cancelling_does_not_wait_for_a_training_to_end() {
+    let mut experiment = small(Axis::Hidden(vec![3]));
+    experiment.base.training.stopping.epochs = 1_000_000;
+    experiment.base.training.stopping.max_fail = 1_000_000;
+    experiment.base.training.method = Method::all()[8];
+    for experiment in [
+        experiment.clone(),
+        Experiment {
+            cross_validation: Some(CrossValidation::default()),
+            ..experiment
+        },
+    ] {
+        let asked = AtomicUsize::new(0);
+        let is_cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= 50;
+        run_experiments(&[experiment], threads(2), is_cancelled, |one| panic!("{one:?}")).unwrap();
+        assert!((51..=60).contains(&asked.into_inner()));
+    }
+}
+
+#[test]
+fn a_cell_that_cannot_be_trained_says_why_and_the_others_go_on() {
+    let mut experiment = small(Axis::Hidden(vec![2, 512]));
+    experiment.base.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
+    experiment.base.starts = 1;
+    let results = &run(&[experiment], 2)[0];
+    assert!(results.is_complete());
+    assert_eq!((results.cells[0].trials.len(), results.cells[0].failures.len()), (3, 0));
+    assert_eq!((results.cells[1].trials.len(), results.cells[1].failures.len()), (0, 3));
+    let message = results.cells[1].failures[0].to_string();
+    assert!(message.contains("seed 0") && message.contains("too wide"), "{message}");
+    assert_eq!(results.cells[1].summary().z_percent.median, None);
+}
+
+/// Against the property itself: whatever is trained, and however well, the training error stays above.
+#[test]
+fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
+    for seed in 0..4 {
+        for hidden in 1..=4 {
+            let mut settings = small(Axis::Hidden(vec![hidden])).base;
+            settings.hidden = hidden;
+            settings.seed = Seed(seed);
+            settings.sensor = SensorModel::new("3x3_2x9".parse().unwrap());
+            settings.samples = 12;
+            settings.validation_samples = 0;
+            settings.training.stopping.epochs = 200;
+            let (split, _) = Run::draw(&settings).unwrap();
+            let least = Bottleneck::fit(split.training.coordinates_mm.view(), hidden)
+                .unwrap()
+                .least_mse();
+            let mut run = Run::prepare(settings).unwrap();
+            while run.step().is_none() {}
+            let reached = run.leader().best_mse();
+            assert!(
+                reached >= least * (1.0 - 1e-9),
+                "{hidden} hidden: {reached} below {least}"
+            );
+            if hidden < 4 {
+                assert!(
+                    reached < 1.2 * least,
+                    "{hidden} hidden: the bound {least} is far below {reached}"
+                );
+            }
+        }
+    }
+}
+
+fn decoupler(arguments: &str, folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
+    command.args(arguments.split_whitespace()).current_dir(folder);
+    command.output().unwrap()
+}
+
+#[test]
+fn the_terminal_prints_every_cell_beside_the_published_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "reproduce --seeds 2 --epochs 3 --starts 1 --k 3 --repeats 2 --hidden 6,7 --out tables/new --json";
+    let output = decoupler(arguments, folder.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let tables = report["tables"].as_array().unwrap();
+    let published: Vec<Vec<_>> = tables
+        .iter()
+        .map(|table| {
+            let cells = table["cells"].as_array().unwrap();
+            for z in cells.iter().map(|cell| &cell["z_percent"]) {
+                let [min, median, max] = ["min", "median", "max"].map(|name| z[name].as_f64().unwrap());
+                assert!(min <= median && median <= max);
+            }
+            cells
+                .iter()
+                .map(|cell| cell["z_percent"]["published"].as_f64())
+                .collect()
+        })
+        .collect();
+    assert_eq!(
+        published,
+        [
+            vec![Some(3.57), None],
+            vec![Some(2.01), Some(3.35)],
+            vec![Some(1.41), Some(1.63), Some(2.28)]
+        ]
+    );
+    assert_eq!(
+        tables[1]["cells"][0]["z_percent"]["values"].as_array().unwrap().len(),
+        4
+    );
+    for number in 1..=3 {
+        let file = |name: &str| fs::read_to_string(folder.path().join("tables/new").join(name)).unwrap();
+        let cells = tables[number - 1]["cells"].as_array().unwrap();
+        let csv = file(&format!("table_{number}.csv"));
+        assert_eq!(csv.lines().count(), 1 + cells.len());
+        let [heading, first] = [0, 1].map(|line| csv.lines().nth(line).unwrap().split(',').collect::<Vec<_>>());
+        let column = heading.iter().position(|name| *name == "z_percent_median").unwrap();
+        assert_eq!(first[column].parse().ok(), cells[0]["z_percent"]["median"].as_f64());
+        let trials: u64 = cells.iter().map(|cell| cell["trials"].as_u64().unwrap()).sum();
+        assert_eq!(
+            file(&format!("table_{number}_trials.csv")).lines().count() as u64,
+            1 + trials
+        );
+        assert!(file(&format!("table_{number}.md")).contains("| Z % publ. |"));
+    }
+}
+
+#[test]
+fn with_training_enough_smaller_arrays_are_decoupled_better() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = decoupler(
+        "reproduce --table 3 --seeds 1 --epochs 60 --starts 1 --json",
+        folder.path(),
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let verdicts = report["tables"][0]["verdicts"].as_array().unwrap();
+    let verdict = verdicts
+        .iter()
+        .find(|verdict| verdict["claim"].as_str().unwrap().contains("Smaller arrays"));
+    assert_eq!(verdict.unwrap()["standing"], "holds");
+    let first = &report["tables"][0]["cells"][0];
+    assert_eq!(first["array"], ArrayScale::PRESETS[0].to_string());
+}
+
+#[test]
+fn what_cannot_be_reproduced_is_refused_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    let cases = [
+        ("--table 4", 2, "possible values: 1, 2, 3, all"),
+        ("--hidden 6,0", 2, "'0' for '--hidden"),
+        ("--arrays 10x6", 2, "not an array scale"),
+        ("--seeds 0", 2, "from 1"),
+        ("--k 11 --folds snapshot", 2, "11 folds of 10 snapshots"),
+        ("--out file", 1, "cannot make the folder 'file'"),
+    ];
+    for (arguments, status, expected) in cases {
+        let output = decoupler(&format!("reproduce {arguments}"), folder.path());
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{arguments}: {text}");
+        assert!(
+            text.contains(expected) && text.lines().count() == 1,
+            "{arguments}: {text}"
+        );
+        assert!(output.stdout.is_empty());
+    }
+}

@@ -1,0 +1,99 @@
+//! Networks too wide for their equations to be factored.
+
+mod training_problems;
+
+use decoupler::{
+    network::{Mlp, Shape},
+    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings},
+};
+use ndarray::Array2;
+use training_problems::wave;
+
+fn named(name: &str) -> Method {
+    let method = Method::all().into_iter().find(|method| method.short_name() == name);
+    method.expect("it is offered")
+}
+
+fn problem(shape: Shape, samples: usize) -> Problem {
+    let inputs = Array2::from_shape_fn((samples, shape.inputs), |(row, column)| wave(row, column));
+    let targets = Array2::from_shape_fn((samples, shape.outputs), |(row, output)| {
+        (inputs[[row, output]] + 0.5 * inputs[[row, output + 1]]).sin()
+    });
+    Problem {
+        training: Examples::new(inputs.view(), targets.view()),
+        validation: None,
+        test: None,
+    }
+}
+
+fn begin(method: &str, shape: Shape, samples: usize) -> Result<Trainer, TrainingError> {
+    let start = Mlp::from_weights(shape, (0..shape.weights()).map(|index| 0.3 * wave(index, 9)).collect());
+    let settings = TrainingSettings {
+        method: named(method),
+        stopping: StoppingRules::default(),
+    };
+    Trainer::new(start, problem(shape, samples), settings)
+}
+
+const WIDE: Shape = Shape {
+    inputs: 40,
+    hidden: 60,
+    outputs: 6,
+};
+
+#[test]
+fn a_wide_network_learns() {
+    for method in ["lm", "varpro"] {
+        let mut trainer = begin(method, WIDE, 700).unwrap();
+        let start = trainer.latest().training_mse;
+        for _ in 0..12 {
+            trainer.step();
+        }
+        let history = trainer.history();
+        let falls = history
+            .windows(2)
+            .all(|pair| pair[1].training_mse < pair[0].training_mse);
+        assert!(falls, "{method}");
+        assert!(
+            trainer.latest().training_mse < 1e-3 * start,
+            "{method}: {:e}",
+            trainer.latest().training_mse
+        );
+    }
+}
+
+#[test]
+fn a_wide_network_is_resumed_with_the_same_bits() {
+    let run = |trainer: &mut Trainer| {
+        (0..4).for_each(|_| {
+            trainer.step();
+        });
+    };
+    let mut whole = begin("lm", WIDE, 700).unwrap();
+    run(&mut whole);
+    let text = serde_json::to_string(&whole.state()).unwrap();
+    let state: TrainerState = serde_json::from_str(&text).unwrap();
+    let mut resumed = Trainer::resume(state, problem(WIDE, 700)).unwrap();
+    run(&mut whole);
+    run(&mut resumed);
+    assert_eq!(whole.present(), resumed.present());
+}
+
+/// Its equations would have 30 100 rows: 7 GB.
+#[test]
+fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
+    let shape = Shape {
+        inputs: 300,
+        hidden: 100,
+        outputs: 3,
+    };
+    let refused = begin("br", shape, 30).err();
+    assert!(
+        matches!(refused, Some(TrainingError::TooWide { bytes }) if bytes > 7_000_000_000),
+        "{refused:?}"
+    );
+    let mut trainer = begin("lm", shape, 30).unwrap();
+    let start = trainer.latest().training_mse;
+    trainer.step();
+    assert!(trainer.latest().training_mse < 0.1 * start);
+}

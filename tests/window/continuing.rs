@@ -1,0 +1,385 @@
+//! Several starts, checkpoints, and going on with another method.
+
+use std::{fs, path::Path};
+
+use decoupler::{
+    app::{Notice, Phase},
+    evaluation::{Run, RunSettings, Spread, StartRecord},
+    export::{CheckpointFile, NetworkFile, format_number},
+    training::{Method, MomentumSettings, StopReason, StoppingRules},
+};
+
+use eframe::egui::vec2;
+
+use crate::{
+    configuring::choose_method,
+    driver::{Driver, small, table_of, trained},
+};
+
+const SAVE: &str = "Type a path for the checkpoint";
+const OPEN: &str = "Type the path of a checkpoint";
+
+/// Types `path` into the form behind `button` and confirms.
+fn give_path(driver: &mut Driver, button: &str, path: &Path) {
+    driver.click(button);
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button(if button == OPEN { "Open" } else { "Save" });
+}
+
+fn save(driver: &mut Driver, button: &str, path: &Path) {
+    give_path(driver, button, path);
+    let saved = format!("Saved {}", path.display());
+    driver.wait("the file", |driver| driver.has(&saved));
+    driver.click("Dismiss");
+}
+
+fn momentum(epochs: usize) -> RunSettings {
+    let mut settings = small();
+    settings.training.method = Method::Momentum(MomentumSettings::default());
+    settings.training.stopping.epochs = epochs;
+    settings
+}
+
+/// Begins a training that goes on for as long as one looks.
+fn start_endless(driver: &mut Driver) {
+    driver.configure_small();
+    choose_method(driver, "Momentum, Eq. (11)");
+    driver.enter("Epochs", "1000000");
+    assert_eq!(driver.state().draft, momentum(1_000_000));
+    driver.click("▶ Train");
+    driver.wait_for_epochs(5);
+}
+
+/// Presses Pause and waits until the last epoch under way is shown.
+fn pause(driver: &mut Driver) {
+    driver.click("⏸ Pause");
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    driver.harness().run_steps(2);
+    assert_eq!(driver.state().phase, Phase::Paused);
+}
+
+fn stepped(settings: RunSettings, epochs: usize) -> Run {
+    let mut run = Run::prepare(settings).unwrap();
+    (0..epochs).for_each(|_| {
+        run.step();
+    });
+    run
+}
+
+fn ended(driver: &mut Driver) {
+    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    driver.settle();
+}
+
+#[test]
+fn several_starts_keep_the_best_and_show_how_all_spread() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.enter("Starts", "4");
+    driver.train();
+    let run = trained(RunSettings { starts: 4, ..small() });
+    let (starts, shown) = (run.starts(), driver.state().run.as_ref().unwrap());
+    assert_eq!(shown.starts, starts);
+    assert_eq!(shown.history, run.leader().history());
+    assert_eq!(driver.table(), table_of(&run));
+    assert!(driver.has("SPREAD OVER 4 STARTS"));
+    let z = Spread::of(starts.iter().filter_map(|start| start.z_percent)).unwrap();
+    let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
+    assert!(z.smallest < z.largest, "the starts differ");
+    for (name, spread) in [("test Z %", z), ("validation mse", validation)] {
+        for (column, value) in [
+            ("min", spread.smallest),
+            ("median", spread.median),
+            ("max", spread.largest),
+        ] {
+            let cell = format!("{name}, {column}: {}", format_number(value));
+            assert!(driver.has(&cell), "{cell} is not in {:#?}", driver.texts());
+        }
+    }
+    let kept = run.leader_number() + 1;
+    assert!(driver.has(&format!("Start {kept} is kept: it has the lowest validation mse.")));
+    let [low, high, median] = [z.smallest, z.largest, z.median].map(format_number);
+    let strip = format!("Spread of Z %: 4 dots from {low} to {high}, median {median}");
+    assert!(driver.has(&strip), "{strip}");
+
+    driver.enter("Starts", "1");
+    driver.train();
+    assert!(!driver.says("SPREAD OVER"), "one start has no spread");
+}
+
+#[test]
+fn the_spread_is_shown_while_the_starts_train() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.enter("Starts", "3");
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Epochs", "1000000");
+    driver.click("▶ Train");
+    driver.wait("a later look at the starts", |driver| {
+        let starts = driver.state().run.as_ref().map(|run| run.starts.as_slice());
+        driver.state().phase == Phase::Training
+            && starts.is_some_and(|starts| starts.len() == 3 && starts[0].epochs > 1)
+    });
+    assert!(driver.has("SPREAD OVER 3 STARTS") && driver.has("0 of 3 starts ended"));
+    driver.click("■ Stop");
+    ended(&mut driver);
+    let settings = RunSettings {
+        starts: 3,
+        ..momentum(1_000_000)
+    };
+    let mut run = stepped(settings, driver.epochs());
+    run.stop();
+    let shown = driver.state().run.as_ref().unwrap();
+    assert_eq!(shown.history, run.leader().history(), "the leader's, whole");
+    assert_eq!(shown.starts, run.starts());
+}
+
+#[test]
+fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interrupted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [checkpoint, network] = ["run.checkpoint", "network.json"].map(|name| folder.path().join(name));
+    let mut driver = Driver::open();
+    start_endless(&mut driver);
+    assert!(!driver.is_enabled("Save checkpoint…"), "a training is held first");
+    pause(&mut driver);
+    save(&mut driver, SAVE, &checkpoint);
+    let (held, history) = (driver.epochs(), driver.state().run.as_ref().unwrap().history.clone());
+    drop(driver);
+
+    let mut driver = Driver::open();
+    give_path(&mut driver, OPEN, &checkpoint);
+    driver.wait("the training", |driver| driver.epochs() == held);
+    driver.settle();
+    assert_eq!(driver.state().phase, Phase::Paused);
+    assert_eq!(driver.state().draft, momentum(1_000_000), "the settings are the file's");
+    assert_eq!(driver.state().run.as_ref().unwrap().history, history);
+    assert!(driver.has("Decoupled surface") && driver.has(&format!("Epoch {held} of 1000000")));
+
+    driver.click("▶ Resume");
+    driver.wait_for_epochs(20);
+    driver.click("■ Stop");
+    ended(&mut driver);
+    save(&mut driver, "Type a path for the network", &network);
+    let mut whole = stepped(momentum(1_000_000), driver.epochs());
+    whole.stop();
+    let mut expected = NetworkFile::from_run(&whole);
+    let found = NetworkFile::load(&network).unwrap();
+    // Only the time it took differs.
+    expected.training.seconds = found.training.seconds;
+    assert_eq!(found, expected);
+    let bits = |file: &NetworkFile| -> Vec<u64> { file.network.mlp().weights().iter().map(|w| w.to_bits()).collect() };
+    assert_eq!(bits(&found), bits(&expected));
+}
+
+#[test]
+fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let [terminal, window] = ["terminal", "window"].map(|name| folder.path().join(name));
+    let settings = RunSettings { starts: 3, ..small() };
+    CheckpointFile::from_run(&stepped(settings, 7)).save(&terminal).unwrap();
+    let mut driver = Driver::open();
+    give_path(&mut driver, OPEN, &terminal);
+    driver.wait("the training", |driver| driver.epochs() == 7);
+    assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 STARTS"));
+    save(&mut driver, SAVE, &window);
+    driver.click("▶ Resume");
+    ended(&mut driver);
+    let whole = trained(settings);
+    assert_eq!(driver.table(), table_of(&whole));
+    assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
+
+    let mut run = CheckpointFile::load(&window).unwrap().resume().unwrap();
+    while run.step().is_none() {}
+    assert_eq!(run.starts(), whole.starts());
+    // One that has ended opens as ended, and can be given more epochs.
+    CheckpointFile::from_run(&run).save(&terminal).unwrap();
+    give_path(&mut driver, OPEN, &terminal);
+    driver.wait("the ended training", |driver| {
+        driver.state().phase == Phase::Ended(StopReason::EpochsReached)
+    });
+    assert!(driver.has("Continue"));
+}
+
+#[test]
+fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let (table, phase, draft) = (driver.table(), driver.state().phase, driver.state().draft);
+    CheckpointFile::from_run(&stepped(momentum(50), 3)).save(&path).unwrap();
+    let sound = fs::read_to_string(&path).unwrap();
+    let cases = [
+        ("is cut off", sound[..sound.len() / 2].to_owned()),
+        ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
+        ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
+        ("has version 9", sound.replacen("\"version\":1", "\"version\":9", 1)),
+    ];
+    for (reason, contents) in cases {
+        fs::write(&path, &contents).unwrap();
+        give_path(&mut driver, OPEN, &path);
+        driver.wait("the reason", |driver| driver.state().notice.is_some());
+        let expected = CheckpointFile::load(&path).unwrap_err().to_string();
+        assert!(expected.contains(reason), "{expected}");
+        assert_eq!(driver.state().notice, Some(Notice::Failed(expected.clone())));
+        assert!(driver.has(&expected));
+        assert_eq!(
+            (driver.table(), driver.state().phase, driver.state().draft),
+            (table.clone(), phase, draft)
+        );
+        driver.click("Dismiss");
+    }
+    fs::write(&path, &sound).unwrap();
+    give_path(&mut driver, OPEN, &path);
+    driver.wait("the sound one", |driver| driver.state().phase == Phase::Paused);
+}
+
+#[test]
+fn levenberg_marquardt_goes_on_where_momentum_ended() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.train();
+    assert_eq!(driver.epochs(), 15);
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    driver.click("Continue");
+    ended(&mut driver);
+    let mut run = trained(momentum(15));
+    run.continue_with(Method::default()).unwrap();
+    run.set_stopping(StoppingRules {
+        epochs: 30,
+        ..StoppingRules::default()
+    })
+    .unwrap();
+    while run.step().is_none() {}
+    let shown = driver.state().run.as_ref().unwrap();
+    assert_eq!(shown.history, run.leader().history());
+    assert_eq!(shown.stages, run.leader().stages());
+    assert!(driver.epochs() > 15);
+    let mse = |epoch: usize| shown.history[epoch].training_mse;
+    assert!(mse(driver.epochs()) < 0.5 * mse(15));
+    assert_eq!(driver.table(), table_of(&run));
+    assert!(driver.has(&format!("Epoch {} of 30", driver.epochs())));
+    assert!(
+        driver.has("lm from epoch 15"),
+        "the chart marks where the method changed"
+    );
+    assert!(!driver.says("The settings have changed"));
+    driver.click("Training state");
+    driver.settle();
+    assert!(driver.has("lm from epoch 15"));
+
+    driver.enter("Hidden nodes", "7");
+    assert!(!driver.has("Continue"), "another network begins anew");
+}
+
+#[test]
+fn more_epochs_of_the_same_method_are_those_of_a_longer_training() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.train();
+    driver.click("Continue");
+    ended(&mut driver);
+    let whole = trained(momentum(30));
+    assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
+    assert_eq!(driver.table(), table_of(&whole));
+    driver.click("▶ Train");
+    ended(&mut driver);
+    assert_eq!(driver.epochs(), 15, "Train begins anew");
+}
+
+#[test]
+fn a_held_training_can_be_continued_with_another_method_or_resumed_as_it_was() {
+    let mut driver = Driver::open();
+    start_endless(&mut driver);
+    pause(&mut driver);
+    assert!(!driver.has("Continue"), "Resume does that");
+    assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Starts"));
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    assert!(driver.has("Continue"));
+    driver.click("▶ Resume");
+    assert_eq!(driver.state().draft, momentum(1_000_000), "as it was");
+    driver.wait_for_epochs(5);
+    pause(&mut driver);
+
+    let held = driver.epochs();
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    driver.enter("Mu", "1e-2");
+    driver.enter("Epochs", "4");
+    driver.click("Continue");
+    ended(&mut driver);
+    let mut run = stepped(momentum(1_000_000), held);
+    let training = driver.state().draft.training;
+    run.continue_with(training.method).unwrap();
+    run.set_stopping(StoppingRules {
+        epochs: held + 4,
+        ..training.stopping
+    })
+    .unwrap();
+    while run.step().is_none() {}
+    assert_eq!(driver.state().run.as_ref().unwrap().history, run.leader().history());
+    assert_eq!(driver.state().draft.training.stopping.epochs, 4, "what was typed stays");
+}
+
+#[test]
+fn what_cannot_be_continued_is_not_offered_or_explained() {
+    let mut driver = Driver::open();
+    assert!(!driver.has("Continue"), "there is nothing to go on from");
+    driver.configure_small();
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Learning rate", "1e6");
+    driver.enter("Validation samples", "0");
+    driver.enter("Epochs", "100000");
+    driver.train();
+    assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
+    assert!(!driver.has("Continue"));
+}
+
+#[test]
+fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    choose_method(&mut driver, "Bayesian regularisation");
+    driver.train();
+    let mut settings = small();
+    settings.training.method = driver.state().draft.training.method;
+    let run = trained(settings);
+    let leader = run.leader();
+    let effective = leader.history()[leader.best_epoch()].effective_parameters.unwrap();
+    let weights = leader.present().weights().len();
+    let text = format!("Effective parameters {} of {weights} weights", format_number(effective));
+    assert!(driver.has(&text), "{text} is not in {:#?}", driver.texts());
+    choose_method(&mut driver, "Levenberg-Marquardt");
+    driver.train();
+    assert!(!driver.says("Effective parameters"));
+}
+
+#[test]
+fn the_spread_and_continue_have_their_place_in_narrow_windows() {
+    let mut driver = Driver::open_sized(vec2(960.0, 640.0));
+    driver.enter("Starts", "3");
+    driver.enter("Epochs", "1");
+    driver.train();
+    driver.settle();
+    let buttons = ["Next snapshot", "Continue", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
+    assert!(
+        buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
+        "{buttons:?}"
+    );
+    let column = driver.get("ERRORS ON THE TEST SET").rect().left();
+    let of_spread = |text: &str| text.starts_with("Spread of Z %") || text.starts_with("test Z %, ");
+    let places: Vec<_> = driver
+        .places()
+        .into_iter()
+        .filter(|(text, _)| of_spread(text))
+        .collect();
+    assert_eq!(places.len(), 4, "the strip and three figures");
+    for (text, place) in places {
+        assert!(
+            place.left() >= column - 0.5 && place.right() <= 960.0,
+            "{text} is at {place:?}"
+        );
+    }
+}
