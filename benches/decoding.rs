@@ -147,18 +147,19 @@ fn print_scale(scale: ArrayScale) {
         }
     }
     let first = CompiledNetworks::<f64>::each(&networks(&training, InputChoice::BEST, 12));
+    let exact = Posterior::new(&model, &scene, &rows, &mut rng).unwrap();
     decoders.push((
         "polish, 1 step".into(),
-        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1)),
+        Box::new(PolishedDecoder::new(Box::new(first), exact, &model, &scene, &rows, 1)),
     ));
     decoders.push((
         "newton".into(),
-        Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default())),
+        Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
     ));
     let posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
     decoders.push((
         "newton with prior, noise 1e-3".into(),
-        Box::new(PosteriorDecoder::new(posterior, &model, &rows)),
+        Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
     ));
     let coordinates = scale.rows() * scale.coordinates_per_row();
     let (m1, m2, m4) = (scale.rows(), scale.nodes_per_row(), scale.columns());

@@ -386,7 +386,7 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
     let baselines = *run.baselines();
     let began = Began {
         settings,
-        weights: run.leader().present().shape().weights(),
+        weights: run.leader().weights(),
         test,
         baselines,
     };

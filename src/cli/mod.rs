@@ -10,6 +10,7 @@ mod failure;
 mod interruption;
 mod reproduce;
 mod reproduce_report;
+mod scene_arguments;
 mod simulate;
 mod spread_plot;
 mod train;

@@ -4,7 +4,7 @@ use rand::Rng;
 use thiserror::Error;
 
 use crate::{
-    scene::{Noise, Scene},
+    scene::{Noise, Scene, SceneError},
     sensor::{SensorError, SensorModel},
 };
 
@@ -18,7 +18,7 @@ pub struct Dataset {
     pub resistances_ohm: Array2<f64>,
     /// Absolute node coordinates in millimetres: samples × 3·M2, each node's x, y, z together.
     pub coordinates_mm: Array2<f64>,
-    /// Row-wires M1 of the array, hence samples of each snapshot.
+    /// Row-wires read, hence samples of each snapshot.
     rows: usize,
 }
 
@@ -28,6 +28,9 @@ pub enum DatasetError {
     /// The number of samples is out of range.
     #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]
     Count(usize),
+    /// The array has no such row-wire.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The model gives no resistance for a drawn deformation.
     #[error("snapshot {snapshot}: {source}")]
     Sensor {
@@ -39,10 +42,12 @@ pub enum DatasetError {
 }
 
 impl Dataset {
-    /// Draws at least `samples` samples, as whole snapshots: 101 samples of 10 rows become 110.
+    /// Draws at least `samples` samples of the row-wires that the scene reads, as whole snapshots: 101 samples of 10
+    /// rows become 110.
     ///
     /// # Errors
-    /// A number of samples out of range, or a deformation for which the model has no resistance.
+    /// A number of samples out of range, a row that the array does not have, or a deformation for which the model has
+    /// no resistance.
     pub fn simulate(
         model: &SensorModel,
         scene: &Scene,
@@ -52,7 +57,8 @@ impl Dataset {
         if !(1..=LARGEST_SAMPLES).contains(&samples) {
             return Err(DatasetError::Count(samples));
         }
-        let rows = model.scale.rows();
+        let read = scene.rows.read(model.scale.rows())?;
+        let rows = read.len();
         let snapshots = samples.div_ceil(rows);
         let mut resistances_ohm = Array2::zeros((snapshots * rows, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((snapshots * rows, model.scale.coordinates_per_row()));
@@ -61,8 +67,8 @@ impl Dataset {
         let positions = coordinates_mm.axis_chunks_iter_mut(Axis(0), rows);
         for (snapshot, (mut readings, mut positions)) in readings.zip(positions).enumerate() {
             let deformation = sampler.draw(rng);
-            for row in 0..rows {
-                let mut reading = readings.row_mut(row);
+            for (place, &row) in read.iter().enumerate() {
+                let mut reading = readings.row_mut(place);
                 let reading = reading.as_slice_mut().expect("a row of a standard array is contiguous");
                 model
                     .row_resistances_into(row, deformation.row_mm(row), reading)
@@ -70,7 +76,7 @@ impl Dataset {
                 let coordinates = deformation
                     .row_positions_mm(model, row)
                     .flat_map(|position| position.to_array());
-                for (target, value) in positions.row_mut(row).iter_mut().zip(coordinates) {
+                for (target, value) in positions.row_mut(place).iter_mut().zip(coordinates) {
                     *target = value;
                 }
             }
@@ -100,10 +106,10 @@ impl Dataset {
         Ok(())
     }
 
-    /// The samples of one row-wire of whole snapshots, in their order.
+    /// The samples of the row-wire in place `row` of those read, of whole snapshots, in their order.
     ///
     /// # Panics
-    /// If the array has no such row-wire.
+    /// If there is no such place.
     pub fn of_row(&self, row: usize) -> Self {
         assert!(row < self.rows);
         let samples: Vec<usize> = (row..self.samples()).step_by(self.rows).collect();
@@ -127,7 +133,7 @@ impl Dataset {
         self.resistances_ohm.nrows()
     }
 
-    /// Row-wires of the array, hence samples of each snapshot.
+    /// Row-wires read, hence samples of each snapshot.
     pub fn rows(&self) -> usize {
         self.rows
     }

@@ -76,6 +76,17 @@ pub enum NewtonError {
     },
 }
 
+impl NewtonError {
+    /// Refuses readings that are not above 0 and finite.
+    pub(super) fn check(readings_ohm: &[f64]) -> Result<(), Self> {
+        let bad = |&(_, value): &(usize, &f64)| !(*value > 0.0 && value.is_finite());
+        match readings_ohm.iter().enumerate().find(bad) {
+            Some((column, &value)) => Err(Self::Reading { column, value }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Gauss-Newton with Levenberg's damping and bounds on Eq. (2) for one known row-wire. Unknown is only what the scene
 /// moves.
 ///
@@ -108,6 +119,11 @@ impl Newton {
             ranges: ranges(model, scene),
             rules,
         }
+    }
+
+    /// Changes when to end.
+    pub(super) fn set_rules(&mut self, rules: NewtonRules) {
+        self.rules = rules;
     }
 
     /// Unknowns of a row.
@@ -148,10 +164,7 @@ impl Newton {
     }
 
     fn read(&mut self, row: usize, readings_ohm: &[f64]) -> Result<(), NewtonError> {
-        let bad = |&(_, value): &(usize, &f64)| !(*value > 0.0 && value.is_finite());
-        if let Some((column, &value)) = readings_ohm.iter().enumerate().find(bad) {
-            return Err(NewtonError::Reading { column, value });
-        }
+        NewtonError::check(readings_ohm)?;
         self.problem.read(row, readings_ohm);
         Ok(())
     }

@@ -3,7 +3,7 @@ use rand::Rng;
 
 use super::{
     box_posterior::{BoxPosterior, Marginal},
-    newton::{Newton, NewtonError, NewtonRules},
+    newton::{Newton, NewtonError, NewtonReport, NewtonRules},
     row_problem::{Range, RowProblem, ranges},
 };
 use crate::{
@@ -112,6 +112,17 @@ pub struct PosteriorReport {
     pub spread_mm: f64,
 }
 
+impl PosteriorReport {
+    /// Of readings without noise.
+    fn exact(report: NewtonReport) -> Self {
+        Self {
+            steps: report.steps,
+            residual: report.residual,
+            spread_mm: 0.0,
+        }
+    }
+}
+
 /// Most linearisations: two nearly always do, for conductance is nearly linear.
 const STEPS: usize = 8;
 /// Change of a mean, relative to the range, below which the linearisation is taken as found.
@@ -130,7 +141,12 @@ impl Posterior {
             problem: RowProblem::new(model, scene.movement.axes()),
             ranges: ranges(model, scene),
             rows: rows.to_vec(),
-            priors: RowPrior::of_rows(model, scene, rows, rng),
+            priors: if scene.noise.in_test().is_none() {
+                // The equations decide alone.
+                Vec::new()
+            } else {
+                RowPrior::of_rows(model, scene, rows, rng)
+            },
             noise: scene.noise.in_test().source(model)?,
             newton: Newton::new(model, scene, NewtonRules::default()),
         })
@@ -149,20 +165,65 @@ impl Posterior {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<PosteriorReport, NewtonError> {
-        let report = self.newton.solve(row, readings_ohm, coordinates_mm)?;
-        let exact = PosteriorReport {
-            steps: report.steps,
-            residual: report.residual,
-            spread_mm: 0.0,
-        };
-        if self.largest_noise(readings_ohm) < SMALLEST_NOISE {
-            return Ok(exact);
+        let is_noisy = NewtonError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
+        let middle: Vec<f64> = self.ranges.iter().map(|range| range.middle()).collect();
+        if is_noisy && let Some(report) = self.iterate(row, readings_ohm, middle, STEPS, coordinates_mm) {
+            return Ok(report);
         }
+        let report = self.newton.solve(row, readings_ohm, coordinates_mm)?;
+        Ok(PosteriorReport::exact(report))
+    }
+
+    /// As [`Self::solve`], by at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
+    /// replaced.
+    ///
+    /// # Errors
+    /// Readings that are no resistances.
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn polish(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        steps: usize,
+    ) -> Result<PosteriorReport, NewtonError> {
+        let is_noisy = NewtonError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
+        if is_noisy {
+            let mut first = vec![0.0; self.ranges.len()];
+            self.problem.read(row, readings_ohm);
+            self.problem.unknowns_of(coordinates_mm, &mut first);
+            for (value, range) in first.iter_mut().zip(&self.ranges) {
+                *value = range.clamp(*value);
+            }
+            if let Some(report) = self.iterate(row, readings_ohm, first, steps, coordinates_mm) {
+                return Ok(report);
+            }
+        }
+        let rules = NewtonRules {
+            steps,
+            ..NewtonRules::default()
+        };
+        self.newton.set_rules(rules);
+        let report = self.newton.polish(row, readings_ohm, coordinates_mm);
+        self.newton.set_rules(NewtonRules::default());
+        Ok(PosteriorReport::exact(report?))
+    }
+
+    /// Linearises anew at each mean, from `at` on; writes the medians. `None` if a posterior has no marginals.
+    fn iterate(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        mut at: Vec<f64>,
+        most_steps: usize,
+        coordinates_mm: &mut [f64],
+    ) -> Option<PosteriorReport> {
         self.problem.read(row, readings_ohm);
-        let mut at: Vec<f64> = self.ranges.iter().map(|range| range.middle()).collect();
         let mut answer = None;
         let mut steps = 0;
-        while steps < STEPS {
+        while steps < most_steps {
             steps += 1;
             let Some(marginals) = self.linearised(row, readings_ohm, &at) else {
                 break;
@@ -176,14 +237,12 @@ impl Posterior {
                 break;
             }
         }
-        let Some(marginals) = answer else {
-            return Ok(exact);
-        };
+        let marginals = answer?;
         let medians: Vec<f64> = marginals.iter().map(|marginal| marginal.median).collect();
         let residual = self.problem.evaluate(&medians);
         self.problem.coordinates_of(&medians, coordinates_mm);
         let variance = marginals.iter().map(|marginal| marginal.variance).sum::<f64>() / marginals.len() as f64;
-        Ok(PosteriorReport {
+        Some(PosteriorReport {
             steps,
             residual,
             spread_mm: variance.sqrt(),

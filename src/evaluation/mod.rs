@@ -3,23 +3,29 @@
 
 mod errors;
 pub mod experiments;
+mod decoder_set;
+mod outlook;
+mod preset;
 mod published;
 mod reference;
-mod row_networks;
 mod run;
 mod run_error;
 mod settings;
 mod spread;
+mod start_trainer;
 mod starts;
 mod table;
 
 pub use errors::{Errors, NodeAddress};
+pub use decoder_set::{DecoderKind, DecoderKindError, DecoderReport, DecoderSet, Precision};
+pub use outlook::{Outlook, OutlookError};
+pub use preset::{Preset, PresetError};
 pub use published::{PublishedErrors, published_errors};
 pub use reference::reference_errors;
-pub use row_networks::{RowTraining, train_row_networks};
 pub use run::{Baselines, Run};
 pub use run_error::RunError;
-pub use settings::{CountError, MOST_STARTS, RunSettings};
+pub use settings::{CountError, MOST_STARTS, ModelSize, RunSettings};
 pub use spread::Spread;
+pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};

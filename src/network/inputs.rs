@@ -1,5 +1,8 @@
+use std::{fmt, str::FromStr};
+
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::{MinMax, Quantity, ScalingError, Whitening};
 
@@ -52,6 +55,31 @@ pub enum InputScaling {
     MinMax(MinMax),
     /// Principal components to unit spread.
     Whitening(Whitening),
+}
+
+/// A word that is none of the scalings.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not a scaling: give minmax or whiten")]
+pub struct ScalingChoiceError(String);
+
+impl fmt::Display for ScalingChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::MinMax => "minmax",
+            Self::Whitening => "whiten",
+        })
+    }
+}
+
+impl FromStr for ScalingChoice {
+    type Err = ScalingChoiceError;
+
+    fn from_str(text: &str) -> Result<Self, ScalingChoiceError> {
+        let found = [Self::MinMax, Self::Whitening]
+            .into_iter()
+            .find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| ScalingChoiceError(text.to_owned()))
+    }
 }
 
 impl From<MinMax> for Inputs {

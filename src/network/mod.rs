@@ -4,6 +4,7 @@
 mod decoupling_network;
 mod inputs;
 mod mlp;
+mod networks;
 mod quantity;
 mod scaling;
 mod start;
@@ -12,8 +13,9 @@ mod tanh;
 mod whitening;
 
 pub use decoupling_network::{DecouplingNetwork, NetworkError};
-pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice};
+pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
 pub use mlp::{Mlp, Shape};
+pub use networks::Networks;
 pub use quantity::{Quantity, QuantityError};
 pub use scaling::{MinMax, ScalingError};
 pub use start::nguyen_widrow;

@@ -54,6 +54,15 @@ pub enum SceneError {
     /// Not a choice of rows.
     #[error("'{0}' is not a choice of rows: give all, known, or the number of a row from 1")]
     RowsText(String),
+    /// Not a loading.
+    #[error(
+        "'{0}' is not a loading: give random, smooth:MM (its correlation length), or indenter with :sphere, :flat-punch, \
+         :cylinder or :edge"
+    )]
+    LoadingText(String),
+    /// Not a choice of axes.
+    #[error("'{0}' is not a choice of axes: give z or xyz")]
+    AxesText(String),
     /// The shift sideways is impossible.
     #[error(
         "the largest shift sideways is {0} mm: it must be above 0 and finite; for none, let nodes move along z only"

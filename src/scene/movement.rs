@@ -1,3 +1,5 @@
+use std::{fmt, str::FromStr};
+
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
@@ -15,6 +17,28 @@ pub enum Movement {
         /// The largest shift along x, and along y, either way.
         largest_shift_mm: f64,
     },
+}
+
+impl fmt::Display for Movement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Z => "z",
+            Self::Xyz { .. } => "xyz",
+        })
+    }
+}
+
+impl FromStr for Movement {
+    type Err = SceneError;
+
+    /// Reads `z` or `xyz`.
+    fn from_str(text: &str) -> Result<Self, SceneError> {
+        match text.trim() {
+            "z" => Ok(Self::Z),
+            "xyz" => Ok(Self::SIDEWAYS),
+            _ => Err(SceneError::AxesText(text.to_owned())),
+        }
+    }
 }
 
 impl Movement {

@@ -7,10 +7,10 @@ use thiserror::Error;
 
 use super::{Bottleneck, CrossValidation};
 use crate::{
-    dataset::{Dataset, DatasetError, Folds, Seed, Split, Stream},
+    dataset::{Dataset, Folds, Seed, Split, Stream},
     decoupling::{Decoupler, LinearMap, TrainingMean},
     evaluation::{Baselines, Errors, Run, RunError, RunSettings},
-    network::DecouplingNetwork,
+    network::Networks,
 };
 
 /// What one trial of a cell came to.
@@ -36,7 +36,7 @@ pub struct Trial {
     /// Time of the quickest epoch, which other work on the machine has disturbed least.
     pub least_epoch_seconds: f64,
     /// The network; none from a cross-validation, which has one for each fold.
-    pub network: Option<DecouplingNetwork>,
+    pub network: Option<Networks>,
 }
 
 /// A trial that could not be carried out.
@@ -91,7 +91,7 @@ impl Trial {
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let set = draw(&settings)?;
+        let set = Run::training_set(&settings, settings.samples)?;
         let own_seed = nth_seed(settings.seed, repeat);
         let folds = Folds::deal(&set, folds, unit, &mut own_seed.rng(Stream::Split))?;
         let mut pooled = Pooled::new(&set);
@@ -119,6 +119,7 @@ impl Trial {
             baselines: Baselines {
                 mean: errors(&pooled.mean),
                 linear: errors(&pooled.linear),
+                reference: None,
             },
             bottleneck: errors(&pooled.bottleneck),
             networks: folds.count(),
@@ -148,15 +149,6 @@ fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Spent> {
         spent.seconds += trainer.elapsed().as_secs_f64();
     }
     Some(spent)
-}
-
-fn draw(settings: &RunSettings) -> Result<Dataset, RunError> {
-    settings.sensor.check()?;
-    settings.scene.check()?;
-    let mut rng = settings.seed.rng(Stream::Training);
-    let drawn: Result<_, DatasetError> =
-        Dataset::simulate(&settings.sensor, &settings.scene, settings.samples, &mut rng);
-    Ok(drawn?)
 }
 
 /// What is fitted and what is held out when fold `fold` is tested: the fold after it chooses the best weights.

@@ -1,0 +1,74 @@
+use std::{fmt, str::FromStr};
+
+use thiserror::Error;
+
+use super::RunSettings;
+use crate::{
+    network::InputChoice,
+    scene::{Rows, Scene},
+    training::{StoppingRules, TrainingSettings},
+};
+
+/// Where the settings of a run begin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// As the paper: all rows by one network, resistances between −1 and 1.
+    #[default]
+    Paper,
+    /// What measurement found best: known rows, whitened conductances, more samples, more patience.
+    Best,
+}
+
+/// A word that is none of the presets.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not a preset: give paper or best")]
+pub struct PresetError(String);
+
+impl Preset {
+    /// All of them, in the order offered.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Best];
+
+    /// The settings it stands for.
+    pub fn settings(self) -> RunSettings {
+        let paper = RunSettings::default();
+        match self {
+            Self::Paper => paper,
+            Self::Best => RunSettings {
+                scene: Scene {
+                    rows: Rows::Known,
+                    ..paper.scene
+                },
+                inputs: InputChoice::BEST,
+                samples: 5000,
+                validation_samples: 1000,
+                training: TrainingSettings {
+                    stopping: StoppingRules {
+                        max_fail: 30,
+                        min_gradient: 0.0,
+                        ..paper.training.stopping
+                    },
+                    ..paper.training
+                },
+                ..paper
+            },
+        }
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Paper => "paper",
+            Self::Best => "best",
+        })
+    }
+}
+
+impl FromStr for Preset {
+    type Err = PresetError;
+
+    fn from_str(text: &str) -> Result<Self, PresetError> {
+        let found = Self::ALL.into_iter().find(|preset| preset.to_string() == text.trim());
+        found.ok_or_else(|| PresetError(text.to_owned()))
+    }
+}
