@@ -156,11 +156,7 @@ impl DecoderSet {
     ///
     /// # Errors
     /// Samples that cannot be scaled, or a sensor without resistances at rest.
-    pub fn decoder(
-        &self,
-        kind: DecoderKind,
-        precision: Precision,
-    ) -> Result<Option<Box<dyn FrameDecoder>>, RunError> {
+    pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn FrameDecoder>>, RunError> {
         let Self {
             settings,
             rows,
@@ -185,9 +181,8 @@ impl DecoderSet {
             }
             DecoderKind::RadialBasis => {
                 let settings_of_basis = RadialBasisSettings::default();
-                let fit = |set: &Dataset| {
-                    RadialBasisNetwork::fit(set, settings.inputs, noise, settings_of_basis, &mut rng)
-                };
+                let fit =
+                    |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, noise, settings_of_basis, &mut rng);
                 Some(Box::new(fit_rows(training, known, fit)?) as Box<dyn FrameDecoder>)
             }
             DecoderKind::Network => networks.map(|networks| match precision {

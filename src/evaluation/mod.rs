@@ -1,9 +1,9 @@
 //! What a decoupler is worth: axis errors as the paper defines them and beyond, the published figures, and a whole
 //! run from settings to report.
 
+mod decoder_set;
 mod errors;
 pub mod experiments;
-mod decoder_set;
 mod outlook;
 mod preset;
 mod published;
@@ -15,9 +15,10 @@ mod spread;
 mod start_trainer;
 mod starts;
 mod table;
+mod trade;
 
-pub use errors::{Errors, NodeAddress};
 pub use decoder_set::{DecoderKind, DecoderKindError, DecoderReport, DecoderSet, Precision};
+pub use errors::{Errors, NodeAddress};
 pub use outlook::{Outlook, OutlookError};
 pub use preset::{Preset, PresetError};
 pub use published::{PublishedErrors, published_errors};
@@ -29,3 +30,4 @@ pub use spread::Spread;
 pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
+pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under, pareto_front};

@@ -344,11 +344,7 @@ impl Task {
         validation: Option<&Dataset>,
         test: &Dataset,
     ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(
-            settings.inputs,
-            training.resistances_ohm.view(),
-            unseen_noise(settings),
-        )?;
+        let inputs = Inputs::fit(settings.inputs, training.resistances_ohm.view(), unseen_noise(settings))?;
         let outputs = MinMax::fit(training.coordinates_mm.view())?;
         let examples = |set: &Dataset| {
             let scaled = inputs.of(set.resistances_ohm.view());
@@ -375,10 +371,15 @@ impl Task {
 /// The relative noise that readings have and the training set lacks, with which whitening reckons.
 pub(super) fn unseen_noise(settings: &RunSettings) -> f64 {
     let noise = settings.scene.noise;
-    if noise.sets == NoisySets::Test { noise.relative } else { 0.0 }
+    if noise.sets == NoisySets::Test {
+        noise.relative
+    } else {
+        0.0
+    }
 }
 
-fn reference(settings: &RunSettings, test: &Dataset) -> Result<Errors, RunError> {
+/// The errors of the Bayesian reference on `test`.
+pub(super) fn reference(settings: &RunSettings, test: &Dataset) -> Result<Errors, RunError> {
     let RunSettings {
         sensor, scene, seed, ..
     } = settings;

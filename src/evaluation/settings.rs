@@ -114,9 +114,13 @@ impl RunSettings {
 
     /// What the paper reports for this configuration, if it does.
     pub fn published(&self) -> Option<PublishedErrors> {
-        let is_papers = self.scene == Scene::default() && self.inputs == InputChoice::PAPER;
         let published = PublishedErrors::of(self.sensor.scale, self.hidden, self.samples);
-        published.filter(|_| is_papers)
+        published.filter(|_| self.is_papers_scene())
+    }
+
+    /// Whether scene and inputs are those of the paper's experiments.
+    pub fn is_papers_scene(&self) -> bool {
+        self.scene == Scene::default() && self.inputs == InputChoice::PAPER
     }
 
     /// What is to be found, from what, by how many networks.

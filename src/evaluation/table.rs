@@ -80,5 +80,9 @@ pub fn error_rows(network: &Errors, baselines: &Baselines, published: Option<&Pu
     ];
     let reference = baselines.reference.as_ref();
     let reference = reference.map(|errors| ErrorRow::measured("reference", errors));
-    measured.into_iter().chain(reference).chain(published.map(ErrorRow::published)).collect()
+    measured
+        .into_iter()
+        .chain(reference)
+        .chain(published.map(ErrorRow::published))
+        .collect()
 }

@@ -93,11 +93,23 @@ mod tests {
 
     #[test]
     fn loadings_are_read_as_they_are_written() {
-        for text in ["random", "smooth:4", "indenter:sphere", "indenter:flat-punch", "indenter:cylinder", "indenter:edge"] {
+        for text in [
+            "random",
+            "smooth:4",
+            "indenter:sphere",
+            "indenter:flat-punch",
+            "indenter:cylinder",
+            "indenter:edge",
+        ] {
             assert_eq!(text.parse::<Loading>().unwrap().to_string(), text);
         }
         assert_eq!("indenter".parse(), Ok(Loading::Indenter(Indenter::default())));
-        for (text, word) in [("smooth", "smooth:MM"), ("smooth:-1", "above 0"), ("indenter:cone", "indenter"), ("", "random")] {
+        for (text, word) in [
+            ("smooth", "smooth:MM"),
+            ("smooth:-1", "above 0"),
+            ("indenter:cone", "indenter"),
+            ("", "random"),
+        ] {
             let message = text.parse::<Loading>().unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
         }
