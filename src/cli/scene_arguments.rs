@@ -62,7 +62,13 @@ fn noisy_sets(text: &str) -> Result<NoisySets, String> {
 impl SceneArguments {
     /// The settings of the preset with the scene and inputs given, at the first noise given.
     pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
-        self.applied(self.preset.unwrap_or_default().settings())
+        self.settings_at(self.preset.unwrap_or_default(), self.noise.first().copied())
+    }
+
+    /// The settings of this preset with the scene and inputs given, at this relative noise.
+    pub(super) fn settings_at(&self, preset: Preset, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
+        let noise = self.noise(Noise::default(), relative_noise);
+        self.applied(preset.settings_in(noise), relative_noise)
     }
 
     /// The one noise of commands that take no several.
@@ -74,21 +80,25 @@ impl SceneArguments {
         Ok(())
     }
 
+    /// `present` with what is given of the noise.
+    fn noise(&self, present: Noise, relative: Option<f64>) -> Noise {
+        let bits = self.adc_bits.and_then(|bits| u8::try_from(bits).ok());
+        Noise {
+            relative: relative.unwrap_or(present.relative),
+            additive_ohm: self.noise_ohm.unwrap_or(present.additive_ohm),
+            converter_bits: bits.or(present.converter_bits),
+            drift: self.drift.unwrap_or(present.drift),
+            sets: self.noise_in.unwrap_or(present.sets),
+        }
+    }
+
     /// `settings` with the scene and inputs given.
-    pub(super) fn applied(&self, mut settings: RunSettings) -> Result<RunSettings, Failure> {
+    fn applied(&self, mut settings: RunSettings, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
         let scene = &mut settings.scene;
         scene.rows = self.rows.unwrap_or(scene.rows);
         scene.movement = self.axes.unwrap_or(scene.movement);
         scene.loading = self.loading.unwrap_or(scene.loading);
-        let noise = &mut scene.noise;
-        noise.relative = self.noise.first().copied().unwrap_or(noise.relative);
-        noise.additive_ohm = self.noise_ohm.unwrap_or(noise.additive_ohm);
-        noise.converter_bits = self
-            .adc_bits
-            .and_then(|bits| u8::try_from(bits).ok())
-            .or(noise.converter_bits);
-        noise.drift = self.drift.unwrap_or(noise.drift);
-        noise.sets = self.noise_in.unwrap_or(noise.sets);
+        scene.noise = self.noise(scene.noise, relative_noise);
         settings.inputs.quantity = self.inputs.unwrap_or(settings.inputs.quantity);
         settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
         scene
@@ -102,10 +112,10 @@ impl SceneArguments {
         let mut asked = *saved;
         if let Some(preset) = self.preset {
             let of_preset = preset.settings();
-            asked.scene = of_preset.scene;
+            asked.scene.rows = of_preset.scene.rows;
             asked.inputs = of_preset.inputs;
         }
-        let asked = self.applied(asked)?;
+        let asked = self.applied(asked, self.noise.first().copied())?;
         let differs = [
             (asked.scene.rows != saved.scene.rows, "rows"),
             (asked.scene.movement != saved.scene.movement, "axes"),

@@ -33,7 +33,7 @@ pub(super) struct Trade {
     #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
     array: ArrayScale,
     /// Hidden nodes of the networks
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12,24", value_parser = count(1..=LARGEST_HIDDEN))]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Vec<usize>,
     /// Most epochs [default: those of the preset]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
@@ -105,8 +105,7 @@ impl Trade {
     }
 
     fn settings(&self, preset: Preset, noise: f64) -> Result<RunSettings, Failure> {
-        let mut settings = self.scene.applied(preset.settings())?;
-        settings.scene.noise.relative = noise;
+        let mut settings = self.scene.settings_at(preset, Some(noise))?;
         settings.sensor = SensorModel::new(self.array);
         settings.samples = self.samples.unwrap_or(settings.samples);
         settings.test_samples = self.test_samples;

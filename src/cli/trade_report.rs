@@ -36,7 +36,12 @@ impl Level {
 
 /// The command that trains this choice.
 fn command(point: &TradePoint) -> String {
-    let (of_preset, settings) = (point.preset.settings(), &point.settings);
+    let settings = &point.settings;
+    // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
+    let of_preset = RunSettings {
+        scene: point.preset.settings().scene,
+        ..point.preset.settings_in(settings.scene.noise)
+    };
     let array = settings.sensor.scale.to_string().replace('×', "x");
     let mut command = format!("decoupler train --preset {} --array {array}", point.preset);
     let mut add = |name: &str, value: &dyn Fn(&RunSettings) -> String| {

@@ -11,6 +11,9 @@ use crate::network::{DecouplingNetwork, Quantity};
 ///
 /// Inputs are taken relative to a resistance R₀ in the middle of each channel, subtracted in double precision:
 /// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. So single precision loses nothing where readings differ little.
+///
+/// Whitening without noise amplifies patterns that hardly vary a million times, so large products nearly cancel. Where
+/// single precision would show there, the hidden layer's sums are made in double precision; the rest is not.
 #[derive(Clone, Debug)]
 pub struct CompiledNetworks<T> {
     rows: usize,
@@ -21,6 +24,9 @@ pub struct CompiledNetworks<T> {
     inputs: Vec<T>,
     hidden: Vec<T>,
     outputs: Vec<T>,
+    /// Inputs and sums of one row in double precision.
+    wide_inputs: Vec<f64>,
+    wide_sums: Vec<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -30,6 +36,8 @@ struct Compiled<T> {
     centre_ohm: Vec<f64>,
     /// (channels + 1) × padded hidden nodes, the bias last.
     hidden_layer: Vec<T>,
+    /// The same in double precision, where sums need it.
+    wide_hidden_layer: Option<Vec<f64>>,
     /// (padded hidden nodes + 1) × padded outputs, the bias last.
     output_layer: Vec<T>,
     /// The middle of every coordinate, which constant ones keep.
@@ -39,6 +47,11 @@ struct Compiled<T> {
     padded_hidden: usize,
     padded_outputs: usize,
 }
+
+/// Rounding of the hidden layer's sums from which they are made in double precision.
+const LARGEST_ROUNDING: f64 = 1e-5;
+/// How far readings are from R₀, in proportion, for the estimate of rounding.
+const USUAL_CHANGE: f64 = 0.1;
 
 /// Layers are padded to a multiple of this.
 const LANES: usize = 4;
@@ -71,6 +84,8 @@ impl<T: Real> CompiledNetworks<T> {
             inputs: vec![T::ZERO; rows * channels],
             hidden: vec![T::ZERO; rows * hidden],
             outputs: vec![T::ZERO; rows * outputs],
+            wide_inputs: vec![0.0; channels],
+            wide_sums: vec![0.0; hidden],
             networks,
         }
     }
@@ -95,14 +110,24 @@ impl<T: Real> Compiled<T> {
         let folded = matrix
             .t()
             .dot(&mlp.hidden_layer().slice_axis(Axis(0), Slice::from(..shape.inputs)));
-        let mut hidden_layer = vec![T::ZERO; (channels + 1) * padded_hidden];
+        let usual_input = |channel: usize| match quantity {
+            Quantity::Conductance | Quantity::LogResistance => USUAL_CHANGE,
+            Quantity::Resistance => USUAL_CHANGE * centre_ohm[channel],
+        };
+        let mut wide = vec![0.0; (channels + 1) * padded_hidden];
+        let mut rounding = 0.0_f64;
         for node in 0..shape.hidden {
+            let mut squares = 0.0;
             for channel in 0..channels {
                 let weight = folded[[channel, node]] * per_computed(channel);
-                hidden_layer[channel * padded_hidden + node] = T::of(weight);
+                wide[channel * padded_hidden + node] = weight;
+                squares += (weight * usual_input(channel)).powi(2);
             }
-            hidden_layer[channels * padded_hidden + node] = T::of(mlp.hidden_layer()[[shape.inputs, node]]);
+            wide[channels * padded_hidden + node] = mlp.hidden_layer()[[shape.inputs, node]];
+            rounding = rounding.max(T::EPSILON * squares.sqrt());
         }
+        let hidden_layer = wide.iter().map(|&weight| T::of(weight)).collect();
+        let is_wide = T::EPSILON > f64::EPSILON && rounding > LARGEST_ROUNDING;
         let ranges = network.outputs().middles_and_half_widths();
         let varying = network.outputs().varying();
         let mut output_layer = vec![T::ZERO; (padded_hidden + 1) * padded_outputs];
@@ -119,6 +144,7 @@ impl<T: Real> Compiled<T> {
             quantity,
             centre_ohm,
             hidden_layer,
+            wide_hidden_layer: is_wide.then_some(wide),
             output_layer,
             middles_mm: ranges.iter().map(|range| range.0).collect(),
             varying,
@@ -128,15 +154,15 @@ impl<T: Real> Compiled<T> {
     }
 
     #[inline(always)]
-    fn read(&self, readings_ohm: &[f64], inputs: &mut [T]) {
+    fn read<U: Real>(&self, readings_ohm: &[f64], inputs: &mut [U]) {
         let pairs = inputs.iter_mut().zip(readings_ohm).zip(&self.centre_ohm);
         match self.quantity {
-            Quantity::Resistance => pairs.for_each(|((input, &ohm), &centre)| *input = T::of(ohm - centre)),
+            Quantity::Resistance => pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre)),
             Quantity::Conductance => {
-                pairs.for_each(|((input, &ohm), &centre)| *input = T::of(ohm - centre) / T::of(ohm));
+                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre) / U::of(ohm));
             }
             Quantity::LogResistance => {
-                pairs.for_each(|((input, &ohm), &centre)| *input = T::of(((ohm - centre) / centre).ln_1p()));
+                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(((ohm - centre) / centre).ln_1p()));
             }
         }
     }
@@ -159,10 +185,17 @@ impl<T: Real> CompiledNetworks<T> {
         for row in 0..self.rows {
             let network = &self.networks[row.min(last)];
             let channels = row * self.channels..(row + 1) * self.channels;
-            let inputs = &mut self.inputs[channels.clone()];
-            network.read(&readings_ohm[channels], inputs);
             let hidden = &mut self.hidden[row * hidden_width..row * hidden_width + network.padded_hidden];
-            affine(inputs, &network.hidden_layer, hidden);
+            if let Some(layer) = &network.wide_hidden_layer {
+                let sums = &mut self.wide_sums[..network.padded_hidden];
+                network.read(&readings_ohm[channels], &mut self.wide_inputs);
+                affine(&self.wide_inputs, layer, sums);
+                hidden.iter_mut().zip(sums).for_each(|(to, sum)| *to = T::of(*sum));
+            } else {
+                let inputs = &mut self.inputs[channels.clone()];
+                network.read(&readings_ohm[channels], inputs);
+                affine(inputs, &network.hidden_layer, hidden);
+            }
         }
         T::tanh_in_place(&mut self.hidden);
         for row in 0..self.rows {

@@ -47,6 +47,8 @@ pub enum Centres {
 
 /// Rounds of Lloyd's algorithm.
 const ROUNDS: usize = 20;
+/// Samples among which clusters are sought: a few for each are enough.
+const MOST_CLUSTERED: usize = 1000;
 
 impl Default for RadialBasisSettings {
     fn default() -> Self {
@@ -152,8 +154,11 @@ fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Means of `count` clusters of the rows of `x`, begun at rows drawn by `rng`.
+/// Means of `count` clusters of the rows of `x`, or of [`MOST_CLUSTERED`] of them, begun at rows drawn by `rng`.
 fn k_means(x: ArrayView2<'_, f64>, count: usize, rng: &mut impl Rng) -> Array2<f64> {
+    let most = MOST_CLUSTERED.max(count);
+    let drawn = (x.nrows() > most).then(|| x.select(Axis(0), &index::sample(rng, x.nrows(), most).into_vec()));
+    let x = drawn.as_ref().map_or(x, |drawn| drawn.view());
     let mut centres = x.select(Axis(0), &index::sample(rng, x.nrows(), count).into_vec());
     for _ in 0..ROUNDS {
         let mut sums = Array2::<f64>::zeros(centres.dim());

@@ -6,6 +6,8 @@ use crate::network::{tanh_in_place, tanh_in_place_single};
 pub trait Real: Copy + Send + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
     /// 0.
     const ZERO: Self;
+    /// The relative spacing of numbers.
+    const EPSILON: f64;
 
     /// The nearest value to a double.
     fn of(value: f64) -> Self;
@@ -19,6 +21,7 @@ pub trait Real: Copy + Send + Add<Output = Self> + Mul<Output = Self> + Div<Outp
 
 impl Real for f64 {
     const ZERO: Self = 0.0;
+    const EPSILON: f64 = f64::EPSILON;
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -38,6 +41,7 @@ impl Real for f64 {
 
 impl Real for f32 {
     const ZERO: Self = 0.0;
+    const EPSILON: f64 = f32::EPSILON as f64;
 
     #[inline(always)]
     fn of(value: f64) -> Self {

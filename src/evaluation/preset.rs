@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::RunSettings;
 use crate::{
     network::InputChoice,
-    scene::{Rows, Scene},
+    scene::{Noise, Rows, Scene},
     training::{StoppingRules, TrainingSettings},
 };
 
@@ -28,9 +28,21 @@ impl Preset {
     /// All of them, in the order offered.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Best];
 
-    /// The settings it stands for.
+    /// The settings it stands for, without noise.
     pub fn settings(self) -> RunSettings {
-        let paper = RunSettings::default();
+        self.settings_in(Noise::default())
+    }
+
+    /// The settings it stands for where readings bear `noise`: then a network is as good as its samples are many, and
+    /// it has learnt what it can after few epochs.
+    pub fn settings_in(self, noise: Noise) -> RunSettings {
+        let mut paper = RunSettings::default();
+        paper.scene.noise = noise;
+        let (samples, validation_samples, epochs) = if noise.is_none() {
+            (5000, 1000, 1000)
+        } else {
+            (50_000, 5000, 100)
+        };
         match self {
             Self::Paper => paper,
             Self::Best => RunSettings {
@@ -39,10 +51,11 @@ impl Preset {
                     ..paper.scene
                 },
                 inputs: InputChoice::BEST,
-                samples: 5000,
-                validation_samples: 1000,
+                samples,
+                validation_samples,
                 training: TrainingSettings {
                     stopping: StoppingRules {
+                        epochs,
                         max_fail: 30,
                         min_gradient: 0.0,
                         ..paper.training.stopping
