@@ -24,8 +24,8 @@ pub enum Method {
     /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`). Its equations are
     /// always factored, since it needs the trace of their inverse.
     BayesianRegularization(BayesianRegularizationSettings),
-    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer, their equations solved as those of
-    /// Levenberg-Marquardt.
+    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer. Its equations are always factored: its
+    /// damping falls so low that conjugate gradients would need thousands of iterations.
     VariableProjection(VariableProjectionSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
     ScaledConjugateGradient(ScaledConjugateGradientSettings),
@@ -171,9 +171,8 @@ impl Method {
     /// How it solves the normal equations for a network of this shape and so many samples, if it has any.
     fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
         match self {
-            Self::LevenbergMarquardt(_) | Self::VariableProjection(_) => Some(Way::cheaper(shape, samples)),
-            // It needs the trace of the inverse.
-            Self::BayesianRegularization(_) => Some(Way::Factored),
+            Self::LevenbergMarquardt(_) => Some(Way::cheaper(shape, samples)),
+            Self::BayesianRegularization(_) | Self::VariableProjection(_) => Some(Way::Factored),
             _ => None,
         }
     }

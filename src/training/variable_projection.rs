@@ -4,6 +4,7 @@ use super::{
     Evaluation, Examples, NormalEquations, Setting, StopReason,
     algorithm::{Algorithm, MethodState, place},
     levenberg_marquardt::SMALLEST_MU,
+    normal_equations::Way,
 };
 use crate::network::Mlp;
 
@@ -100,7 +101,7 @@ pub struct ProjectionState {
 impl VariableProjection {
     /// Gathers the normal equations at the start.
     pub(super) fn new(settings: VariableProjectionSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::new(mlp.shape(), examples);
+        let mut equations = NormalEquations::solved_by(Way::Factored, mlp.shape(), examples);
         let now = equations.gather(mlp, examples);
         let method = Self {
             settings,

@@ -160,6 +160,8 @@ fn enter_saves_and_the_suggested_name_tells_runs_apart() {
     driver.click("Loss curves…");
     let suggested = driver.get("File").value().unwrap();
     assert!(suggested.ends_with("loss-10x6_3x18-h6-lm-seed0.csv"), "{suggested}");
+    driver.settle();
+    assert!(driver.get("File").is_focused(), "typing begins at once");
     driver.enter("File", &path.display().to_string());
     driver.wait("the file", |driver| driver.says("Saved "));
     assert_eq!(names(folder.path()), ["loss.csv"]);

@@ -40,6 +40,10 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                 actions.push(Action::EditPath(path.clone()));
             }
             let entered = edit.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
+            // Typing and Enter are all it takes; Tab still reaches the buttons.
+            if ui.memory(|memory| memory.focused().is_none()) {
+                edit.request_focus();
+            }
             ui.add_space(space(3));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let theme = Theme::of(ui);

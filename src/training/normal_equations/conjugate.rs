@@ -119,7 +119,7 @@ impl ConjugateGradient {
         let mut length = self.precondition();
         self.direction.copy_from_slice(&self.preconditioned);
         let goal = TOLERANCE * TOLERANCE * length;
-        for iteration in 0..MOST_ITERATIONS {
+        for _ in 0..MOST_ITERATIONS {
             self.apply(system, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
@@ -138,9 +138,6 @@ impl ConjugateGradient {
             let before = length;
             length = self.precondition();
             if length <= goal {
-                if std::env::var("COUNT").is_ok() {
-                    eprint!("[{}] ", iteration + 1);
-                }
                 break;
             }
             for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {

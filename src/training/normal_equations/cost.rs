@@ -30,11 +30,6 @@ const SPEED: f64 = 2.0;
 impl Way {
     /// The cheaper way for a network of this shape and so many samples.
     pub(in crate::training) fn cheaper(shape: Shape, samples: usize) -> Self {
-        match std::env::var("WAY").as_deref() {
-            Ok("f") => return Self::Factored,
-            Ok("i") => return Self::Iterated,
-            _ => {}
-        }
         let [factored, iterated] = [Self::Factored, Self::Iterated].map(|way| {
             let gathering = samples as f64 * way.gathering_per_sample(shape);
             gathering + way.solving(shape, samples)
