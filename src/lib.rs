@@ -6,12 +6,12 @@
 //!
 //! | module | what it knows |
 //! |---|---|
-//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
-//! | [`scene`] | what happens to the sensor: which deformations are drawn |
+//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian, what readings can tell |
+//! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
 //! | [`dataset`] | samples (one row-wire each), drawn as whole snapshots; splits |
 //! | [`network`] | the three-layer network, its start, its scaling, its file |
 //! | [`training`] | methods, the stepped [`training::Trainer`], why it stopped |
-//! | [`decoupling`] | resistances to deformation: network, linear map, mean |
+//! | [`decoupling`] | resistances to deformation, every way we know |
 //! | [`evaluation`] | axis errors, tables, a whole run from settings to report |
 //! | [`surface`] | smooth surfaces through the nodes |
 //! | [`export`] | files for other programs |

@@ -115,7 +115,7 @@ fn damage_is_named_and_said_where() {
         ),
         (
             "a newer version",
-            replaced("\"version\":1", "\"version\":2"),
+            replaced("\"version\":2", "\"version\":3"),
             "install a newer one",
         ),
         (
@@ -123,10 +123,10 @@ fn damage_is_named_and_said_where() {
             "{\"format\":\"decoupler network\",\"version\":9,\"w\":0}".to_owned(),
             "version 9",
         ),
-        ("no version", replaced("\"version\":1,", ""), "missing field `version`"),
+        ("no version", replaced("\"version\":2,", ""), "missing field `version`"),
         (
             "an impossible version",
-            replaced("\"version\":1", "\"version\":0"),
+            replaced("\"version\":2", "\"version\":0"),
             "no version 0",
         ),
         (

@@ -4,7 +4,7 @@
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{MOST_STARTS, Run, RunError, RunSettings, best_start},
+    evaluation::{MOST_STARTS, Run, RunError, RunSettings, StartTrainer, best_start},
     sensor::SensorModel,
     training::{Method, StopReason, StoppingRules, Trainer},
 };
@@ -32,9 +32,14 @@ fn trained(settings: RunSettings) -> Run {
 
 /// Present and best weights of every start as bits, and its epochs.
 fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
-    let of = |trainer: &Trainer| {
-        let weights = trainer.present().weights().iter().chain(trainer.best().weights());
-        let bits = weights.map(|weight| weight.to_bits()).collect();
+    let of = |trainer: &StartTrainer| {
+        let weights = |row: &Trainer| [row.present().weights(), row.best().weights()].concat();
+        let bits = trainer
+            .rows()
+            .iter()
+            .flat_map(weights)
+            .map(|weight| weight.to_bits())
+            .collect();
         (bits, trainer.latest().epoch, trainer.stop_reason())
     };
     run.trainers().iter().map(of).collect()
@@ -69,7 +74,13 @@ fn the_start_of_lowest_validation_error_leads() {
         let lowest = starts[number].deciding_mse();
         assert!(starts.iter().all(|start| lowest <= start.deciding_mse()));
         assert_eq!(starts[number].validation_mse.is_some(), validation_samples > 0);
-        assert_eq!(run.network().mlp(), run.trainers()[number].best());
+        assert!(
+            run.network()
+                .each()
+                .iter()
+                .map(|network| network.mlp())
+                .eq(run.trainers()[number].best())
+        );
         assert_eq!(run.decouple_test().1.z_percent, starts[number].z_percent);
         assert_eq!(run.stop_reason(), run.leader().stop_reason());
     }

@@ -23,6 +23,7 @@ use super::{
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     export::{CheckpointFile, NetworkFile},
+    scene::Rows,
     training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
 };
 
@@ -419,7 +420,7 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
     let baselines = *run.baselines();
     let began = Began {
         settings,
-        weights: run.leader().present().shape().weights(),
+        weights: run.leader().weights(),
         test,
         baselines,
     };
@@ -428,6 +429,13 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
 
 fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
     let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+    if let Rows::One(_) = file.settings.scene.rows {
+        return Err(format!(
+            "'{}' reads one row only, and the window shows whole arrays: go on with it in a terminal, by decoupler \
+             train --resume",
+            path.display()
+        ));
+    }
     let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
     resumed.map_err(|error| format!("'{}': {error}", path.display()))
 }

@@ -8,7 +8,10 @@ use std::{
 
 use clap::{Parser, Subcommand, error::ErrorKind};
 
-use super::{decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, train::Train};
+use super::{
+    decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
+    train::Train,
+};
 
 /// Opens the window and returns when it is closed.
 pub type Window = fn() -> Result<(), Box<dyn Error>>;
@@ -27,8 +30,9 @@ struct Arguments {
 enum Command {
     Train(Box<Train>),
     Decode(Decode),
-    Simulate(Simulate),
+    Simulate(Box<Simulate>),
     Reproduce(Reproduce),
+    Trade(Box<Trade>),
 }
 
 /// Does what `arguments` (the program's name first) ask for. `window` is what a call without a command opens, in
@@ -46,7 +50,9 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
         Err(failure) if !failure.is_broken_pipe() => {
             // Nobody is left to tell if this fails.
             let _ = match &failure {
-                Failure::Interrupted(_) | Failure::InterruptedTrials { .. } => writeln!(stderr(), "{failure}"),
+                Failure::Interrupted(_) | Failure::InterruptedTrials { .. } | Failure::InterruptedTrade { .. } => {
+                    writeln!(stderr(), "{failure}")
+                }
                 _ => writeln!(stderr(), "error: {failure}"),
             };
             ExitCode::from(failure.status())
@@ -65,6 +71,7 @@ impl Arguments {
             Some(Command::Decode(decode)) => decode.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
+            Some(Command::Trade(trade)) => trade.run(),
             None => window.ok_or(Failure::NoWindow)?().map_err(Failure::Window),
         }
     }

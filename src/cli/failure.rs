@@ -12,6 +12,7 @@ use crate::{
     dataset::{DatasetError, ReadError},
     evaluation::{RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
+    scene::Rows,
     training::SettingError,
 };
 
@@ -40,6 +41,8 @@ pub(super) enum Failure {
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
+    #[error("interrupted after {done} points")]
+    InterruptedTrade { done: usize },
     #[error("cannot make the folder '{}': {source}", .path.display())]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -52,6 +55,15 @@ pub(super) enum Failure {
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
+    #[error("'{}': line {line}: it is of row {row}, but the network reads row {rows} only", .path.display())]
+    OtherRow {
+        path: PathBuf,
+        line: u64,
+        row: usize,
+        rows: Rows,
+    },
+    #[error("'{}': the lines are no whole snapshots of {rows} rows: add the rest, or a column named row with the number of each line's row-wire", .path.display())]
+    PartOfSnapshot { path: PathBuf, rows: usize },
     #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
 }
@@ -95,7 +107,9 @@ impl Failure {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) => 2,
-            Self::Interrupted(_) | Self::InterruptedTrials { .. } => interruption::STATUS,
+            Self::Interrupted(_) | Self::InterruptedTrials { .. } | Self::InterruptedTrade { .. } => {
+                interruption::STATUS
+            }
             _ => 1,
         }
     }

@@ -1,4 +1,4 @@
-//! The work without a window: `decoupler train`, `decode`, `simulate` and `reproduce`.
+//! The work without a window: `decoupler train`, `decode`, `simulate`, `reproduce` and `trade`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` then first keeps what it has.
@@ -10,8 +10,11 @@ mod failure;
 mod interruption;
 mod reproduce;
 mod reproduce_report;
+mod scene_arguments;
 mod simulate;
 mod spread_plot;
+mod trade;
+mod trade_report;
 mod train;
 mod train_report;
 mod training_arguments;

@@ -8,11 +8,13 @@ use clap::Args;
 use super::{
     arguments::{count, seed},
     failure::Failure,
+    scene_arguments::SceneArguments,
 };
 use crate::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, Stream},
+    dataset::{Dataset, DatasetError, LARGEST_SAMPLES, Seed, Stream},
+    decoupling::{FrameDecoder, decode_set},
+    evaluation::{DecoderSet, Precision, Run, RunError, RunSettings},
     export::{AtomicFile, WriteError, write_samples, write_samples_header},
-    scene::Scene,
     sensor::{ArrayScale, SensorModel},
 };
 
@@ -23,7 +25,8 @@ const BLOCK: usize = 64;
 ///
 /// A line is one row-wire at one moment: snapshot and row counted from 1, its resistances r_1, r_2, … in ohm, and
 /// x_1, y_1, z_1, x_2, … of its nodes in mm. Samples come as whole snapshots of all rows. With the seed and array of
-/// a training they are its test samples.
+/// a training they are its test samples. With --decoder, one of them, the coordinates that it decodes follow as
+/// decoded_x_1, …; networks are first trained with the settings of the preset.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Simulate {
@@ -36,6 +39,8 @@ pub(super) struct Simulate {
     /// From which everything random follows
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
+    #[command(flatten)]
+    scene: SceneArguments,
     /// File to write instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -58,16 +63,48 @@ impl Simulate {
     }
 
     fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
-        let model = SensorModel::new(self.array);
-        let mut rng = Seed(self.seed).rng(Stream::Test);
-        let rows = self.array.rows();
-        let snapshots = self.samples.div_ceil(rows);
-        write_samples_header(self.array, writer).map_err(&refused)?;
+        let settings = RunSettings {
+            sensor: SensorModel::new(self.array),
+            seed: Seed(self.seed),
+            ..self.scene.settings()?
+        };
+        let RunSettings {
+            sensor, scene, seed, ..
+        } = &settings;
+        let rows = scene.rows.read(self.array.rows()).map_err(DatasetError::from)?;
+        let mut decoder = self.decoder(&settings)?;
+        let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
+        let snapshots = self.samples.div_ceil(rows.len());
+        write_samples_header(self.array, decoder.is_some(), writer).map_err(&refused)?;
         for first in (0..snapshots).step_by(BLOCK) {
-            let samples = BLOCK.min(snapshots - first) * rows;
-            let set = Dataset::simulate(&model, &Scene::default(), samples, &mut rng)?;
-            write_samples(&set, first + 1, writer).map_err(&refused)?;
+            let samples = BLOCK.min(snapshots - first) * rows.len();
+            let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
+            set.disturb(sensor, &scene.noise.in_test(), &mut noise_rng)
+                .map_err(RunError::from)?;
+            let decoded_mm = match &mut decoder {
+                Some(decoder) => Some(decode_set(&mut **decoder, &set).map_err(RunError::from)?),
+                None => None,
+            };
+            write_samples(&set, &rows, decoded_mm.as_ref(), first + 1, writer).map_err(&refused)?;
         }
         Ok(())
+    }
+
+    /// The decoder asked for, trained if need be.
+    fn decoder(&self, settings: &RunSettings) -> Result<Option<Box<dyn FrameDecoder>>, Failure> {
+        self.scene.check_one_noise()?;
+        let kind = match self.scene.decoder[..] {
+            [] => return Ok(None),
+            [kind] => kind,
+            _ => return Err(Failure::Arguments("--decoder: give one here".to_owned())),
+        };
+        let networks = if kind.needs_network() {
+            let mut run = Run::prepare(*settings)?;
+            while run.step().is_none() {}
+            Some(run.network())
+        } else {
+            None
+        };
+        Ok(DecoderSet::new(settings, networks)?.decoder(kind, Precision::Double)?)
     }
 }

@@ -15,14 +15,15 @@ use super::{
     training_arguments::TrainingArguments,
 };
 use crate::{
-    evaluation::Run,
+    evaluation::{DecoderKind, DecoderReport, DecoderSet, Precision, Run},
     export::{CheckpointFile, NetworkFile, check_writable, format_number},
 };
 
 /// Train a network and print what it is worth
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
-/// set, with the best linear map, and with the published figures where there are any. Ctrl-C stops after the epoch,
+/// set, with the best linear map, with other decoders, with what is possible at all in the scene (the reference), and
+/// with the published figures where there are any. Ctrl-C stops after the epoch,
 /// keeps what there is, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
@@ -66,12 +67,29 @@ impl Train {
         if let Some(path) = &self.out {
             file.save(path)?;
         }
-        if self.json {
-            print_json(&file)?;
+        let decoders = if end.is_ok() {
+            self.measure_decoders(&run)?
         } else {
-            print_text(&file)?;
+            Vec::new()
+        };
+        if self.json {
+            print_json(&file, &decoders)?;
+        } else {
+            print_text(&file, &decoders)?;
         }
         end
+    }
+
+    fn measure_decoders(&self, run: &Run) -> Result<Vec<DecoderReport>, Failure> {
+        let set = DecoderSet::of_run(run)?;
+        let mut reports = Vec::new();
+        for kind in self.training.scene.decoders() {
+            let single = (kind == DecoderKind::Network).then_some(Precision::Single);
+            for precision in std::iter::once(Precision::Double).chain(single) {
+                reports.extend(set.measure(kind, precision, run.test())?);
+            }
+        }
+        Ok(reports)
     }
 
     fn resume(&self, path: &Path) -> Result<Run, Failure> {

@@ -1,4 +1,5 @@
 use std::{
+    collections::BTreeMap,
     io::{self, Write, stdout},
     time::Duration,
 };
@@ -7,8 +8,12 @@ use serde::Serialize;
 
 use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
-    evaluation::{Baselines, ErrorRow, Errors, PublishedErrors, RunSettings, StartRecord, error_rows},
+    evaluation::{
+        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, RunSettings, StartRecord, best_start, error_rows,
+    },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
+    network::InputChoice,
+    scene::{Noise, NoisySets, Scene},
     sensor::{ArrayScale, Geometry},
     training::{Stage, StopReason},
 };
@@ -34,6 +39,32 @@ struct Report<'a> {
     errors: &'a Errors,
     baselines: &'a Baselines,
     published: Option<Published>,
+    scene: &'a Scene,
+    inputs: &'a InputChoice,
+    unknowns: usize,
+    equations: usize,
+    networks: usize,
+    weights: usize,
+    condition: Option<f64>,
+    warnings: Vec<String>,
+    decoders: BTreeMap<String, Decoder>,
+    reference: Option<Reference>,
+}
+
+#[derive(Serialize)]
+struct Decoder {
+    z_percent: Option<f64>,
+    z_mm: f64,
+    frame_us: f64,
+    /// rms of m/R − 1; none where the answer has no resistance.
+    residual: Option<f64>,
+    fit_seconds: f64,
+}
+
+#[derive(Serialize)]
+struct Reference {
+    z_percent: Option<f64>,
+    z_mm: f64,
 }
 
 #[derive(Serialize)]
@@ -41,10 +72,6 @@ struct Published {
     z_percent: f64,
     x_percent: f64,
     y_percent: f64,
-}
-
-fn published(settings: &RunSettings) -> Option<PublishedErrors> {
-    PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples)
 }
 
 fn epochs(training: &TrainingRecord) -> usize {
@@ -57,9 +84,12 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 }
 
 /// Prints one JSON object.
-pub(super) fn print_json(file: &NetworkFile) -> Result<(), Failure> {
+pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Result<(), Failure> {
     let (settings, training) = (&file.settings, &file.training);
     let best = training.history.get(training.best_epoch);
+    let size = settings.model_size().map_err(RunError::from)?;
+    let outlook = Outlook::of(settings).ok();
+    let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
     let report = Report {
         array: settings.sensor.scale,
         hidden: settings.hidden,
@@ -73,15 +103,34 @@ pub(super) fn print_json(file: &NetworkFile) -> Result<(), Failure> {
         epochs: epochs(training),
         best_epoch: training.best_epoch,
         stop_reason: training.stop_reason,
-        train_mse: best.map_or(f64::NAN, |record| record.training_mse),
-        validation_mse: best.and_then(|record| record.validation_mse),
+        train_mse: best_start.map_or_else(
+            || best.map_or(f64::NAN, |record| record.training_mse),
+            |start| start.train_mse,
+        ),
+        validation_mse: best_start.map_or_else(
+            || best.and_then(|record| record.validation_mse),
+            |start| start.validation_mse,
+        ),
         epoch_ms: 1e3 * epoch_seconds(training),
         errors: &file.errors,
         baselines: &file.baselines,
-        published: published(settings).map(|row| Published {
+        published: settings.published().map(|row| Published {
             z_percent: row.z_percent,
             x_percent: row.x_percent,
             y_percent: row.y_percent,
+        }),
+        scene: &settings.scene,
+        inputs: &settings.inputs,
+        unknowns: size.unknowns,
+        equations: size.equations,
+        networks: size.networks,
+        weights: file.network.weights(),
+        condition: condition(outlook.as_ref()),
+        warnings: warnings(outlook.as_ref()),
+        decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
+        reference: file.baselines.reference.as_ref().map(|errors| Reference {
+            z_percent: errors.z_percent,
+            z_mm: errors.z_mm,
         }),
     };
     let mut output = stdout().lock();
@@ -91,12 +140,33 @@ pub(super) fn print_json(file: &NetworkFile) -> Result<(), Failure> {
     written.map_err(Failure::Output)
 }
 
-/// Prints what was trained, why it ended, and the error table.
-pub(super) fn print_text(file: &NetworkFile) -> Result<(), Failure> {
-    write_text(file, &mut stdout().lock()).map_err(Failure::Output)
+fn decoder(report: &DecoderReport) -> Decoder {
+    Decoder {
+        z_percent: report.errors.z_percent,
+        z_mm: report.errors.z_mm,
+        frame_us: report.frame_us,
+        residual: Some(report.residual).filter(|residual| residual.is_finite()),
+        fit_seconds: report.fit_seconds,
+    }
 }
 
-fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
+/// The condition number of the worst row; none where some pattern is not seen at all.
+fn condition(outlook: Option<&Outlook>) -> Option<f64> {
+    let condition = outlook?.worst_row.condition();
+    Some(condition).filter(|condition| condition.is_finite())
+}
+
+fn warnings(outlook: Option<&Outlook>) -> Vec<String> {
+    let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
+    warnings.map(ToString::to_string).collect()
+}
+
+/// Prints what was trained, why it ended, and the error table.
+pub(super) fn print_text(file: &NetworkFile, decoders: &[DecoderReport]) -> Result<(), Failure> {
+    write_text(file, decoders, &mut stdout().lock()).map_err(Failure::Output)
+}
+
+fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Write) -> io::Result<()> {
     let (settings, training) = (&file.settings, &file.training);
     let scale = settings.sensor.scale;
     let first = training.stages.first();
@@ -109,7 +179,9 @@ fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     for stage in training.stages.iter().skip(1) {
         writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
     }
-    let whole = |samples: usize| samples.div_ceil(scale.rows()) * scale.rows();
+    write_scene(file, out)?;
+    let rows = settings.model_size().map_or(1, |size| size.rows);
+    let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,
         "{} samples for training, {} for validation, {} for test",
@@ -133,8 +205,9 @@ fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
         write_starts(&training.starts, out)?;
         writeln!(out)?;
     }
-    let published = published(settings);
+    let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
+    write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
     writeln!(
         out,
         "\nErrors in % are means of the coordinate, as in the paper; of the stroke where said so."
@@ -143,6 +216,89 @@ fn write_text(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "{note}")?;
     }
     Ok(())
+}
+
+/// What the scene is, what it came to, and what stands in the way.
+fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
+    let RunSettings { scene, inputs, .. } = &file.settings;
+    let Noise {
+        relative,
+        additive_ohm,
+        converter_bits,
+        drift,
+        sets,
+    } = scene.noise;
+    write!(
+        out,
+        "Rows {}, axes {}, loading {}, inputs {} ({})",
+        scene.rows, scene.movement, scene.loading, inputs.quantity, inputs.scaling
+    )?;
+    let noises = [
+        (relative > 0.0).then(|| format!("noise {relative:e}")),
+        (additive_ohm > 0.0).then(|| format!("noise {additive_ohm:e} ohm")),
+        converter_bits.map(|bits| format!("{bits} bits")),
+        (drift > 0.0).then(|| format!("drift {drift:e}")),
+        (!scene.noise.is_none() && sets == NoisySets::Training).then(|| "in training only".to_owned()),
+        (!scene.noise.is_none() && sets == NoisySets::Test).then(|| "in test only".to_owned()),
+    ];
+    for noise in noises.into_iter().flatten() {
+        write!(out, ", {noise}")?;
+    }
+    writeln!(out)?;
+    if let Ok(size) = file.settings.model_size() {
+        let networks = if size.networks == 1 { "network" } else { "networks" };
+        write!(
+            out,
+            "A frame has {} unknowns and {} equations; {} {networks} with {} weights",
+            size.unknowns,
+            size.equations,
+            size.networks,
+            file.network.weights()
+        )?;
+    }
+    let outlook = Outlook::of(&file.settings).ok();
+    match condition(outlook.as_ref()) {
+        Some(condition) => writeln!(out, "; condition of the worst row {condition:.1e}")?,
+        None => writeln!(out)?,
+    }
+    for warning in warnings(outlook.as_ref()) {
+        writeln!(out, "Warning: {warning}")?;
+    }
+    Ok(())
+}
+
+/// What each decoder is worth, and how far it is from the reference.
+fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &mut impl Write) -> io::Result<()> {
+    if decoders.is_empty() {
+        return Ok(());
+    }
+    let headings = ["Z %", "Z mm", "x reference", "residual", "us a frame"];
+    write!(out, "\n{:<14}", "Decoder")?;
+    for heading in headings {
+        write!(out, "{heading:>12}")?;
+    }
+    writeln!(out)?;
+    for report in decoders {
+        write!(out, "{:<14}", report.name())?;
+        let ratio = reference
+            .filter(|limit| limit.z_mm > 0.0)
+            .map(|limit| report.errors.z_mm / limit.z_mm);
+        let values = [
+            report.errors.z_percent,
+            Some(report.errors.z_mm),
+            ratio,
+            Some(report.residual).filter(|residual| residual.is_finite()),
+            Some(report.frame_us),
+        ];
+        for value in values {
+            write!(out, "{:>12}", format_number(value))?;
+        }
+        writeln!(out)?;
+    }
+    writeln!(
+        out,
+        "The residual is how far the readings are from those of the answer (relative, rms): it needs no ground truth."
+    )
 }
 
 fn write_table(rows: &[ErrorRow], out: &mut impl Write) -> io::Result<()> {

@@ -6,6 +6,7 @@ use clap::{
 use super::{
     arguments::{count, seed},
     failure::Failure,
+    scene_arguments::SceneArguments,
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
@@ -18,6 +19,8 @@ use crate::{
 // What to train. Whatever is not given is the default, or what a checkpoint says.
 #[derive(Args)]
 pub(super) struct TrainingArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
     /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
     #[arg(long, value_name = "SCALE")]
     array: Option<ArrayScale>,
@@ -61,9 +64,10 @@ pub(super) struct TrainingArguments {
 impl TrainingArguments {
     /// The settings of a new run.
     pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
-        let default = RunSettings::default();
+        self.scene.check_one_noise()?;
+        let default = self.scene.settings()?;
         Ok(RunSettings {
-            sensor: self.array.map_or(default.sensor, SensorModel::new),
+            sensor: self.sensor().unwrap_or(default.sensor),
             samples: self.samples.unwrap_or(default.samples),
             validation_samples: self.validation_samples.unwrap_or(default.validation_samples),
             test_samples: self.test_samples.unwrap_or(default.test_samples),
@@ -73,6 +77,11 @@ impl TrainingArguments {
             seed: self.seed.map_or(default.seed, Seed),
             ..default
         })
+    }
+
+    /// The sensor given.
+    pub(super) fn sensor(&self) -> Option<SensorModel> {
+        self.array.map(SensorModel::new)
     }
 
     /// How a run of the settings `saved` is to go on.
@@ -87,6 +96,12 @@ impl TrainingArguments {
         let count = |argument, given: Option<usize>, saved: usize| {
             same(argument, given.map(|given| given.to_string()), saved.to_string())
         };
+        if let Some(what) = self.scene.difference(saved)? {
+            return Err(Failure::Arguments(format!(
+                "the checkpoint has another choice of {what}: leave it out to go on, or begin anew with another \
+                 --checkpoint"
+            )));
+        }
         let scale = saved.sensor.scale;
         same("array", self.array.map(|scale| scale.to_string()), scale.to_string())?;
         count("hidden", self.hidden, saved.hidden)?;
@@ -137,7 +152,7 @@ fn method() -> impl TypedValueParser<Value = Method> {
     })
 }
 
-fn number(text: &str) -> Result<f64, String> {
+pub(super) fn number(text: &str) -> Result<f64, String> {
     let number = text
         .parse()
         .ok()
@@ -184,7 +199,8 @@ mod tests {
     #[test]
     fn the_defaults_in_the_help_are_those_of_the_library() {
         assert_eq!(parsed("train").settings().unwrap(), RunSettings::default());
-        let told = "train --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 --goal 0 --max-fail 6 \
+        let told = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
+                    --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 --goal 0 --max-fail 6 \
                     --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples 200 --seed 0";
         assert_eq!(parsed(told).settings().unwrap(), RunSettings::default());
     }

@@ -11,6 +11,10 @@ pub struct ResistanceReader<R> {
     rows: Rows<R>,
     /// Position in the file of each resistance, in the order r_1 to r_M4.
     columns: Vec<usize>,
+    /// Position of the column `row`, if there is one.
+    row_column: Option<usize>,
+    /// Row-wires of the array, if their numbers are wanted.
+    row_wires: Option<usize>,
     /// Columns of the file.
     width: usize,
     /// Whether the row at hand was read while looking for names.
@@ -35,6 +39,8 @@ pub struct Reading {
     pub resistances_ohm: Array2<f64>,
     /// Line of the file of each row, from 1.
     pub lines: Vec<u64>,
+    /// Row-wire of each row, from 0, where they are wanted and the file has a column `row`.
+    pub row_wires: Option<Vec<usize>>,
 }
 
 /// What is wrong with a file of resistances. Lines and columns are counted from 1.
@@ -68,6 +74,18 @@ pub enum ReadError {
         column: usize,
         /// What stands there.
         text: String,
+    },
+    /// A field is not the number of a row-wire.
+    #[error("line {line}, column {column}: '{text}' is not a row-wire; give a number from 1 to {rows}")]
+    RowWire {
+        /// Line.
+        line: u64,
+        /// Column.
+        column: usize,
+        /// What stands there.
+        text: String,
+        /// Row-wires of the array.
+        rows: usize,
     },
     /// A line break that ends no row: within quotes, or a carriage return alone.
     #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
@@ -126,6 +144,7 @@ impl<R: BufRead> ResistanceReader<R> {
         let names: Vec<Option<usize>> = record.iter().map(|name| channel_of(name, channels)).collect();
         let has_names = names.iter().any(Option::is_some) || record.iter().all(|field| number(field).is_none());
         let width = record.len();
+        let row_column = record.iter().position(|name| name == b"row").filter(|_| has_names);
         let columns = if has_names {
             named_columns(&names, channels)?
         } else {
@@ -134,9 +153,20 @@ impl<R: BufRead> ResistanceReader<R> {
         Ok(Self {
             rows,
             columns,
+            row_column,
+            row_wires: None,
             width: if has_names { width } else { channels },
             waiting: !has_names,
         })
+    }
+
+    /// Also reads the column `row`, if there is one: the number of the row-wire, from 1 to `row_wires`.
+    #[must_use]
+    pub fn with_row_wires(self, row_wires: usize) -> Self {
+        Self {
+            row_wires: Some(row_wires),
+            ..self
+        }
     }
 
     /// The next rows, at most `most` of them; `None` at the end.
@@ -146,16 +176,24 @@ impl<R: BufRead> ResistanceReader<R> {
     pub fn read(&mut self, most: usize) -> Result<Option<Reading>, ReadError> {
         let mut resistances_ohm = Vec::with_capacity(most * self.columns.len());
         let mut lines = Vec::new();
+        let mut row_wires = self.row_column.and(self.row_wires).map(|_| Vec::new());
         while lines.len() < most && (self.waiting || self.rows.advance()?) {
             self.waiting = false;
             lines.push(self.parse(&mut resistances_ohm)?);
+            if let Some(row_wires) = &mut row_wires {
+                row_wires.extend(self.parse_row_wire()?);
+            }
         }
         if lines.is_empty() {
             return Ok(None);
         }
         let shape = (lines.len(), self.columns.len());
         let resistances_ohm = Array2::from_shape_vec(shape, resistances_ohm).expect("every row has M4 values");
-        Ok(Some(Reading { resistances_ohm, lines }))
+        Ok(Some(Reading {
+            resistances_ohm,
+            lines,
+            row_wires,
+        }))
     }
 
     /// Appends the resistances of the row at hand; returns its line.
@@ -171,11 +209,34 @@ impl<R: BufRead> ResistanceReader<R> {
             resistances_ohm.push(value.ok_or_else(|| ReadError::Value {
                 line,
                 column: column + 1,
-                text: String::from_utf8_lossy(field).chars().take(40).collect(),
+                text: excerpt(field),
             })?);
         }
         Ok(line)
     }
+
+    /// The row-wire of the row at hand, from 0, where it is wanted and said.
+    fn parse_row_wire(&self) -> Result<Option<usize>, ReadError> {
+        let Some((column, rows)) = self.row_column.zip(self.row_wires) else {
+            return Ok(None);
+        };
+        let field = &self.rows.record[column];
+        let number: Option<usize> = std::str::from_utf8(field).ok().and_then(|text| text.parse().ok());
+        match number.filter(|number| (1..=rows).contains(number)) {
+            Some(number) => Ok(Some(number - 1)),
+            None => Err(ReadError::RowWire {
+                line: self.rows.line,
+                column: column + 1,
+                text: excerpt(field),
+                rows,
+            }),
+        }
+    }
+}
+
+/// What stands in a field, as far as a message can show it.
+fn excerpt(field: &[u8]) -> String {
+    String::from_utf8_lossy(field).chars().take(40).collect()
 }
 
 fn number(field: &[u8]) -> Option<f64> {
@@ -237,6 +298,29 @@ mod tests {
             read.extend(block.lines);
         }
         assert_eq!(read, [1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn row_wires_are_read_where_they_are_wanted_and_said() {
+        let rows = |text: &str, wanted: Option<usize>| {
+            let reader = ResistanceReader::new(text.as_bytes(), 2)?;
+            let mut reader = match wanted {
+                Some(rows) => reader.with_row_wires(rows),
+                None => reader,
+            };
+            Ok::<_, ReadError>(reader.read(100)?.and_then(|reading| reading.row_wires))
+        };
+        let text = "row,r_1,r_2\n3,1,2\n1,1,2\n";
+        assert_eq!(rows(text, Some(3)).unwrap(), Some(vec![2, 0]));
+        assert_eq!(rows(text, None).unwrap(), None);
+        assert_eq!(rows("r_1,r_2\n1,2\n", Some(3)).unwrap(), None);
+        assert_eq!(
+            rows("row,r_1,r_2\nx,1,2\n", None).unwrap(),
+            None,
+            "what is not wanted is not read"
+        );
+        let message = rows(text, Some(2)).unwrap_err().to_string();
+        assert!(message.contains("line 2, column 1: '3'"), "{message}");
     }
 
     #[test]

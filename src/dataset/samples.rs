@@ -4,7 +4,7 @@ use rand::Rng;
 use thiserror::Error;
 
 use crate::{
-    scene::Scene,
+    scene::{Noise, Scene, SceneError},
     sensor::{SensorError, SensorModel},
 };
 
@@ -18,7 +18,7 @@ pub struct Dataset {
     pub resistances_ohm: Array2<f64>,
     /// Absolute node coordinates in millimetres: samples × 3·M2, each node's x, y, z together.
     pub coordinates_mm: Array2<f64>,
-    /// Row-wires M1 of the array, hence samples of each snapshot.
+    /// Row-wires read, hence samples of each snapshot.
     rows: usize,
 }
 
@@ -28,6 +28,9 @@ pub enum DatasetError {
     /// The number of samples is out of range.
     #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]
     Count(usize),
+    /// The array has no such row-wire.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The model gives no resistance for a drawn deformation.
     #[error("snapshot {snapshot}: {source}")]
     Sensor {
@@ -39,10 +42,12 @@ pub enum DatasetError {
 }
 
 impl Dataset {
-    /// Draws at least `samples` samples, as whole snapshots: 101 samples of 10 rows become 110.
+    /// Draws at least `samples` samples of the row-wires that the scene reads, as whole snapshots: 101 samples of 10
+    /// rows become 110.
     ///
     /// # Errors
-    /// A number of samples out of range, or a deformation for which the model has no resistance.
+    /// A number of samples out of range, a row that the array does not have, or a deformation for which the model has
+    /// no resistance.
     pub fn simulate(
         model: &SensorModel,
         scene: &Scene,
@@ -52,16 +57,18 @@ impl Dataset {
         if !(1..=LARGEST_SAMPLES).contains(&samples) {
             return Err(DatasetError::Count(samples));
         }
-        let rows = model.scale.rows();
+        let read = scene.rows.read(model.scale.rows())?;
+        let rows = read.len();
         let snapshots = samples.div_ceil(rows);
         let mut resistances_ohm = Array2::zeros((snapshots * rows, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((snapshots * rows, model.scale.coordinates_per_row()));
+        let sampler = scene.sampler(model);
         let readings = resistances_ohm.axis_chunks_iter_mut(Axis(0), rows);
         let positions = coordinates_mm.axis_chunks_iter_mut(Axis(0), rows);
         for (snapshot, (mut readings, mut positions)) in readings.zip(positions).enumerate() {
-            let deformation = scene.draw(model.scale, &model.geometry, rng);
-            for row in 0..rows {
-                let mut reading = readings.row_mut(row);
+            let deformation = sampler.draw(rng);
+            for (place, &row) in read.iter().enumerate() {
+                let mut reading = readings.row_mut(place);
                 let reading = reading.as_slice_mut().expect("a row of a standard array is contiguous");
                 model
                     .row_resistances_into(row, deformation.row_mm(row), reading)
@@ -69,7 +76,7 @@ impl Dataset {
                 let coordinates = deformation
                     .row_positions_mm(model, row)
                     .flat_map(|position| position.to_array());
-                for (target, value) in positions.row_mut(row).iter_mut().zip(coordinates) {
+                for (target, value) in positions.row_mut(place).iter_mut().zip(coordinates) {
                     *target = value;
                 }
             }
@@ -81,12 +88,52 @@ impl Dataset {
         })
     }
 
+    /// Disturbs the readings, snapshot by snapshot. Deformations stay as they are, so sets with different noise compare.
+    ///
+    /// # Errors
+    /// A model without resistances at rest.
+    pub fn disturb(&mut self, model: &SensorModel, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
+        if noise.is_none() {
+            return Ok(());
+        }
+        let source = noise.source(model)?;
+        for mut snapshot in self.resistances_ohm.axis_chunks_iter_mut(Axis(0), self.rows) {
+            let readings = snapshot
+                .as_slice_mut()
+                .expect("rows of a standard array are contiguous");
+            source.disturb(readings, rng);
+        }
+        Ok(())
+    }
+
+    /// The samples of the row-wire in place `row` of those read, of whole snapshots, in their order.
+    ///
+    /// # Panics
+    /// If there is no such place.
+    pub fn of_row(&self, row: usize) -> Self {
+        assert!(row < self.rows);
+        let samples: Vec<usize> = (row..self.samples()).step_by(self.rows).collect();
+        Self {
+            rows: 1,
+            ..self.select(&samples)
+        }
+    }
+
+    /// The same samples as if each were a snapshot of one row-wire: what a decoder sees that is not told the row.
+    #[must_use]
+    pub fn as_one_row(&self) -> Self {
+        Self {
+            rows: 1,
+            ..self.clone()
+        }
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.resistances_ohm.nrows()
     }
 
-    /// Row-wires of the array, hence samples of each snapshot.
+    /// Row-wires read, hence samples of each snapshot.
     pub fn rows(&self) -> usize {
         self.rows
     }
@@ -166,6 +213,29 @@ mod tests {
     fn more_samples_extend_a_set_without_changing_its_beginning() {
         let (few, many) = (draw("10x6_3x18", 20, 3), draw("10x6_3x18", 40, 3));
         assert_eq!(few, many.select(&(0..20).collect::<Vec<_>>()));
+    }
+
+    #[test]
+    fn a_row_is_every_sample_of_it() {
+        let set = draw("10x6_3x18", 30, 3);
+        let row = set.of_row(4);
+        assert_eq!((row.samples(), row.snapshots()), (3, 3));
+        assert_eq!(row.resistances_ohm, set.select(&[4, 14, 24]).resistances_ohm);
+    }
+
+    #[test]
+    fn noise_changes_readings_and_not_deformations() {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let clean = draw("10x6_3x18", 30, 3);
+        let mut noisy = clean.clone();
+        let mut rng = Seed(3).rng(Stream::TrainingNoise);
+        noisy.disturb(&model, &Noise::relative(1e-3), &mut rng).unwrap();
+        assert_eq!(noisy.coordinates_mm, clean.coordinates_mm);
+        let ratio = (&noisy.resistances_ohm / &clean.resistances_ohm).mapv(|ratio| (ratio - 1.0).abs());
+        let mean = ratio.mean().unwrap();
+        // Mean of the absolute value of a normal deviate.
+        let expected = 1e-3 * (2.0 / std::f64::consts::PI).sqrt();
+        assert!((mean / expected - 1.0).abs() < 0.1, "{mean}");
     }
 
     #[test]

@@ -22,6 +22,12 @@ pub enum Stream {
     Split,
     /// Which samples are in which fold of a cross-validation.
     Folds,
+    /// What disturbs the readings of the training (and validation) set.
+    TrainingNoise,
+    /// What disturbs the readings of the test set.
+    TestNoise,
+    /// Draws that estimate an expectation, such as the spread of a scene.
+    Expectation,
 }
 
 /// Streams from here on are those of the starts after the first.

@@ -1,10 +1,40 @@
-//! Decoupling: the resistances of rows in, the coordinates of their nodes out. Beside the network stand two
-//! baselines, so that a reader sees what the network adds.
+//! Decoupling: resistances in, coordinates of nodes out, by every way we know.
+//!
+//! | decoder | what it is |
+//! |---|---|
+//! | [`TrainingMean`] | knows nothing: the baseline |
+//! | [`RidgeMap`] | affine, with a penalty chosen by cross-validation |
+//! | [`RadialBasisNetwork`] | Gaussians around centres |
+//! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
+//! | [`NewtonDecoder`] | solves Eq. (2) |
+//! | [`PolishedDecoder`] | any of them, then a few of Newton's steps |
+//! | [`PosteriorDecoder`] | Newton's method with noise and prior |
+//!
+//! All are [`FrameDecoder`]s. [`resistance_residual`] tells how well an answer explains the readings, without ground truth.
+//! [`Decoupler`] is the older interface of networks and baselines to rows without order.
 
+mod box_posterior;
+mod compiled_network;
+mod equation_decoders;
+mod frame;
 mod linear_map;
+mod newton;
+mod posterior;
+mod radial_basis;
+mod real;
+mod ridge_map;
+mod row_problem;
 mod training_mean;
 
+pub use compiled_network::CompiledNetworks;
+pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
+pub use frame::{DecodeError, FrameDecoder, RowMap, RowMaps, decode_set, fit_rows};
 pub use linear_map::LinearMap;
+pub use newton::{Newton, NewtonError, NewtonReport, NewtonRules, NewtonStop, resistance_residual};
+pub use posterior::{Posterior, PosteriorReport};
+pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
+pub use real::Real;
+pub use ridge_map::RidgeMap;
 pub use training_mean::TrainingMean;
 
 use ndarray::{Array2, ArrayView2};
@@ -20,5 +50,11 @@ pub trait Decoupler {
 impl Decoupler for DecouplingNetwork {
     fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
         Self::decouple(self, resistances_ohm)
+    }
+}
+
+impl RowMap for TrainingMean {
+    fn map(&mut self, _readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
+        coordinates_mm.copy_from_slice(self.coordinates_mm());
     }
 }

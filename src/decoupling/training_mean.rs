@@ -21,6 +21,11 @@ impl TrainingMean {
             .expect("a training set has samples");
         Self { coordinates_mm }
     }
+
+    /// The mean, 3·M2.
+    pub(super) fn coordinates_mm(&self) -> &[f64] {
+        self.coordinates_mm.as_slice().expect("a mean is contiguous")
+    }
 }
 
 impl Decoupler for TrainingMean {

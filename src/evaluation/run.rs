@@ -4,11 +4,12 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, RunError, RunSettings, StartRecord, starts::lowest};
+use super::{Errors, RunError, RunSettings, StartRecord, StartTrainer, reference_errors, starts::lowest};
 use crate::{
     dataset::{Dataset, Split, Stream, hold_out},
     decoupling::{Decoupler, LinearMap, TrainingMean},
-    network::{DecouplingNetwork, MinMax, Shape, nguyen_widrow},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, Shape, nguyen_widrow},
+    scene::NoisySets,
     training::{
         Examples, Method, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState,
         TrainingError,
@@ -23,10 +24,17 @@ use crate::{
 pub struct Run {
     settings: RunSettings,
     test: Arc<Dataset>,
-    inputs: MinMax,
-    outputs: MinMax,
-    trainers: Vec<Trainer>,
+    /// Of each row-wire that has a network of its own, or of all.
+    scalings: Vec<(Inputs, MinMax)>,
+    starts: Vec<StartTrainer>,
     baselines: Baselines,
+}
+
+/// What a network of the run is to learn: of one row-wire, or of all.
+struct Task {
+    problem: Problem,
+    shape: Shape,
+    scaling: (Inputs, MinMax),
 }
 
 /// What stands beside a network in every table.
@@ -37,6 +45,9 @@ pub struct Baselines {
     pub mean: Errors,
     /// The best affine map on resistance.
     pub linear: Errors,
+    /// The Bayesian reference, below which no decoder comes: [`reference_errors`]. Absent from older files.
+    #[serde(default)]
+    pub reference: Option<Errors>,
 }
 
 /// The most memory that the equations of all starts may take.
@@ -57,13 +68,19 @@ impl Run {
     /// # Errors
     /// Settings that are impossible, with the reason.
     pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        Self::with_sets(settings, split, test, |problem, shape| {
-            let start = |number| nguyen_widrow(shape, &mut settings.seed.start_rng(number));
-            let trainers = (0..settings.starts).into_par_iter().map(|number| {
-                let trainer = Trainer::new(start(number), problem.clone(), settings.training);
-                trainer.map_err(RunError::from)
+        Self::with_sets(settings, split, test, |tasks| {
+            let starts = (0..settings.starts).into_par_iter().map(|number| {
+                let mut rng = settings.seed.start_rng(number);
+                let begun: Vec<_> = tasks
+                    .iter()
+                    .map(|task| (task, nguyen_widrow(task.shape, &mut rng)))
+                    .collect();
+                let rows = begun
+                    .into_par_iter()
+                    .map(|(task, start)| Trainer::new(start, task.problem.clone(), settings.training));
+                Ok(StartTrainer::new(rows.collect::<Result<_, _>>()?))
             });
-            trainers.collect()
+            starts.collect()
         })
     }
 
@@ -72,23 +89,28 @@ impl Run {
     /// # Errors
     /// Settings that are impossible, or states that are damaged or not theirs.
     pub fn resume(settings: RunSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        if states.len() != settings.starts {
+        settings.check_counts()?;
+        let networks = settings.model_size()?.networks;
+        if states.len() != settings.starts * networks {
             return Err(RunError::Starts {
                 found: states.len(),
-                expected: settings.starts,
+                expected: settings.starts * networks,
             });
         }
         let (split, test) = Self::draw(&settings)?;
-        Self::with_sets(settings, split, test, |problem, shape| {
-            let trainers = states.into_par_iter().enumerate().map(|(start, state)| {
+        Self::with_sets(settings, split, test, |tasks| {
+            let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
+                let (start, task) = (number / networks, &tasks[number % networks]);
                 let refused = |source| RunError::Resume { start, source };
-                let trainer = Trainer::resume(state, problem.clone()).map_err(refused)?;
-                if trainer.present().shape() != shape {
+                let trainer = Trainer::resume(state, task.problem.clone()).map_err(refused)?;
+                if trainer.present().shape() != task.shape {
                     return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
                 }
                 Ok(trainer)
             });
-            trainers.collect()
+            let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
+            let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
+            Ok(starts.collect())
         })
     }
 
@@ -100,14 +122,25 @@ impl Run {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
         let test = Self::test_set(settings)?;
+        let rows = settings.model_size()?.rows;
+        let held_out = settings.validation_samples.div_ceil(rows);
+        let drawn = Self::training_set(settings, (settings.samples.div_ceil(rows) + held_out) * rows)?;
+        Ok((hold_out(drawn, held_out, &mut settings.seed.rng(Stream::Split)), test))
+    }
+
+    /// As many samples as are asked for, drawn and disturbed as those that a network is trained on.
+    ///
+    /// # Errors
+    /// An impossible sensor, scene, or number of samples.
+    pub fn training_set(settings: &RunSettings, samples: usize) -> Result<Dataset, RunError> {
         let RunSettings {
             sensor, scene, seed, ..
         } = settings;
-        let rows = sensor.scale.rows();
-        let held_out = settings.validation_samples.div_ceil(rows);
-        let drawn = (settings.samples.div_ceil(rows) + held_out) * rows;
-        let drawn = Dataset::simulate(sensor, scene, drawn, &mut seed.rng(Stream::Training))?;
-        Ok((hold_out(drawn, held_out, &mut seed.rng(Stream::Split)), test))
+        sensor.check()?;
+        scene.check()?;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut seed.rng(Stream::Training))?;
+        set.disturb(sensor, &scene.noise.in_training(), &mut seed.rng(Stream::TrainingNoise))?;
+        Ok(set)
     }
 
     /// The test set of these settings: what the window shows before anything is trained.
@@ -115,24 +148,24 @@ impl Run {
     /// # Errors
     /// An impossible sensor, scene, or number of samples.
     pub fn test_set(settings: &RunSettings) -> Result<Dataset, RunError> {
-        settings.sensor.check()?;
-        settings.scene.check()?;
-        let mut rng = settings.seed.rng(Stream::Test);
-        Ok(Dataset::simulate(
-            &settings.sensor,
-            &settings.scene,
-            settings.test_samples,
-            &mut rng,
-        )?)
+        let RunSettings {
+            sensor, scene, seed, ..
+        } = settings;
+        sensor.check()?;
+        scene.check()?;
+        let mut set = Dataset::simulate(sensor, scene, settings.test_samples, &mut seed.rng(Stream::Test))?;
+        set.disturb(sensor, &scene.noise.in_test(), &mut seed.rng(Stream::TestNoise))?;
+        Ok(set)
     }
 
     fn with_sets(
         settings: RunSettings,
         split: Split,
         test: Dataset,
-        trainers: impl FnOnce(&Problem, Shape) -> Result<Vec<Trainer>, RunError>,
+        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Self, RunError> {
         settings.check_counts()?;
+        let networks = settings.model_size()?.networks;
         let Split { training, validation } = split;
         let stroke_mm = settings.stroke_mm();
         let score = |decoupler: &dyn Decoupler| {
@@ -141,38 +174,29 @@ impl Run {
         let baselines = Baselines {
             mean: score(&TrainingMean::fit(&training)),
             linear: score(&LinearMap::fit(&training)?),
+            reference: Some(reference(&settings, &test)?),
         };
-        let inputs = MinMax::fit(training.resistances_ohm.view())?;
-        let outputs = MinMax::fit(training.coordinates_mm.view())?;
-        let examples = |set: &Dataset| {
-            let scaled = inputs.scale(set.resistances_ohm.view());
-            Examples::new(scaled.view(), outputs.scale(set.coordinates_mm.view()).view())
+        let tasks: Vec<Task> = if networks == 1 {
+            vec![Task::new(&settings, &training, validation.as_ref(), &test)?]
+        } else {
+            let of_row = |row| {
+                let validation = validation.as_ref().map(|set| set.of_row(row));
+                Task::new(&settings, &training.of_row(row), validation.as_ref(), &test.of_row(row))
+            };
+            (0..networks).map(of_row).collect::<Result<_, _>>()?
         };
-        let problem = Problem {
-            training: examples(&training),
-            validation: validation.as_ref().map(examples),
-            test: Some(examples(&test)),
-        };
-        // They are in `problem`, scaled: large sets need not be held twice.
+        // They are in the tasks, scaled: large sets need not be held twice.
         drop((training, validation));
-        let shape = Shape {
-            inputs: problem.training.inputs(),
-            hidden: settings.hidden,
-            outputs: problem.training.outputs(),
-        };
-        check_memory(
-            &settings.training.method,
-            shape,
-            problem.training.samples(),
-            settings.starts,
-        )?;
-        let trainers = trainers(&problem, shape)?;
+        let first = &tasks[0];
+        let samples = first.problem.training.samples();
+        let trainings = settings.starts * networks;
+        check_memory(&settings.training.method, first.shape, samples, trainings)?;
+        let starts = begin(&tasks)?;
         Ok(Self {
             settings,
             test: Arc::new(test),
-            inputs,
-            outputs,
-            trainers,
+            scalings: tasks.into_iter().map(|task| task.scaling).collect(),
+            starts,
             baselines,
         })
     }
@@ -185,12 +209,12 @@ impl Run {
     /// Runs one epoch of every start that has not ended, side by side. Returns why the run has ended, once every
     /// start has. The bits do not depend on the number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
-        match self.trainers.as_mut_slice() {
+        match self.starts.as_mut_slice() {
             // Stays on this thread, which saves handing it over each epoch.
             [only] => only.step(),
             all => {
-                all.par_iter_mut().for_each(|trainer| {
-                    trainer.step();
+                all.par_iter_mut().for_each(|start| {
+                    start.step();
                 });
                 self.stop_reason()
             }
@@ -199,13 +223,13 @@ impl Run {
 
     /// Ends every start by the user's wish.
     pub fn stop(&mut self) {
-        self.trainers.iter_mut().for_each(Trainer::stop);
+        self.starts.iter_mut().for_each(StartTrainer::stop);
     }
 
     /// Why the run has ended, once every start has ended: the leader's reason, or the user's wish if any start could
     /// have gone on.
     pub fn stop_reason(&self) -> Option<StopReason> {
-        let reasons = self.trainers.iter().map(Trainer::stop_reason);
+        let reasons = self.starts.iter().map(StartTrainer::stop_reason);
         let reasons: Vec<_> = reasons.collect::<Option<_>>()?;
         if reasons.contains(&StopReason::Stopped) {
             return Some(StopReason::Stopped);
@@ -218,11 +242,13 @@ impl Run {
     /// # Errors
     /// A setting out of range, or networks too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
-        let shape = self.leader().present().shape();
-        check_memory(&method, shape, self.settings.samples, self.trainers.len())?;
-        // The starts have the same shape, so the first is refused or none.
-        for trainer in &mut self.trainers {
-            trainer.continue_with(method)?;
+        let rows = self.leader().rows();
+        let trainings = rows.len() * self.starts.len();
+        let samples = self.settings.samples.div_ceil(rows.len());
+        check_memory(&method, rows[0].present().shape(), samples, trainings)?;
+        // The starts have the same shapes, so the first is refused or none.
+        for start in &mut self.starts {
+            start.continue_with(method)?;
         }
         self.settings.training.method = method;
         Ok(())
@@ -233,32 +259,32 @@ impl Run {
     /// # Errors
     /// A setting out of range; then nothing has changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        for trainer in &mut self.trainers {
-            trainer.set_stopping(stopping)?;
+        for start in &mut self.starts {
+            start.set_stopping(stopping)?;
         }
         self.settings.training.stopping = stopping;
         Ok(())
     }
 
     /// The trainings of all starts.
-    pub fn trainers(&self) -> &[Trainer] {
-        &self.trainers
+    pub fn trainers(&self) -> &[StartTrainer] {
+        &self.starts
     }
 
     /// The number of the leader, from 0.
     pub fn leader_number(&self) -> usize {
-        lowest(self.trainers.iter().map(Trainer::best_mse)).unwrap_or(0)
+        lowest(self.starts.iter().map(StartTrainer::best_mse)).unwrap_or(0)
     }
 
     /// The training of the leader.
-    pub fn leader(&self) -> &Trainer {
-        &self.trainers[self.leader_number()]
+    pub fn leader(&self) -> &StartTrainer {
+        &self.starts[self.leader_number()]
     }
 
     /// How each start stands. Costs a decoupling of the test set for each.
     pub fn starts(&self) -> Vec<StartRecord> {
-        let record = |trainer: &Trainer| {
-            let best = trainer.history()[trainer.best_epoch()];
+        let record = |trainer: &StartTrainer| {
+            let best = trainer.best_records();
             StartRecord {
                 train_mse: best.training_mse,
                 validation_mse: best.validation_mse,
@@ -268,12 +294,12 @@ impl Run {
                 stop_reason: trainer.stop_reason(),
             }
         };
-        self.trainers.par_iter().map(record).collect()
+        self.starts.par_iter().map(record).collect()
     }
 
-    /// The states of all starts, from which [`Self::resume`] goes on.
+    /// The states of all trainings, from which [`Self::resume`] goes on: start by start, in each its rows.
     pub fn states(&self) -> Vec<TrainerState> {
-        self.trainers.iter().map(Trainer::state).collect()
+        self.starts.iter().flat_map(StartTrainer::states).collect()
     }
 
     /// The test set.
@@ -286,13 +312,17 @@ impl Run {
         &self.baselines
     }
 
-    /// The leader's best network so far, ready to read resistances.
-    pub fn network(&self) -> DecouplingNetwork {
+    /// The leader's best networks so far, ready to read resistances.
+    pub fn network(&self) -> Networks {
         self.network_of(self.leader())
     }
 
-    fn network_of(&self, trainer: &Trainer) -> DecouplingNetwork {
-        DecouplingNetwork::new(self.inputs.clone(), trainer.best().clone(), self.outputs.clone())
+    fn network_of(&self, start: &StartTrainer) -> Networks {
+        let rows = self.scalings.iter().zip(start.best());
+        let network = |((inputs, outputs), mlp): (&(Inputs, MinMax), &Mlp)| {
+            DecouplingNetwork::new(inputs.clone(), mlp.clone(), outputs.clone())
+        };
+        Networks::new(rows.map(network).collect())
     }
 
     /// What [`Self::network`] makes of the test set: coordinates in millimetres (samples × 3·M2) and their errors.
@@ -300,11 +330,67 @@ impl Run {
         self.test_errors(&self.network())
     }
 
-    fn test_errors(&self, network: &DecouplingNetwork) -> (Array2<f64>, Errors) {
+    fn test_errors(&self, network: &Networks) -> (Array2<f64>, Errors) {
         let decoupled_mm = network.decouple(self.test.resistances_ohm.view());
         let errors = Errors::measure(&self.test, &decoupled_mm, self.settings.stroke_mm());
         (decoupled_mm, errors)
     }
+}
+
+impl Task {
+    fn new(
+        settings: &RunSettings,
+        training: &Dataset,
+        validation: Option<&Dataset>,
+        test: &Dataset,
+    ) -> Result<Self, RunError> {
+        let inputs = Inputs::fit(settings.inputs, training.resistances_ohm.view(), unseen_noise(settings))?;
+        let outputs = MinMax::fit(training.coordinates_mm.view())?;
+        let examples = |set: &Dataset| {
+            let scaled = inputs.of(set.resistances_ohm.view());
+            Examples::new(scaled.view(), outputs.scale(set.coordinates_mm.view()).view())
+        };
+        let problem = Problem {
+            training: examples(training),
+            validation: validation.map(examples),
+            test: Some(examples(test)),
+        };
+        let shape = Shape {
+            inputs: problem.training.inputs(),
+            hidden: settings.hidden,
+            outputs: problem.training.outputs(),
+        };
+        Ok(Self {
+            problem,
+            shape,
+            scaling: (inputs, outputs),
+        })
+    }
+}
+
+/// The relative noise that readings have and the training set lacks, with which whitening reckons.
+pub(super) fn unseen_noise(settings: &RunSettings) -> f64 {
+    let noise = settings.scene.noise;
+    if noise.sets == NoisySets::Test {
+        noise.relative
+    } else {
+        0.0
+    }
+}
+
+/// The errors of the Bayesian reference on `test`.
+pub(super) fn reference(settings: &RunSettings, test: &Dataset) -> Result<Errors, RunError> {
+    let RunSettings {
+        sensor, scene, seed, ..
+    } = settings;
+    let rows = scene.rows.read(sensor.scale.rows())?;
+    Ok(reference_errors(
+        sensor,
+        scene,
+        &rows,
+        test,
+        &mut seed.rng(Stream::Expectation),
+    )?)
 }
 
 /// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.

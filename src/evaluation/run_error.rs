@@ -3,6 +3,7 @@ use thiserror::Error;
 use super::CountError;
 use crate::{
     dataset::{DatasetError, FoldsError},
+    decoupling::DecodeError,
     network::ScalingError,
     scene::SceneError,
     sensor::SensorError,
@@ -30,6 +31,9 @@ pub enum RunError {
     /// Samples that cannot be scaled.
     #[error(transparent)]
     Scaling(#[from] ScalingError),
+    /// A reading that is no resistance.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
     /// A training that cannot begin.
     #[error(transparent)]
     Training(#[from] TrainingError),
@@ -53,12 +57,12 @@ pub enum RunError {
         /// What is wrong with it.
         source: ResumeError,
     },
-    /// Not as many saved trainings as starts.
-    #[error("{found} saved trainings, but the settings ask for {expected} starts")]
+    /// Not as many saved trainings as the settings ask for.
+    #[error("{found} saved trainings, but the settings ask for {expected}: starts times networks")]
     Starts {
         /// Trainings found.
         found: usize,
-        /// Starts asked for.
+        /// Trainings asked for.
         expected: usize,
     },
 }

@@ -3,10 +3,11 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::PublishedErrors;
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    network::LARGEST_HIDDEN,
-    scene::Scene,
+    network::{InputChoice, LARGEST_HIDDEN},
+    scene::{Scene, SceneError},
     sensor::{ArrayScale, SensorModel},
     training::TrainingSettings,
 };
@@ -19,7 +20,10 @@ pub struct RunSettings {
     pub sensor: SensorModel,
     /// What happens to it.
     pub scene: Scene,
-    /// Samples that the method fits.
+    /// What the network is given of the resistances.
+    #[serde(default)]
+    pub inputs: InputChoice,
+    /// Samples that the method fits, of all row-wires read together.
     pub samples: usize,
     /// Samples drawn beside them and held out, to choose the best weights and to stop; 0 for none.
     pub validation_samples: usize,
@@ -34,6 +38,19 @@ pub struct RunSettings {
     pub training: TrainingSettings,
     /// From which everything random follows.
     pub seed: Seed,
+}
+
+/// What a scene came to: nothing that does not vary in it is counted, nor modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModelSize {
+    /// Row-wires read.
+    pub rows: usize,
+    /// Coordinates to be found in a frame, all rows read at one moment.
+    pub unknowns: usize,
+    /// Resistances read in a frame.
+    pub equations: usize,
+    /// Networks: one, or one for each known row.
+    pub networks: usize,
 }
 
 /// The most starts of one run: enough to know the distribution of its results, and what memory allows.
@@ -62,6 +79,7 @@ impl Default for RunSettings {
         Self {
             sensor: SensorModel::new(ArrayScale::default()),
             scene: Scene::default(),
+            inputs: InputChoice::PAPER,
             samples: 1000,
             validation_samples: 200,
             test_samples: 100,
@@ -92,6 +110,32 @@ impl RunSettings {
             }
         }
         Ok(())
+    }
+
+    /// What the paper reports for this configuration, if it does.
+    pub fn published(&self) -> Option<PublishedErrors> {
+        let published = PublishedErrors::of(self.sensor.scale, self.hidden, self.samples);
+        published.filter(|_| self.is_papers_scene())
+    }
+
+    /// Whether scene and inputs are those of the paper's experiments.
+    pub fn is_papers_scene(&self) -> bool {
+        self.scene == Scene::default() && self.inputs == InputChoice::PAPER
+    }
+
+    /// What is to be found, from what, by how many networks.
+    ///
+    /// # Errors
+    /// A row that the array does not have.
+    pub fn model_size(&self) -> Result<ModelSize, SceneError> {
+        let scale = self.sensor.scale;
+        let rows = self.scene.rows.read(scale.rows())?.len();
+        Ok(ModelSize {
+            rows,
+            unknowns: rows * self.scene.unknowns_per_row(scale),
+            equations: rows * scale.columns(),
+            networks: if self.scene.rows.are_known() { rows } else { 1 },
+        })
     }
 
     /// The distance a node can travel: the full scale of its deformation.

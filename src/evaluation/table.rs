@@ -70,12 +70,19 @@ impl ErrorRow {
     }
 }
 
-/// The rows of an error table: the baselines, the network, and what the paper reports if it does.
+/// The rows of an error table: the baselines, the network, the Bayesian reference below which no decoder comes, and
+/// what the paper reports if it does.
 pub fn error_rows(network: &Errors, baselines: &Baselines, published: Option<&PublishedErrors>) -> Vec<ErrorRow> {
     let measured = [
         ErrorRow::measured("training mean", &baselines.mean),
         ErrorRow::measured("linear map", &baselines.linear),
         ErrorRow::measured("network", network),
     ];
-    measured.into_iter().chain(published.map(ErrorRow::published)).collect()
+    let reference = baselines.reference.as_ref();
+    let reference = reference.map(|errors| ErrorRow::measured("reference", errors));
+    measured
+        .into_iter()
+        .chain(reference)
+        .chain(published.map(ErrorRow::published))
+        .collect()
 }

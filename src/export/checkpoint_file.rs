@@ -19,7 +19,9 @@ use crate::{
 };
 
 const FORMAT: &str = "decoupler checkpoint";
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
+/// The oldest version that is read: of the paper's scene.
+const OLDEST_VERSION: u64 = 1;
 /// How the file begins, whatever became of the rest.
 const BEGINNING: &[u8] = br#"{"format":"decoupler checkpoint","#;
 
@@ -33,7 +35,7 @@ pub struct CheckpointFile {
     pub program: String,
     /// What was asked for, with the method and the stopping rules of that epoch.
     pub settings: RunSettings,
-    /// Each start.
+    /// Each start; where rows are known, each with its rows one after another.
     pub starts: Vec<TrainerState>,
 }
 
@@ -67,7 +69,7 @@ pub enum CheckpointFileError {
         column: usize,
     },
     /// Written in a format unknown to this version.
-    #[error("'{}' has version {version} of the checkpoint format, written by {program}; this is {PROGRAM}, which reads version {VERSION}: install a newer one", .path.display())]
+    #[error("'{}' has version {version} of the checkpoint format, written by {program}; this is {PROGRAM}, which reads versions {OLDEST_VERSION} to {VERSION}: install a newer one", .path.display())]
     Version {
         /// The file.
         path: PathBuf,
@@ -201,7 +203,7 @@ impl CheckpointFile {
             });
         }
         let document: Document<'_> = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
-        if document.version != VERSION {
+        if document.version < OLDEST_VERSION {
             return Err(damaged(format!("there is no version {}", document.version)));
         }
         if document.crc32 != checksum(document.run) {

@@ -14,12 +14,14 @@ use super::{
 };
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
-    network::DecouplingNetwork,
+    network::Networks,
     training::{EpochRecord, History, Stage, StopReason},
 };
 
 const FORMAT: &str = "decoupler network";
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
+/// The oldest version that is read: one network, of the paper's scene.
+const OLDEST_VERSION: u64 = 1;
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
 /// A network with all that is known of it: what was asked for, how the training went, and what the network is worth.
@@ -30,8 +32,8 @@ pub struct NetworkFile {
     pub program: String,
     /// What was asked for: sensor, scene, samples, method, stopping, seed.
     pub settings: RunSettings,
-    /// The best network of the training.
-    pub network: DecouplingNetwork,
+    /// The best network of the training, or of each row-wire.
+    pub network: Networks,
     /// How the training went.
     pub training: TrainingRecord,
     /// What the network is worth on the test set.
@@ -94,7 +96,7 @@ pub enum NetworkFileError {
         path: PathBuf,
     },
     /// Written in a format unknown to this version.
-    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads version {VERSION}: install a newer one", .path.display())]
+    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads versions {OLDEST_VERSION} to {VERSION}: install a newer one", .path.display())]
     Version {
         /// The file.
         path: PathBuf,
@@ -132,7 +134,7 @@ struct Document {
     version: u64,
     program: String,
     settings: RunSettings,
-    network: DecouplingNetwork,
+    network: Networks,
     training: TrainingDocument,
     errors: Errors,
     baselines: Baselines,
@@ -238,7 +240,7 @@ impl NetworkFile {
         }
         let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
         let document: Document = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
-        if document.version != VERSION {
+        if document.version < OLDEST_VERSION {
             return Err(damaged(format!("version: there is no version {}", document.version)));
         }
         let epochs = document.training.epochs;

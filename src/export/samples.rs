@@ -1,30 +1,49 @@
 use std::io::{self, Write};
 
+use ndarray::Array2;
+
 use crate::{dataset::Dataset, sensor::ArrayScale};
 
-/// Writes the names of the columns of [`write_samples`], and ends the line.
+/// Writes the names of the columns of [`write_samples`], with or without those of decoded coordinates, and ends the
+/// line.
 ///
 /// # Errors
 /// What `writer` said.
-pub fn write_samples_header(scale: ArrayScale, writer: &mut dyn Write) -> io::Result<()> {
+pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut dyn Write) -> io::Result<()> {
     write!(writer, "snapshot,row,")?;
     for column in 1..=scale.columns() {
         write!(writer, "r_{column},")?;
     }
-    write_coordinates_header(scale.nodes_per_row(), writer)
+    if with_decoded {
+        for node in 1..=scale.nodes_per_row() {
+            write!(writer, "x_{node},y_{node},z_{node},")?;
+        }
+        write_names("decoded_", scale.nodes_per_row(), writer)
+    } else {
+        write_coordinates_header(scale.nodes_per_row(), writer)
+    }
 }
 
-/// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, and x, y, z of each node in
-/// millimetres. Everything is counted from 1, snapshots from `first_snapshot`.
+/// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
+/// millimetres, and the same as `decoded_mm` (samples × 3·M2) has it. `rows` are the row-wires of a snapshot, from 0.
+/// Everything is written counted from 1, snapshots from `first_snapshot`.
 ///
 /// # Errors
 /// What `writer` said.
-pub fn write_samples(set: &Dataset, first_snapshot: usize, writer: &mut dyn Write) -> io::Result<()> {
+pub fn write_samples(
+    set: &Dataset,
+    rows: &[usize],
+    decoded_mm: Option<&Array2<f64>>,
+    first_snapshot: usize,
+    writer: &mut dyn Write,
+) -> io::Result<()> {
     let samples = set.resistances_ohm.rows().into_iter().zip(set.coordinates_mm.rows());
     for (sample, (resistances_ohm, coordinates_mm)) in samples.enumerate() {
-        let (snapshot, row) = (first_snapshot + sample / set.rows(), 1 + sample % set.rows());
+        let (snapshot, row) = (first_snapshot + sample / rows.len(), 1 + rows[sample % rows.len()]);
         write!(writer, "{snapshot},{row},")?;
-        write_numbers(resistances_ohm.iter().chain(&coordinates_mm), writer)?;
+        let decoded_mm = decoded_mm.map(|decoded_mm| decoded_mm.row(sample));
+        let decoded_mm = decoded_mm.iter().flatten();
+        write_numbers(resistances_ohm.iter().chain(&coordinates_mm).chain(decoded_mm), writer)?;
     }
     Ok(())
 }
@@ -34,9 +53,13 @@ pub fn write_samples(set: &Dataset, first_snapshot: usize, writer: &mut dyn Writ
 /// # Errors
 /// What `writer` said.
 pub fn write_coordinates_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
+    write_names("", nodes, writer)
+}
+
+fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     for node in 1..=nodes {
         let end = if node == nodes { "\n" } else { "," };
-        write!(writer, "x_{node},y_{node},z_{node}{end}")?;
+        write!(writer, "{before}x_{node},{before}y_{node},{before}z_{node}{end}")?;
     }
     Ok(())
 }

@@ -3,7 +3,7 @@ use std::fmt::Display;
 use super::NetworkFile;
 use crate::{
     evaluation::{Baselines, Errors, RunSettings, StartRecord},
-    network::DecouplingNetwork,
+    network::{DecouplingNetwork, Networks},
     sensor::ArrayScale,
 };
 
@@ -16,13 +16,21 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         network,
         training,
         errors,
-        baselines: Baselines { mean, linear },
+        baselines: Baselines {
+            mean,
+            linear,
+            reference,
+        },
     } = file;
-    let weight = network.mlp().weights().iter().position(|weight| !weight.is_finite());
+    let weight = |network: &DecouplingNetwork| {
+        let weights = network.mlp().weights();
+        weights.iter().position(|weight| !weight.is_finite())
+    };
     let last_epoch = training.history.last().map(|record| record.epoch);
     let flaws = [
-        weight.map(|index| format!("network: weight {index} is not a finite number")),
-        mismatch(network, settings.sensor.scale, settings.hidden),
+        (network.each().iter().find_map(weight)).map(|index| format!("network: weight {index} is not a finite number")),
+        number_flaw(network, settings),
+        (network.each().iter()).find_map(|network| mismatch(network, settings.sensor.scale, settings.hidden)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
@@ -33,6 +41,9 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         unmeasured("errors", errors),
         unmeasured("baselines.mean", mean),
         unmeasured("baselines.linear", linear),
+        reference
+            .as_ref()
+            .and_then(|reference| unmeasured("baselines.reference", reference)),
     ];
     settings_flaw(settings).or_else(|| flaws.into_iter().flatten().next())
 }
@@ -65,6 +76,18 @@ fn starts_flaw(file: &NetworkFile) -> Option<String> {
     Some(format!(
         "training.starts: an error of number {place} is not a finite number"
     ))
+}
+
+fn number_flaw(network: &Networks, settings: &RunSettings) -> Option<String> {
+    let (found, rows) = (network.each().len(), settings.scene.rows);
+    match settings.model_size() {
+        Ok(size) if size.networks == found => None,
+        Ok(size) => Some(format!(
+            "network: {found} of them, but rows {rows} of {} need {}",
+            settings.sensor.scale, size.networks
+        )),
+        Err(flaw) => Some(format!("settings.scene.rows: {flaw}")),
+    }
 }
 
 fn mismatch(network: &DecouplingNetwork, scale: ArrayScale, hidden: usize) -> Option<String> {

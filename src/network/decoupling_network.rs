@@ -2,13 +2,13 @@ use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{MinMax, Mlp, Shape};
+use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, Shape};
 
 /// A network together with its scaling: resistances in ohm in, coordinates in millimetres out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Record", into = "Record")]
 pub struct DecouplingNetwork {
-    inputs: MinMax,
+    inputs: Inputs,
     mlp: Mlp,
     outputs: MinMax,
 }
@@ -43,9 +43,10 @@ impl DecouplingNetwork {
     /// Joins a network with the scaling it was trained under.
     ///
     /// # Panics
-    /// If the network's channels are not the varying channels of the scaling.
-    pub fn new(inputs: MinMax, mlp: Mlp, outputs: MinMax) -> Self {
-        assert_eq!(inputs.varying().len(), mlp.shape().inputs);
+    /// If the network's channels are not those of the scaling.
+    pub fn new(inputs: impl Into<Inputs>, mlp: Mlp, outputs: MinMax) -> Self {
+        let inputs = inputs.into();
+        assert_eq!(inputs.count(), mlp.shape().inputs);
         assert_eq!(outputs.varying().len(), mlp.shape().outputs);
         Self { inputs, mlp, outputs }
     }
@@ -55,8 +56,8 @@ impl DecouplingNetwork {
         &self.mlp
     }
 
-    /// Scaling of the resistances.
-    pub fn inputs(&self) -> &MinMax {
+    /// How resistances become inputs.
+    pub fn inputs(&self) -> &Inputs {
         &self.inputs
     }
 
@@ -67,7 +68,7 @@ impl DecouplingNetwork {
 
     /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4).
     pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        let scaled = self.inputs.scale(resistances_ohm);
+        let scaled = self.inputs.of(resistances_ohm);
         self.outputs.restore(self.mlp.forward(scaled.view()).view())
     }
 }
@@ -76,7 +77,9 @@ impl DecouplingNetwork {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {
-    input_scaling: MinMax,
+    #[serde(default)]
+    input_quantity: Quantity,
+    input_scaling: InputScaling,
     hidden_nodes: usize,
     /// (varying inputs + 1) × hidden nodes.
     hidden_layer: Vec<f64>,
@@ -92,7 +95,8 @@ impl From<DecouplingNetwork> for Record {
             hidden_nodes: network.mlp.shape().hidden,
             hidden_layer: hidden_layer.to_vec(),
             output_layer: output_layer.to_vec(),
-            input_scaling: network.inputs,
+            input_quantity: network.inputs.quantity(),
+            input_scaling: network.inputs.scaling().clone(),
             output_scaling: network.outputs,
         }
     }
@@ -102,13 +106,17 @@ impl TryFrom<Record> for DecouplingNetwork {
     type Error = NetworkError;
 
     fn try_from(record: Record) -> Result<Self, NetworkError> {
-        for (side, scaling) in [("input", &record.input_scaling), ("output", &record.output_scaling)] {
-            if !scaling.is_sound() {
+        let inputs = Inputs::new(record.input_quantity, record.input_scaling);
+        for (side, is_sound) in [
+            ("input", inputs.is_sound()),
+            ("output", record.output_scaling.is_sound()),
+        ] {
+            if !is_sound {
                 return Err(NetworkError::Scaling(side));
             }
         }
         let shape = Shape {
-            inputs: record.input_scaling.varying().len(),
+            inputs: inputs.count(),
             hidden: record.hidden_nodes,
             outputs: record.output_scaling.varying().len(),
         };
@@ -138,6 +146,6 @@ impl TryFrom<Record> for DecouplingNetwork {
             }
         }
         let mlp = Mlp::from_weights(shape, [record.hidden_layer, record.output_layer].concat());
-        Ok(Self::new(record.input_scaling, mlp, record.output_scaling))
+        Ok(Self::new(inputs, mlp, record.output_scaling))
     }
 }

@@ -2,15 +2,23 @@
 //! scaling on both sides and the random start.
 
 mod decoupling_network;
+mod inputs;
 mod mlp;
+mod networks;
+mod quantity;
 mod scaling;
 mod start;
 mod suggestions;
 mod tanh;
+mod whitening;
 
 pub use decoupling_network::{DecouplingNetwork, NetworkError};
+pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
 pub use mlp::{Mlp, Shape};
+pub use networks::Networks;
+pub use quantity::{Quantity, QuantityError};
 pub use scaling::{MinMax, ScalingError};
 pub use start::nguyen_widrow;
 pub use suggestions::{HiddenSuggestions, LARGEST_HIDDEN};
-pub use tanh::tanh_in_place;
+pub use tanh::{tanh_in_place, tanh_in_place_single};
+pub use whitening::Whitening;

@@ -39,6 +39,12 @@ pub enum ScalingError {
         /// Its largest value.
         maximum: f64,
     },
+    /// The principal components could not be computed.
+    #[error("the principal components of the readings did not converge: scale by their range instead")]
+    NotConverged,
+    /// A file whose scaling makes no sense.
+    #[error("its parts are missing, not finite, or of sizes that do not fit")]
+    Damaged,
 }
 
 impl MinMax {
@@ -111,6 +117,22 @@ impl MinMax {
             column.mapv_inplace(|value| (value - middle) / half_width);
         }
         scaled
+    }
+
+    /// The map to scaled values, `matrix · (values − centre)` with the matrix varying channels × channels.
+    pub(super) fn affine(&self) -> (Vec<f64>, Array2<f64>) {
+        let varying = self.varying();
+        let centre = (0..self.channels()).map(|channel| self.range(channel).0).collect();
+        let mut matrix = Array2::zeros((varying.len(), self.channels()));
+        for (k, &channel) in varying.iter().enumerate() {
+            matrix[[k, channel]] = 1.0 / self.range(channel).1;
+        }
+        (centre, matrix)
+    }
+
+    /// Values in the middle of their ranges, of which constants are the exact value, and half widths of the ranges.
+    pub(crate) fn middles_and_half_widths(&self) -> Vec<(f64, f64)> {
+        (0..self.channels()).map(|channel| self.range(channel)).collect()
     }
 
     /// Scaled values (samples × varying channels) back to physical ones (samples × channels), constants restored.

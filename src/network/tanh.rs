@@ -52,6 +52,50 @@ fn tanh(x: f64) -> f64 {
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
 }
 
+/// As [`tanh_in_place`] in single precision, within 4 units in the last place.
+pub fn tanh_in_place_single(values: &mut [f32]) {
+    pulp::Arch::new().dispatch(|| {
+        for value in &mut *values {
+            *value = tanh_single(*value);
+        }
+    });
+}
+
+#[inline(always)]
+fn tanh_single(x: f32) -> f32 {
+    /// ln 2 in two parts; products of the first with a whole number up to 2¹⁵ are exact.
+    const LN2_HIGH: f32 = 0.693_359_4;
+    const LN2_LOW: f32 = -2.121_944_4e-4;
+    /// Adding 1.5·2²³ leaves the nearest whole number in the low bits.
+    const ROUND: f32 = 12_582_912.0;
+    /// Beyond 2|x| = 20 the result rounds to ±1.
+    const SATURATED: f32 = 20.0;
+    /// 1/n! from n = 7 down to 2; the rest is below 1e-8.
+    const INVERSE_FACTORIALS: [f32; 6] = [
+        1.0 / 5_040.0,
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        1.0 / 2.0,
+    ];
+
+    let twice = 2.0 * x.abs();
+    // Written so that NaN passes through.
+    let y = if twice > SATURATED { SATURATED } else { twice };
+    let shifted = y * std::f32::consts::LOG2_E + ROUND;
+    let k = shifted - ROUND;
+    let r = (y - k * LN2_HIGH) - k * LN2_LOW;
+    let mut tail = INVERSE_FACTORIALS[0];
+    for coefficient in &INVERSE_FACTORIALS[1..] {
+        tail = tail * r + coefficient;
+    }
+    let less_one = r + r * r * tail;
+    let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23));
+    let exponential_less_one = power * less_one + (power - 1.0);
+    (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +125,28 @@ mod tests {
         assert!(values[4].is_sign_negative());
         let mut nan = [f64::NAN];
         tanh_in_place(&mut nan);
+        assert!(nan[0].is_nan());
+    }
+
+    #[test]
+    fn single_precision_agrees_with_double() {
+        let magnitudes = (0..=20_000)
+            .map(|i| i as f32 * 1e-3)
+            .chain((0..38).map(|e| 10.0_f32.powi(-e)))
+            .chain([f32::INFINITY, f32::MAX]);
+        for x in magnitudes.flat_map(|x| [x, -x]) {
+            let mut ours = [x];
+            tanh_in_place_single(&mut ours);
+            let exact = f64::from(x).tanh();
+            let error = (f64::from(ours[0]) - exact).abs();
+            assert!(
+                error <= 4.0 * f64::from(f32::EPSILON) * exact.abs(),
+                "{x}: {} {exact}",
+                ours[0]
+            );
+        }
+        let mut nan = [f32::NAN];
+        tanh_in_place_single(&mut nan);
         assert!(nan[0].is_nan());
     }
 }

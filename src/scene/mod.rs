@@ -1,33 +1,40 @@
 //! The scene: what happens to the sensor. Nothing that does not vary in the scene is modelled further on.
 
 mod deformation;
+mod loading;
+mod movement;
+mod noise;
+pub(crate) mod normal;
+mod rows;
 
 pub use deformation::Deformation;
+pub use loading::{DeformationSampler, Indenter, IndenterShape, Loading, Span};
+pub use movement::Movement;
+pub use noise::{Noise, NoiseSource, NoisySets, RelativeSpread};
+pub use rows::Rows;
 
-use glam::DVec3;
-use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::sensor::{ArrayScale, Geometry};
+use crate::sensor::{ArrayScale, Geometry, SensorModel};
 
-/// How the top surface is loaded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Loading {
-    /// Every node is compressed by an independent, uniformly distributed amount: the paper's experiments.
-    #[default]
-    RandomNodes,
-}
-
-/// Which deformations occur. All rows are read, and nodes move along z only, as in the paper.
+/// What is read, what moves, how it is loaded, and what disturbs the readings. The default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
+    /// Which row-wires are read, and whether a decoder knows which.
+    #[serde(default)]
+    pub rows: Rows,
+    /// How nodes move.
+    #[serde(default)]
+    pub movement: Movement,
     /// How the surface is loaded.
     pub loading: Loading,
     /// The largest compression as a fraction of the height, in (0, 1).
     pub largest_compression: f64,
+    /// What disturbs the readings.
+    #[serde(default)]
+    pub noise: Noise,
 }
 
 /// A scene that cannot be drawn.
@@ -36,28 +43,82 @@ pub enum SceneError {
     /// The largest compression is out of range.
     #[error("the largest compression is {} %: it must be above 0 and below 100 % of the height", 100.0 * .0)]
     Compression(f64),
+    /// The array has no such row-wire.
+    #[error("row {row} does not exist: the array has rows 1 to {rows}")]
+    Row {
+        /// What was asked for, from 1.
+        row: usize,
+        /// Row-wires of the array.
+        rows: usize,
+    },
+    /// Not a choice of rows.
+    #[error("'{0}' is not a choice of rows: give all, known, or the number of a row from 1")]
+    RowsText(String),
+    /// Not a loading.
+    #[error(
+        "'{0}' is not a loading: give random, smooth:MM (its correlation length), or indenter with :sphere, :flat-punch, \
+         :cylinder or :edge"
+    )]
+    LoadingText(String),
+    /// Not a choice of axes.
+    #[error("'{0}' is not a choice of axes: give z or xyz")]
+    AxesText(String),
+    /// The shift sideways is impossible.
+    #[error(
+        "the largest shift sideways is {0} mm: it must be above 0 and finite; for none, let nodes move along z only"
+    )]
+    Shift(f64),
+    /// The correlation length is impossible.
+    #[error("the correlation length is {0} mm: it must be above 0 and finite")]
+    CorrelationLength(f64),
+    /// The indenter's spread is impossible.
+    #[error("the surface comes back around the indenter within {0} mm: this must be above 0 and finite")]
+    Spread(f64),
+    /// The indenter's radius is impossible.
+    #[error("the indenter's radius is from {} to {} mm: give two lengths above 0 in order", .0.smallest, .0.largest)]
+    Radius(Span),
+    /// The indenter's tilt is impossible.
+    #[error("the indenter's largest tilt is {0} degrees: give from 0 to 45")]
+    Tilt(f64),
+    /// Noise out of range.
+    #[error("the {what} is {value}: give from 0 to {largest}")]
+    Noise {
+        /// Which kind.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The largest possible.
+        largest: f64,
+    },
+    /// Bits out of range.
+    #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MOST_BITS)]
+    Bits(u8),
 }
 
 impl Default for Scene {
     fn default() -> Self {
         Self {
+            rows: Rows::All,
+            movement: Movement::Z,
             loading: Loading::RandomNodes,
             largest_compression: 0.2,
+            noise: Noise::default(),
         }
     }
 }
 
 impl Scene {
-    /// Checks that the compression lies between nothing and the whole height.
+    /// Checks every number, but not whether an array has the row of [`Rows::One`]: [`Rows::read`] tells that.
     ///
     /// # Errors
-    /// It does not.
+    /// The first that is impossible.
     pub fn check(&self) -> Result<(), SceneError> {
-        if self.largest_compression > 0.0 && self.largest_compression < 1.0 {
-            Ok(())
-        } else {
-            Err(SceneError::Compression(self.largest_compression))
+        if !(self.largest_compression > 0.0 && self.largest_compression < 1.0) {
+            return Err(SceneError::Compression(self.largest_compression));
         }
+        self.movement.check()?;
+        self.loading.check()?;
+        self.noise.check()
     }
 
     /// The full scale of the deformation: the distance a node can travel.
@@ -65,13 +126,121 @@ impl Scene {
         self.largest_compression * geometry.height_mm
     }
 
-    /// Draws the deformation of the whole array at one moment.
-    pub fn draw(&self, scale: ArrayScale, geometry: &Geometry, rng: &mut impl Rng) -> Deformation {
-        let stroke_mm = self.stroke_mm(geometry);
-        match self.loading {
-            Loading::RandomNodes => {
-                Deformation::from_fn(scale, |_, _| DVec3::new(0.0, 0.0, stroke_mm * rng.random::<f64>()))
+    /// Prepares to draw deformations of `model`.
+    pub fn sampler(&self, model: &SensorModel) -> DeformationSampler {
+        DeformationSampler::new(self, model)
+    }
+
+    /// Unknowns of each row-wire of an array: what moves, and nothing else.
+    pub fn unknowns_per_row(&self, scale: ArrayScale) -> usize {
+        scale.nodes_per_row() * self.movement.axes().count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{Seed, Stream};
+
+    fn scenes() -> Vec<Scene> {
+        let mut loadings = vec![
+            Loading::RandomNodes,
+            Loading::SmoothField {
+                correlation_length_mm: 3.0,
+            },
+        ];
+        loadings.extend(Indenter::all().map(Loading::Indenter));
+        let with = |movement| {
+            loadings.clone().into_iter().map(move |loading| Scene {
+                movement,
+                loading,
+                ..Scene::default()
+            })
+        };
+        with(Movement::Z).chain(with(Movement::SIDEWAYS)).collect()
+    }
+
+    #[test]
+    fn every_loading_stays_within_the_stroke_and_uses_it() {
+        let model = SensorModel::new(ArrayScale::default());
+        for scene in scenes() {
+            scene.check().unwrap();
+            let sampler = scene.sampler(&model);
+            let mut rng = Seed(0).rng(Stream::Training);
+            let mut largest = glam::DVec3::ZERO;
+            for _ in 0..200 {
+                let deformation = sampler.draw(&mut rng);
+                for u in (0..10).flat_map(|row| deformation.row_mm(row)) {
+                    assert!((0.0..=1.0).contains(&u.z), "{scene:?} {u}");
+                    largest = largest.max(u.abs());
+                }
             }
+            assert!(largest.z > 0.9, "{scene:?} {largest}");
+            match scene.movement {
+                Movement::Z => assert_eq!((largest.x, largest.y), (0.0, 0.0)),
+                Movement::Xyz { largest_shift_mm } => {
+                    assert!(largest.x <= largest_shift_mm && largest.y <= largest_shift_mm);
+                    assert!(largest.x > 0.0 && largest.y > 0.0);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scenes_survive_their_file_and_older_files_are_the_papers() {
+        for scene in scenes() {
+            let scene = Scene {
+                rows: Rows::One(3),
+                noise: Noise::relative(1e-3),
+                ..scene
+            };
+            let text = serde_json::to_string(&scene).unwrap();
+            assert_eq!(serde_json::from_str::<Scene>(&text).unwrap(), scene, "{text}");
+        }
+        let older = r#"{"loading":"random_nodes","largest_compression":0.2}"#;
+        assert_eq!(serde_json::from_str::<Scene>(older).unwrap(), Scene::default());
+    }
+
+    #[test]
+    fn impossible_scenes_are_named() {
+        let impossible = [
+            (
+                Scene {
+                    movement: Movement::Xyz { largest_shift_mm: -1.0 },
+                    ..Scene::default()
+                },
+                "shift",
+            ),
+            (
+                Scene {
+                    loading: Loading::SmoothField {
+                        correlation_length_mm: f64::NAN,
+                    },
+                    ..Scene::default()
+                },
+                "correlation length",
+            ),
+            (
+                Scene {
+                    noise: Noise::relative(-0.1),
+                    ..Scene::default()
+                },
+                "relative noise",
+            ),
+            (
+                Scene {
+                    noise: Noise {
+                        converter_bits: Some(0),
+                        ..Noise::default()
+                    },
+                    ..Scene::default()
+                },
+                "0 bits",
+            ),
+        ];
+        for (scene, word) in impossible {
+            let message = scene.check().unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
         }
     }
 }

@@ -78,6 +78,12 @@ impl SensorModel {
         )
     }
 
+    /// The displacement that puts a node at `position_mm`, z counting downwards: the inverse of [`Self::displaced_mm`].
+    pub fn displacement_mm(&self, row: usize, node: usize, position_mm: DVec3) -> DVec3 {
+        let apart = position_mm - self.geometry.row_node_mm(self.scale, row, node);
+        DVec3::new(apart.x, apart.y, -apart.z)
+    }
+
     /// Row-column resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them),
     /// written to `resistances_ohm` (M4), Eq. (2):
     ///
@@ -97,19 +103,23 @@ impl SensorModel {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
         let (y0, pitch) = (self.geometry.column_y0_mm, self.geometry.column_pitch_mm);
-        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
-        resistances_ohm.fill(0.0);
-        for (node, &displacement) in displacements_mm.iter().enumerate() {
-            let position = self.displaced_mm(row, node, displacement);
-            for j in 0..self.scale.nodes_per_column() {
-                let dx = position.x - self.geometry.column_node_mm(0, j).x;
-                let across2 = dx * dx + position.z * position.z;
-                for (column, sum) in resistances_ohm.iter_mut().enumerate() {
-                    let dy = position.y - (y0 + pitch * column as f64);
-                    *sum += 1.0 / (across2 + dy * dy).sqrt();
+        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance. No fused operations,
+        // so every machine gives the same bits.
+        let sums = &mut *resistances_ohm;
+        pulp::Arch::new().dispatch(|| {
+            sums.fill(0.0);
+            for (node, &displacement) in displacements_mm.iter().enumerate() {
+                let position = self.displaced_mm(row, node, displacement);
+                for j in 0..self.scale.nodes_per_column() {
+                    let dx = position.x - self.geometry.column_node_mm(0, j).x;
+                    let across2 = dx * dx + position.z * position.z;
+                    for (column, sum) in sums.iter_mut().enumerate() {
+                        let dy = position.y - (y0 + pitch * column as f64);
+                        *sum += 1.0 / (across2 + dy * dy).sqrt();
+                    }
                 }
             }
-        }
+        });
         for (column, value) in resistances_ohm.iter_mut().enumerate() {
             *value = self.resistivity_ohm_per_mm / *value;
             if !(*value > 0.0 && value.is_finite()) {

@@ -21,8 +21,7 @@ impl Trainer {
     /// # Errors
     /// A setting out of range, or a network too wide for the method; then nothing has changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        method.check()?;
-        check_width(&method, self.mlp.shape(), self.problem.training.samples())?;
+        self.check_method(&method)?;
         let begun = Instant::now();
         let first_epoch = self.latest().epoch + 1;
         self.stages.retain(|stage| stage.first_epoch < first_epoch);
@@ -34,6 +33,15 @@ impl Trainer {
         self.stop_reason = all_run.then_some(StopReason::EpochsReached);
         self.elapsed += begun.elapsed();
         Ok(())
+    }
+
+    /// Whether [`Self::continue_with`] would take this method.
+    ///
+    /// # Errors
+    /// What it would say.
+    pub fn check_method(&self, method: &Method) -> Result<(), TrainingError> {
+        method.check()?;
+        check_width(method, self.mlp.shape(), self.problem.training.samples())
     }
 
     /// Changes when to stop. A training that these rules would not have ended where it stands goes on, say with more

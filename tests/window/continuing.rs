@@ -167,7 +167,14 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     // Only the time it took differs.
     expected.training.seconds = found.training.seconds;
     assert_eq!(found, expected);
-    let bits = |file: &NetworkFile| -> Vec<u64> { file.network.mlp().weights().iter().map(|w| w.to_bits()).collect() };
+    let bits = |file: &NetworkFile| -> Vec<u64> {
+        file.network.each()[0]
+            .mlp()
+            .weights()
+            .iter()
+            .map(|w| w.to_bits())
+            .collect()
+    };
     assert_eq!(bits(&found), bits(&expected));
 }
 
@@ -348,7 +355,7 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
     let run = trained(settings);
     let leader = run.leader();
     let effective = leader.history()[leader.best_epoch()].effective_parameters.unwrap();
-    let weights = leader.present().weights().len();
+    let weights = leader.weights();
     let text = format!("Effective parameters {} of {weights} weights", format_number(effective));
     assert!(driver.has(&text), "{text} is not in {:#?}", driver.texts());
     choose_method(&mut driver, "Levenberg-Marquardt");

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use decoupler::{
     export::{NetworkFile, format_number},
-    network::DecouplingNetwork,
+    network::Networks,
 };
 use eframe::egui::{Key, Modifiers};
 
@@ -55,7 +55,7 @@ fn a_saved_network_gives_the_same_outputs_bit_by_bit() {
     let run = trained(small());
     assert_eq!(file.settings, small());
     let readings = run.test().resistances_ohm.view();
-    let bits = |network: &DecouplingNetwork| network.decouple(readings).mapv(f64::to_bits);
+    let bits = |network: &Networks| network.decouple(readings).mapv(f64::to_bits);
     assert_eq!(bits(&file.network), bits(&run.network()));
     driver.click("Dismiss");
     assert!(!driver.says("Saved "));

@@ -79,6 +79,11 @@ pub enum ExperimentError {
     /// A setting of the method out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// Single samples are dealt where rows are known.
+    #[error(
+        "known rows need whole snapshots, in which each sample's row follows from its place: deal folds of snapshots"
+    )]
+    KnownRows,
     /// Folds that cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
@@ -115,6 +120,7 @@ impl Experiment {
             Some(_) => PublishedErrors::of_cross_validation,
         };
         let published = published(settings.sensor.scale, settings.hidden, settings.samples);
+        let published = published.filter(|_| settings.is_papers_scene());
         Cell {
             column,
             row,
@@ -165,6 +171,12 @@ impl Experiment {
             .is_some_and(|second| second.is_same_kind(&self.axis))
         {
             return Err(ExperimentError::SameAxes(self.axis.name()));
+        }
+        let deals_samples = self
+            .cross_validation
+            .is_some_and(|cross_validation| cross_validation.unit == FoldUnit::Sample);
+        if deals_samples && self.base.scene.rows.are_known() {
+            return Err(ExperimentError::KnownRows);
         }
         for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
             let allowed = 1..=MOST_TRIALS;

@@ -137,6 +137,7 @@ pub(super) mod tests {
             baselines: Baselines {
                 mean: errors(5.5),
                 linear: errors(1.6),
+                reference: None,
             },
             bottleneck: errors(0.0),
             networks: 1,

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::{Bottleneck, CrossValidation};
 use crate::{
-    dataset::{Dataset, DatasetError, Folds, Seed, Split, Stream},
+    dataset::{Dataset, Folds, Seed, Split, Stream},
     decoupling::{Decoupler, LinearMap, TrainingMean},
     evaluation::{Baselines, Errors, Run, RunError, RunSettings},
     training::TrainerState,
@@ -92,7 +92,7 @@ impl Trial {
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let set = draw(&settings)?;
+        let set = Run::training_set(&settings, settings.samples)?;
         let own_seed = nth_seed(settings.seed, repeat);
         let folds = Folds::deal(&set, folds, unit, &mut own_seed.rng(Stream::Split))?;
         let mut pooled = Pooled::new(&set);
@@ -120,6 +120,7 @@ impl Trial {
             baselines: Baselines {
                 mean: errors(&pooled.mean),
                 linear: errors(&pooled.linear),
+                reference: None,
             },
             bottleneck: errors(&pooled.bottleneck),
             networks: folds.count(),
@@ -149,15 +150,6 @@ fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Spent> {
         spent.seconds += trainer.elapsed().as_secs_f64();
     }
     Some(spent)
-}
-
-fn draw(settings: &RunSettings) -> Result<Dataset, RunError> {
-    settings.sensor.check()?;
-    settings.scene.check()?;
-    let mut rng = settings.seed.rng(Stream::Training);
-    let drawn: Result<_, DatasetError> =
-        Dataset::simulate(&settings.sensor, &settings.scene, settings.samples, &mut rng);
-    Ok(drawn?)
 }
 
 /// What is fitted and what is held out when fold `fold` is tested: the fold after it chooses the best weights.

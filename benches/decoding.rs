@@ -1,0 +1,249 @@
+//! How fast frames are decoded: `cargo bench --no-default-features --bench decoding`.
+//!
+//! One thread; medians of many frames, taken in turns within one run. Only ratios are worth remembering: what the
+//! arithmetic alone takes, divisions, square roots, hyperbolic tangents and multiplications in plain loops of the same
+//! number, is measured beside.
+#![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::{hint::black_box, time::Instant};
+
+use decoupler::{
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{
+        CompiledNetworks, FrameDecoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
+        RadialBasisNetwork, RadialBasisSettings, RidgeMap, RowMaps, TrainingMean, fit_rows,
+    },
+    network::{
+        DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, Shape, nguyen_widrow, tanh_in_place,
+        tanh_in_place_single,
+    },
+    scene::{Noise, Rows, Scene},
+    sensor::{ArrayScale, Axes, RowConductance, SensorModel},
+};
+use glam::DVec3;
+
+/// Nanoseconds of each piece of work: medians of blocks, taken in turns.
+fn medians_ns<'a>(works: &mut [(String, Box<dyn FnMut() + 'a>)]) -> Vec<f64> {
+    const TURNS: usize = 15;
+    const BLOCK_NS: f64 = 2e6;
+    let runs: Vec<usize> = works
+        .iter_mut()
+        .map(|(_, work)| {
+            work();
+            let begun = Instant::now();
+            work();
+            (BLOCK_NS / begun.elapsed().as_nanos().max(1) as f64).clamp(1.0, 20_000.0) as usize
+        })
+        .collect();
+    let mut times = vec![Vec::new(); works.len()];
+    for _ in 0..TURNS {
+        for (((_, work), &runs), times) in works.iter_mut().zip(&runs).zip(&mut times) {
+            let begun = Instant::now();
+            for _ in 0..runs {
+                work();
+            }
+            times.push(begun.elapsed().as_nanos() as f64 / runs as f64);
+        }
+    }
+    let middle = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[TURNS / 2]
+    };
+    times.iter_mut().map(middle).collect()
+}
+
+/// Untrained networks: speed does not depend on the weights.
+fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Vec<DecouplingNetwork> {
+    let mut rng = Seed(0).rng(Stream::Start);
+    let network = |row: usize| {
+        let set = training.of_row(row);
+        let inputs = Inputs::fit(choice, set.resistances_ohm.view(), 0.0).unwrap();
+        let outputs = MinMax::fit(set.coordinates_mm.view()).unwrap();
+        let shape = Shape {
+            inputs: inputs.count(),
+            hidden,
+            outputs: outputs.varying().len(),
+        };
+        DecouplingNetwork::new(inputs, nguyen_widrow(shape, &mut rng), outputs)
+    };
+    (0..training.rows()).map(network).collect()
+}
+
+/// What decoding of a frame by networks cannot avoid, in the precision of the array.
+macro_rules! arithmetic {
+    ($real:ty, $tanh:path, $divisions:expr, $tangents:expr, $products:expr) => {{
+        let (mut quotients, mut tangents) = (vec![1.5 as $real; $divisions], vec![0.3 as $real; $tangents]);
+        let weights = vec![0.01 as $real; $products];
+        move || {
+            pulp::Arch::new().dispatch(|| {
+                for value in &mut *quotients {
+                    *value = 2.0 / black_box(1.0 as $real) / *value;
+                }
+                let mut sums = [0.0 as $real; 32];
+                for block in weights.chunks_exact(32) {
+                    for (sum, weight) in sums.iter_mut().zip(block) {
+                        *sum += 0.7 * weight;
+                    }
+                }
+                black_box(sums);
+            });
+            $tanh(&mut tangents);
+            black_box((&quotients, &tangents));
+        }
+    }};
+}
+
+fn print_scale(scale: ArrayScale) {
+    let model = SensorModel::new(scale);
+    let scene = Scene {
+        rows: Rows::Known,
+        ..Scene::default()
+    };
+    let noisy = Scene {
+        noise: Noise::relative(1e-3),
+        ..scene
+    };
+    let rows: Vec<usize> = (0..scale.rows()).collect();
+    let mut rng = Seed(0).rng(Stream::Training);
+    let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
+    let frame: Vec<f64> = training
+        .resistances_ohm
+        .iter()
+        .take(scale.rows() * scale.columns())
+        .copied()
+        .collect();
+    let mut decoders: Vec<(String, Box<dyn FrameDecoder>)> = vec![
+        (
+            "mean".into(),
+            Box::new(RowMaps::shared(TrainingMean::fit(&training), scale.rows())),
+        ),
+        (
+            "ridge".into(),
+            Box::new(fit_rows(&training, true, |set| RidgeMap::fit(set, InputChoice::BEST, 0.0)).unwrap()),
+        ),
+        (
+            "radial basis, 100 centres".into(),
+            Box::new(
+                fit_rows(&training, true, |set| {
+                    let settings = RadialBasisSettings::default();
+                    RadialBasisNetwork::fit(set, InputChoice::BEST, 0.0, settings, &mut rng)
+                })
+                .unwrap(),
+            ),
+        ),
+    ];
+    for hidden in [6, 12, 24, 48] {
+        for quantity in Quantity::ALL {
+            let choice = InputChoice {
+                quantity,
+                scaling: ScalingChoice::Whitening,
+            };
+            let networks = networks(&training, choice, hidden);
+            let double = CompiledNetworks::<f64>::each(&networks);
+            let single = CompiledNetworks::<f32>::each(&networks);
+            decoders.push((format!("network, {hidden} hidden, {quantity}, f64"), Box::new(double)));
+            decoders.push((format!("network, {hidden} hidden, {quantity}, f32"), Box::new(single)));
+        }
+    }
+    let first = CompiledNetworks::<f64>::each(&networks(&training, InputChoice::BEST, 12));
+    let exact = Posterior::new(&model, &scene, &rows, &mut rng).unwrap();
+    decoders.push((
+        "polish, 1 step".into(),
+        Box::new(PolishedDecoder::new(Box::new(first), exact, &model, &scene, &rows, 1)),
+    ));
+    decoders.push((
+        "newton".into(),
+        Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
+    ));
+    let posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    decoders.push((
+        "newton with prior, noise 1e-3".into(),
+        Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
+    ));
+    let coordinates = scale.rows() * scale.coordinates_per_row();
+    let (m1, m2, m4) = (scale.rows(), scale.nodes_per_row(), scale.columns());
+    let pressed = vec![DVec3::new(0.0, 0.0, 0.4); m2];
+    let mut resistances = vec![0.0; m4];
+    let mut works: Vec<(String, Box<dyn FnMut() + '_>)> = Vec::new();
+    for (name, decoder) in &mut decoders {
+        let mut answer = vec![0.0; coordinates];
+        let frame = &frame;
+        let work = move || {
+            decoder.decode(black_box(frame), &mut answer).unwrap();
+            black_box(&answer);
+        };
+        works.push((name.clone(), Box::new(work)));
+    }
+    let (divisions, tangents, products) = (m1 * m4, m1 * 12, m1 * 12 * (m4 + m2));
+    works.push((
+        "arithmetic of 12 hidden, f64".into(),
+        Box::new(arithmetic!(f64, tanh_in_place, divisions, tangents, products)),
+    ));
+    works.push((
+        "arithmetic of 12 hidden, f32".into(),
+        Box::new(arithmetic!(f32, tanh_in_place_single, divisions, tangents, products)),
+    ));
+    works.push((
+        "forward model".into(),
+        Box::new(|| {
+            for row in 0..m1 {
+                model
+                    .row_resistances_into(row, black_box(&pressed), &mut resistances)
+                    .unwrap();
+                black_box(&resistances);
+            }
+        }),
+    ));
+    for axes in [Axes::Z, Axes::Xyz] {
+        let mut conductance = RowConductance::new(&model, axes);
+        let pressed = &pressed;
+        let model = &model;
+        works.push((
+            format!("forward model and Jacobian, {axes:?}"),
+            Box::new(move || {
+                for row in 0..m1 {
+                    conductance.evaluate(model, row, black_box(pressed));
+                    black_box(&conductance);
+                }
+            }),
+        ));
+    }
+    let mut distances = vec![30.0_f64; m1 * m2 * scale.nodes_per_column() * m4];
+    works.push((
+        "arithmetic of the forward model".into(),
+        Box::new(move || {
+            pulp::Arch::new().dispatch(|| {
+                for value in &mut distances {
+                    *value = 1.0 / (*value + 30.0).sqrt();
+                }
+            });
+            black_box(&distances);
+        }),
+    ));
+    let times = medians_ns(&mut works);
+    println!("\n{scale}: {m1} rows a frame");
+    println!("{:38} {:>12} {:>12}", "", "ns per row", "us per frame");
+    for ((name, _), ns) in works.iter().zip(&times) {
+        println!("{name:38} {:>12.0} {:>12.3}", ns / m1 as f64, ns * 1e-3);
+    }
+    let of = |name: &str| times[works.iter().position(|work| work.0 == name).unwrap()];
+    for precision in ["f64", "f32"] {
+        println!(
+            "12 hidden, conductance, {precision}: {:.1} times its arithmetic",
+            of(&format!("network, 12 hidden, conductance, {precision}"))
+                / of(&format!("arithmetic of 12 hidden, {precision}"))
+        );
+    }
+    println!(
+        "forward model: {:.1} times its arithmetic",
+        of("forward model") / of("arithmetic of the forward model")
+    );
+}
+
+fn main() {
+    for scale in ArrayScale::PRESETS {
+        print_scale(scale);
+    }
+    print_scale("20x20_10x60".parse().unwrap());
+}

@@ -1,0 +1,237 @@
+use std::{
+    io::{self, Write, stdout},
+    time::Duration,
+};
+
+use serde::Serialize;
+
+use super::failure::Failure;
+use crate::{
+    evaluation::{RunSettings, TradePoint, fastest_under, most_accurate_under, pareto_front},
+    export::{format_duration, format_number},
+    sensor::ArrayScale,
+};
+
+/// The points at one level of noise.
+pub(super) struct Level {
+    pub(super) noise: f64,
+    pub(super) points: Vec<TradePoint>,
+}
+
+/// What choices are asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    pub(super) percent: Option<f64>,
+    pub(super) microseconds: Option<f64>,
+}
+
+impl Level {
+    /// Whether each point is on the front of decoding time, and on that of training time.
+    fn fronts(&self) -> Vec<(bool, bool)> {
+        let front = |of: fn(&TradePoint) -> (f64, f64)| pareto_front(&self.points.iter().map(of).collect::<Vec<_>>());
+        let decoding = front(TradePoint::decoding).into_iter();
+        decoding.zip(front(TradePoint::training)).collect()
+    }
+}
+
+/// The command that trains this choice.
+fn command(point: &TradePoint) -> String {
+    let settings = &point.settings;
+    // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
+    let of_preset = RunSettings {
+        scene: point.preset.settings().scene,
+        ..point.preset.settings_in(settings.scene.noise)
+    };
+    let array = settings.sensor.scale.to_string().replace('×', "x");
+    let mut command = format!("decoupler train --preset {} --array {array}", point.preset);
+    let mut add = |name: &str, value: &dyn Fn(&RunSettings) -> String| {
+        if value(settings) != value(&of_preset) {
+            command += &format!(" --{name} {}", value(settings));
+        }
+    };
+    add("rows", &|settings| settings.scene.rows.to_string());
+    add("axes", &|settings| settings.scene.movement.to_string());
+    add("loading", &|settings| settings.scene.loading.to_string());
+    add("inputs", &|settings| settings.inputs.quantity.to_string());
+    add("scaling", &|settings| settings.inputs.scaling.to_string());
+    add("noise", &|settings| format!("{:e}", settings.scene.noise.relative));
+    add("noise-ohm", &|settings| {
+        format!("{:e}", settings.scene.noise.additive_ohm)
+    });
+    add("drift", &|settings| format!("{:e}", settings.scene.noise.drift));
+    add("adc-bits", &|settings| {
+        settings.scene.noise.converter_bits.unwrap_or(0).to_string()
+    });
+    add("noise-in", &|settings| {
+        format!("{:?}", settings.scene.noise.sets).to_lowercase()
+    });
+    add("samples", &|settings| settings.samples.to_string());
+    add("epochs", &|settings| settings.training.stopping.epochs.to_string());
+    add("seed", &|settings| settings.seed.to_string());
+    if let Some(hidden) = point.hidden() {
+        command += &format!(" --hidden {hidden}");
+    }
+    command + &format!(" --decoder {}", point.report.kind)
+}
+
+#[derive(Serialize)]
+struct Report {
+    array: ArrayScale,
+    levels: Vec<LevelReport>,
+}
+
+#[derive(Serialize)]
+struct LevelReport {
+    noise: f64,
+    points: Vec<PointReport>,
+    fastest_under: Option<Choice>,
+    most_accurate_under: Option<Choice>,
+}
+
+#[derive(Serialize)]
+struct PointReport {
+    preset: String,
+    decoder: String,
+    precision: &'static str,
+    hidden: Option<usize>,
+    z_percent: Option<f64>,
+    z_mm: f64,
+    frame_us: f64,
+    training_s: f64,
+    /// rms of m/R − 1; none where the answer has no resistance.
+    residual: Option<f64>,
+    reference_z_percent: Option<f64>,
+    reference_z_mm: f64,
+    to_reference: Option<f64>,
+    on_decoding_front: bool,
+    on_training_front: bool,
+    command: String,
+}
+
+#[derive(Serialize)]
+struct Choice {
+    limit: f64,
+    /// None where nothing is good enough.
+    point: Option<usize>,
+    command: Option<String>,
+}
+
+/// The choices asked for: with their limit, the place of the point.
+fn choices(level: &Level, limits: Limits) -> [Option<Choice>; 2] {
+    let choice = |limit: Option<f64>, choose: fn(&[TradePoint], f64) -> Option<&TradePoint>| {
+        let limit = limit?;
+        let chosen = choose(&level.points, limit);
+        let is_chosen = |point: &TradePoint| chosen.is_some_and(|chosen| std::ptr::eq(point, chosen));
+        Some(Choice {
+            limit,
+            point: level.points.iter().position(is_chosen),
+            command: chosen.map(command),
+        })
+    };
+    [
+        choice(limits.percent, fastest_under),
+        choice(limits.microseconds, most_accurate_under),
+    ]
+}
+
+/// Prints one JSON object.
+pub(super) fn print_json(array: ArrayScale, levels: &[Level], limits: Limits) -> Result<(), Failure> {
+    let point = |(point, (on_decoding_front, on_training_front)): (&TradePoint, (bool, bool))| PointReport {
+        preset: point.preset.to_string(),
+        decoder: point.report.kind.to_string(),
+        precision: match point.report.precision {
+            crate::evaluation::Precision::Double => "f64",
+            crate::evaluation::Precision::Single => "f32",
+        },
+        hidden: point.hidden(),
+        z_percent: point.report.errors.z_percent,
+        z_mm: point.report.errors.z_mm,
+        frame_us: point.report.frame_us,
+        training_s: point.training_seconds,
+        residual: Some(point.report.residual).filter(|residual| residual.is_finite()),
+        reference_z_percent: point.reference.z_percent,
+        reference_z_mm: point.reference.z_mm,
+        to_reference: point.to_reference(),
+        on_decoding_front,
+        on_training_front,
+        command: command(point),
+    };
+    let level = |level: &Level| {
+        let [fastest_under, most_accurate_under] = choices(level, limits);
+        LevelReport {
+            noise: level.noise,
+            points: level.points.iter().zip(level.fronts()).map(point).collect(),
+            fastest_under,
+            most_accurate_under,
+        }
+    };
+    let report = Report {
+        array,
+        levels: levels.iter().map(level).collect(),
+    };
+    let mut output = stdout().lock();
+    let written = serde_json::to_writer(&mut output, &report)
+        .map_err(io::Error::from)
+        .and_then(|()| writeln!(output));
+    written.map_err(Failure::Output)
+}
+
+/// Prints a table for each level of noise.
+pub(super) fn print_text(array: ArrayScale, levels: &[Level], limits: Limits) -> Result<(), Failure> {
+    write_text(array, levels, limits, &mut stdout().lock()).map_err(Failure::Output)
+}
+
+fn write_text(array: ArrayScale, levels: &[Level], limits: Limits, out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "{array}: time for a frame (one thread) and training time against the error of z"
+    )?;
+    for level in levels {
+        write_level(level, limits, out)?;
+    }
+    writeln!(
+        out,
+        "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
+         Training is processor time of all rows together."
+    )
+}
+
+fn write_level(level: &Level, limits: Limits, out: &mut impl Write) -> io::Result<()> {
+    write!(out, "\nNoise {}", level.noise)?;
+    if let Some(point) = level.points.first() {
+        let reference = point.reference;
+        let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));
+        write!(out, ", reference {percent} % ({mm} mm)")?;
+    }
+    writeln!(
+        out,
+        "\n{:<7}{:<13}{:>7}{:>12}{:>12}{:>13}{:>12}{:>12}",
+        "preset", "decoder", "hidden", "Z %", "Z mm", "x reference", "us a frame", "training"
+    )?;
+    for (point, (on_decoding_front, on_training_front)) in level.points.iter().zip(level.fronts()) {
+        let hidden = point.hidden().map_or(String::new(), |hidden| hidden.to_string());
+        let training = Duration::try_from_secs_f64(point.training_seconds).unwrap_or_default();
+        writeln!(
+            out,
+            "{:<7}{:<13}{hidden:>7}{:>12}{:>12}{:>13}{:>12}{:>12} {}{}",
+            point.preset,
+            point.report.name(),
+            format_number(point.report.errors.z_percent),
+            format_number(point.report.errors.z_mm),
+            format_number(point.to_reference()),
+            format_number(point.report.frame_us),
+            format_duration(training),
+            if on_decoding_front { "*" } else { " " },
+            if on_training_front { "+" } else { "" },
+        )?;
+    }
+    let [fastest, most_accurate] = choices(level, limits);
+    let told = [
+        fastest.map(|choice| (format!("Fastest under {} %", choice.limit), choice)),
+        most_accurate.map(|choice| (format!("Most accurate under {} us", choice.limit), choice)),
+    ];
+    for (what, choice) in told.into_iter().flatten() {
+        writeln!(out, "{what}: {}", choice.command.as_deref().unwrap_or("none"))?;
+    }
+    Ok(())
+}

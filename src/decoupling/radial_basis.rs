@@ -1,0 +1,233 @@
+use faer::{
+    Mat,
+    linalg::solvers::{Solve, SolveLstsq},
+};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
+use rand::{Rng, seq::index};
+
+use super::frame::RowMap;
+use crate::{
+    dataset::Dataset,
+    network::{InputChoice, Inputs, MinMax, ScalingError},
+};
+
+/// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear output
+/// layer with a constant, solved as a ridge regression.
+#[derive(Clone, Debug)]
+pub struct RadialBasisNetwork {
+    inputs: Inputs,
+    /// Centres × inputs.
+    centres: Array2<f64>,
+    /// 1 / (2 · width²).
+    sharpness: f64,
+    /// (centres + 1) × varying outputs, the constant last.
+    coefficients: Array2<f64>,
+    outputs: MinMax,
+}
+
+/// How a radial-basis network is built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadialBasisSettings {
+    /// Where the Gaussians stand.
+    pub centres: Centres,
+    /// Width of the Gaussians in proportion to the root mean square distance between inputs.
+    pub relative_width: f64,
+    /// Penalty on squared output weights, in proportion to the number of samples.
+    pub ridge: f64,
+}
+
+/// Where the Gaussians stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Centres {
+    /// On every training sample.
+    Samples,
+    /// On this many means of clusters (Lloyd 1982), at most one for each sample.
+    KMeans(usize),
+}
+
+/// Rounds of Lloyd's algorithm.
+const ROUNDS: usize = 20;
+/// Samples among which clusters are sought: a few for each are enough.
+const MOST_CLUSTERED: usize = 1000;
+
+impl Default for RadialBasisSettings {
+    fn default() -> Self {
+        Self {
+            centres: Centres::KMeans(100),
+            relative_width: 2.0,
+            ridge: 1e-12,
+        }
+    }
+}
+
+impl RadialBasisNetwork {
+    /// Fits to a training set; `noise` as in [`Inputs::fit`]; `rng` chooses where clusters begin.
+    ///
+    /// # Errors
+    /// Values that cannot be scaled.
+    pub fn fit(
+        training: &Dataset,
+        choice: InputChoice,
+        noise: f64,
+        settings: RadialBasisSettings,
+        rng: &mut impl Rng,
+    ) -> Result<Self, ScalingError> {
+        let inputs = Inputs::fit(choice, training.resistances_ohm.view(), noise)?;
+        let outputs = MinMax::fit(training.coordinates_mm.view())?;
+        let x = inputs.of(training.resistances_ohm.view());
+        let y = outputs.scale(training.coordinates_mm.view());
+        let centres = match settings.centres {
+            Centres::Samples => x.clone(),
+            Centres::KMeans(count) => k_means(x.view(), count.clamp(1, x.nrows()), rng),
+        };
+        // Twice the total variance is the mean squared distance between two samples.
+        let spread2 = 2.0 * x.var_axis(Axis(0), 0.0).sum();
+        let width2 = settings.relative_width.powi(2) * spread2;
+        let sharpness = if width2 > 0.0 { 0.5 / width2 } else { 0.0 };
+        let (samples, count) = (x.nrows(), centres.nrows());
+        let root = (settings.ridge * samples as f64).sqrt();
+        let below = if root > 0.0 { count } else { 0 };
+        let basis = Mat::from_fn(samples + below, count + 1, |s, c| match (s < samples, c < count) {
+            (true, true) => gaussian(x.row(s), centres.row(c), sharpness),
+            (true, false) => 1.0,
+            (false, _) => {
+                if s - samples == c {
+                    root
+                } else {
+                    0.0
+                }
+            }
+        });
+        let right = Mat::from_fn(
+            samples + below,
+            y.ncols(),
+            |s, t| if s < samples { y[[s, t]] } else { 0.0 },
+        );
+        // One sample at every centre leaves one weight more than equations; the last constant is then left out.
+        let solution = if basis.nrows() > count {
+            basis.qr().solve_lstsq(&right)
+        } else {
+            let square = basis.submatrix(0, 0, samples, count).to_owned();
+            square.partial_piv_lu().solve(&right)
+        };
+        let coefficients = Array2::from_shape_fn((count + 1, y.ncols()), |(c, t)| {
+            let value = if c < solution.nrows() { solution[(c, t)] } else { 0.0 };
+            if value.is_finite() { value } else { 0.0 }
+        });
+        Ok(Self {
+            inputs,
+            centres,
+            sharpness,
+            coefficients,
+            outputs,
+        })
+    }
+
+    /// Number of Gaussians.
+    pub fn centres(&self) -> usize {
+        self.centres.nrows()
+    }
+}
+
+impl RowMap for RadialBasisNetwork {
+    fn map(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
+        let readings = ArrayView2::from_shape((1, readings_ohm.len()), readings_ohm).expect("one row");
+        let x = self.inputs.of(readings);
+        let count = self.centres.nrows();
+        let mut answer = self.coefficients.row(count).to_owned();
+        for (centre, coefficients) in self.centres.rows().into_iter().zip(self.coefficients.rows()) {
+            answer.scaled_add(gaussian(x.row(0), centre, self.sharpness), &coefficients);
+        }
+        let restored = self.outputs.restore(answer.insert_axis(Axis(0)).view());
+        coordinates_mm
+            .iter_mut()
+            .zip(&restored)
+            .for_each(|(target, value)| *target = *value);
+    }
+}
+
+fn gaussian(x: ArrayView1<'_, f64>, centre: ArrayView1<'_, f64>, sharpness: f64) -> f64 {
+    (-sharpness * distance2(x, centre)).exp()
+}
+
+fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// Means of `count` clusters of the rows of `x`, or of [`MOST_CLUSTERED`] of them, begun at rows drawn by `rng`.
+fn k_means(x: ArrayView2<'_, f64>, count: usize, rng: &mut impl Rng) -> Array2<f64> {
+    let most = MOST_CLUSTERED.max(count);
+    let drawn = (x.nrows() > most).then(|| x.select(Axis(0), &index::sample(rng, x.nrows(), most).into_vec()));
+    let x = drawn.as_ref().map_or(x, |drawn| drawn.view());
+    let mut centres = x.select(Axis(0), &index::sample(rng, x.nrows(), count).into_vec());
+    for _ in 0..ROUNDS {
+        let mut sums = Array2::<f64>::zeros(centres.dim());
+        let mut members = vec![0.0; count];
+        for row in x.rows() {
+            let distances = centres.rows().into_iter().map(|centre| distance2(row, centre));
+            let nearest = distances
+                .enumerate()
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .map_or(0, |(c, _)| c);
+            sums.row_mut(nearest).scaled_add(1.0, &row);
+            members[nearest] += 1.0;
+        }
+        let mut moved = false;
+        for ((mut centre, sum), &members) in centres.rows_mut().into_iter().zip(sums.rows()).zip(&members) {
+            // A cluster without members stays where it is.
+            if members > 0.0 {
+                let mean = &sum / members;
+                moved |= mean != centre;
+                centre.assign(&mean);
+            }
+        }
+        if !moved {
+            break;
+        }
+    }
+    centres
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Scene,
+        sensor::SensorModel,
+    };
+    use ndarray::array;
+
+    #[test]
+    fn gaussians_on_every_sample_interpolate_the_samples() {
+        let model = SensorModel::new("1x4_2x12".parse().unwrap());
+        let mut rng = Seed(0).rng(Stream::Training);
+        let set = Dataset::simulate(&model, &Scene::default(), 40, &mut rng).unwrap();
+        let settings = RadialBasisSettings {
+            centres: Centres::Samples,
+            relative_width: 0.5,
+            ridge: 0.0,
+        };
+        let mut network = RadialBasisNetwork::fit(&set, InputChoice::BEST, 1e-4, settings, &mut rng).unwrap();
+        assert_eq!(network.centres(), 40);
+        for sample in 0..40 {
+            let mut coordinates = [0.0; 12];
+            network.map(&set.resistances_ohm.row(sample).to_vec(), &mut coordinates);
+            for (ours, truth) in coordinates.iter().zip(set.coordinates_mm.row(sample)) {
+                assert!((ours - truth).abs() < 1e-7, "{sample}: {ours} {truth}");
+            }
+        }
+    }
+
+    #[test]
+    fn clusters_are_found() {
+        let x = array![[0.0, 0.1], [0.1, 0.0], [0.0, 0.0], [5.0, 5.1], [5.1, 5.0], [5.0, 5.0]];
+        for seed in 0..5 {
+            let mut centres = k_means(x.view(), 2, &mut Seed(seed).rng(Stream::Start));
+            if centres[[0, 0]] > centres[[1, 0]] {
+                centres.invert_axis(Axis(0));
+            }
+            assert!((centres[[0, 0]] - 0.1 / 3.0).abs() < 1e-12 && (centres[[1, 1]] - 15.1 / 3.0).abs() < 1e-12);
+        }
+    }
+}

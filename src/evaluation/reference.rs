@@ -1,0 +1,102 @@
+use ndarray::Array2;
+use rand::Rng;
+
+use super::Errors;
+use crate::{
+    dataset::Dataset,
+    decoupling::Posterior,
+    scene::Scene,
+    sensor::{SensorError, SensorModel},
+};
+
+/// The limit that physics sets: errors of the Bayesian reference on a test set whose readings bear the scene's noise.
+///
+/// For each row, Eq. (2) is linearised at the true deformation; with the noise of the scene and its prior this has a
+/// posterior, whose medians are the answers of least expected distance. No decoder that knows as much does better on
+/// average; one that must find out where to linearise can come close.
+///
+/// The prior of random nodes is the uniform one, cut at 0 and at the stroke, which a Gaussian of the same spread would
+/// get wrong by up to a quarter of the error. Other loadings enter by mean and covariance, cut likewise: there a
+/// decoder that learns the loading's shape may fall below the reference. Each row is judged by its own readings and is
+/// taken as known, also in scenes whose decoders are not told the row; those cannot reach it entirely.
+///
+/// Without noise the reference is exact and its errors are 0. `rng` draws what a prior without closed form needs.
+///
+/// # Errors
+/// A sensor without resistances at rest.
+///
+/// # Panics
+/// If `test` is not of the rows that the scene reads.
+pub fn reference_errors(
+    model: &SensorModel,
+    scene: &Scene,
+    rows: &[usize],
+    test: &Dataset,
+    rng: &mut impl Rng,
+) -> Result<Errors, SensorError> {
+    assert_eq!(test.rows(), rows.len());
+    let mut posterior = Posterior::new(model, scene, rows, rng)?;
+    let mut limit_mm = Array2::zeros(test.coordinates_mm.dim());
+    for (sample, mut answer) in limit_mm.rows_mut().into_iter().enumerate() {
+        let (readings, truth) = (test.resistances_ohm.row(sample), test.coordinates_mm.row(sample));
+        let contiguous = "a row of a standard array is contiguous";
+        posterior.limit(
+            rows[sample % rows.len()],
+            readings.as_slice().expect(contiguous),
+            truth.as_slice().expect(contiguous),
+            answer.as_slice_mut().expect(contiguous),
+        );
+    }
+    Ok(Errors::measure(test, &limit_mm, scene.stroke_mm(&model.geometry)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Noise,
+    };
+
+    fn z_mm(model: &SensorModel, noise: f64, snapshots: usize) -> f64 {
+        let scene = Scene {
+            noise: Noise::relative(noise),
+            ..Scene::default()
+        };
+        let rows: Vec<usize> = (0..model.scale.rows()).collect();
+        let mut test =
+            Dataset::simulate(model, &scene, snapshots * rows.len(), &mut Seed(2).rng(Stream::Test)).unwrap();
+        test.disturb(model, &scene.noise, &mut Seed(2).rng(Stream::TestNoise))
+            .unwrap();
+        let mut rng = Seed(2).rng(Stream::Expectation);
+        reference_errors(model, &scene, &rows, &test, &mut rng).unwrap().z_mm
+    }
+
+    /// One node: the posterior is normal with deviation ε/s while that is small against the stroke, and readings tell
+    /// nothing when it is large, where the middle of the stroke is off by a quarter of it.
+    #[test]
+    fn one_node_has_the_closed_form_at_both_ends() {
+        let mut model = SensorModel::new("1x1_1x4".parse().unwrap());
+        model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
+        let noise = 1e-4;
+        // With R = g·d the derivative of ln R is z/d², here averaged over where the node may be.
+        let mut expected = 0.0;
+        for step in 0..1000 {
+            let z = 4.0 + (f64::from(step) + 0.5) / 1000.0;
+            let information: f64 = (0..4).map(|k| (z / (z * z + (k as f64 - 1.5).powi(2))).powi(2)).sum();
+            expected += noise / information.sqrt() * (2.0 / std::f64::consts::PI).sqrt() / 1000.0;
+        }
+        let found = z_mm(&model, noise, 20_000);
+        assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+        let blind = z_mm(&model, 1.0, 5_000);
+        assert!((blind - 0.25).abs() < 0.02, "{blind}");
+        assert_eq!(z_mm(&model, 0.0, 5), 0.0);
+    }
+
+    #[test]
+    fn more_noise_never_helps() {
+        let model = SensorModel::new("2x4_2x12".parse().unwrap());
+        let errors = [1e-5, 1e-4, 1e-3, 1e-2].map(|noise| z_mm(&model, noise, 30));
+        assert!(errors.is_sorted(), "{errors:?}");
+    }
+}

@@ -1,0 +1,143 @@
+use super::{
+    DecoderKind, DecoderReport, DecoderSet, Errors, Precision, Preset, Run, RunError, RunSettings, run::reference,
+};
+
+/// One choice, with what it costs and gains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TradePoint {
+    /// Where its settings began.
+    pub preset: Preset,
+    /// What was run; its hidden nodes count only where the decoder has a network.
+    pub settings: RunSettings,
+    /// The decoder, its errors, and its time for a frame.
+    pub report: DecoderReport,
+    /// Processor time of training and fitting, in seconds.
+    pub training_seconds: f64,
+    /// The limit that physics sets in this scene.
+    pub reference: Errors,
+}
+
+impl TradePoint {
+    /// Error of z, AveZerr in percent; infinite where a percentage has no meaning.
+    pub fn z_percent(&self) -> f64 {
+        self.report.errors.z_percent.unwrap_or(f64::INFINITY)
+    }
+
+    /// Hidden nodes, if the decoder has a network.
+    pub fn hidden(&self) -> Option<usize> {
+        self.report.kind.needs_network().then_some(self.settings.hidden)
+    }
+
+    /// Its error in proportion to the reference; `None` without noise, where the reference is 0.
+    pub fn to_reference(&self) -> Option<f64> {
+        let limit = self.reference.z_mm;
+        (limit > 0.0).then(|| self.report.errors.z_mm / limit)
+    }
+
+    /// Its decoding time in microseconds and its error.
+    pub fn decoding(&self) -> (f64, f64) {
+        (self.report.frame_us, self.z_percent())
+    }
+
+    /// Its training time in seconds and its error.
+    pub fn training(&self) -> (f64, f64) {
+        (self.training_seconds, self.z_percent())
+    }
+}
+
+/// Measures every decoder of `decoders` in the scene of `settings`, networks with each number of `hidden` nodes; hands
+/// over each point as it is measured. Training uses all threads, decoding is timed on one. Ends early, with `false`,
+/// once `is_cancelled`.
+///
+/// # Errors
+/// Settings that are impossible, with the reason.
+pub fn measure_trade(
+    preset: Preset,
+    settings: &RunSettings,
+    hidden: &[usize],
+    decoders: &[DecoderKind],
+    is_cancelled: impl Fn() -> bool,
+    mut on_point: impl FnMut(TradePoint),
+) -> Result<bool, RunError> {
+    let mut set = DecoderSet::new(settings, None)?;
+    let test = Run::test_set(settings)?;
+    let reference = reference(settings, &test)?;
+    let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) =
+        decoders.iter().partition(|kind| kind.needs_network());
+    for kind in without {
+        if is_cancelled() {
+            return Ok(false);
+        }
+        let report = set.measure(kind, Precision::Double, &test)?;
+        let report = report.expect("it needs no network");
+        on_point(TradePoint {
+            preset,
+            settings: *settings,
+            report,
+            training_seconds: report.fit_seconds,
+            reference,
+        });
+    }
+    if with_network.is_empty() {
+        return Ok(true);
+    }
+    for &hidden in hidden {
+        let settings = RunSettings { hidden, ..*settings };
+        let mut run = Run::prepare(settings)?;
+        while run.step().is_none() {
+            if is_cancelled() {
+                return Ok(false);
+            }
+        }
+        set.set_networks(Some(run.network()));
+        for &kind in &with_network {
+            let single = (kind == DecoderKind::Network).then_some(Precision::Single);
+            for precision in std::iter::once(Precision::Double).chain(single) {
+                let report = set.measure(kind, precision, &test)?.expect("it has its network");
+                on_point(TradePoint {
+                    preset,
+                    settings,
+                    report,
+                    training_seconds: run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum(),
+                    reference,
+                });
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// Which points (cost, error) no other beats: none is better in one and at least as good in the other.
+pub fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
+    let is_beaten = |&(cost, error): &(f64, f64)| {
+        let beats = |other: &(f64, f64)| other.0 <= cost && other.1 <= error && (other.0 < cost || other.1 < error);
+        points.iter().any(beats)
+    };
+    points.iter().map(|point| !is_beaten(point)).collect()
+}
+
+/// The point of least decoding time whose error is at most `percent`.
+pub fn fastest_under(points: &[TradePoint], percent: f64) -> Option<&TradePoint> {
+    let good = points.iter().filter(|point| point.z_percent() <= percent);
+    good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
+}
+
+/// The point of least error that decodes a frame within `microseconds`.
+pub fn most_accurate_under(points: &[TradePoint], microseconds: f64) -> Option<&TradePoint> {
+    let quick = points.iter().filter(|point| point.report.frame_us <= microseconds);
+    quick.min_by(|a, b| a.z_percent().total_cmp(&b.z_percent()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_what_no_other_beats() {
+        let points = [(1.0, 5.0), (2.0, 2.0), (3.0, 2.0), (4.0, 1.0), (5.0, 3.0), (1.0, 6.0)];
+        assert_eq!(pareto_front(&points), [true, true, false, true, false, false]);
+        let twins = [(1.0, 1.0), (1.0, 1.0)];
+        assert_eq!(pareto_front(&twins), [true, true], "neither beats the other");
+        assert!(pareto_front(&[]).is_empty());
+    }
+}

@@ -1,0 +1,204 @@
+use std::{fmt, str::FromStr};
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{MinMax, Quantity, ScalingError, Whitening};
+
+/// How resistances become the inputs of a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputChoice {
+    /// What is taken of each resistance.
+    pub quantity: Quantity,
+    /// How it is scaled.
+    pub scaling: ScalingChoice,
+}
+
+impl InputChoice {
+    /// Resistances between −1 and 1, as in the paper.
+    pub const PAPER: Self = Self {
+        quantity: Quantity::Resistance,
+        scaling: ScalingChoice::MinMax,
+    };
+    /// Whitened conductances.
+    pub const BEST: Self = Self {
+        quantity: Quantity::Conductance,
+        scaling: ScalingChoice::Whitening,
+    };
+}
+
+/// How inputs are scaled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScalingChoice {
+    /// Each channel to [−1, 1]: the paper.
+    #[default]
+    MinMax,
+    /// Principal components to unit spread, less where noise hides them.
+    Whitening,
+}
+
+/// Resistances to inputs, as fitted to a training set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inputs {
+    quantity: Quantity,
+    scaling: InputScaling,
+}
+
+/// A fitted scaling.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum InputScaling {
+    /// Each channel to [−1, 1].
+    MinMax(MinMax),
+    /// Principal components to unit spread.
+    Whitening(Whitening),
+}
+
+/// A word that is none of the scalings.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not a scaling: give minmax or whiten")]
+pub struct ScalingChoiceError(String);
+
+impl fmt::Display for ScalingChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::MinMax => "minmax",
+            Self::Whitening => "whiten",
+        })
+    }
+}
+
+impl FromStr for ScalingChoice {
+    type Err = ScalingChoiceError;
+
+    fn from_str(text: &str) -> Result<Self, ScalingChoiceError> {
+        let found = [Self::MinMax, Self::Whitening]
+            .into_iter()
+            .find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| ScalingChoiceError(text.to_owned()))
+    }
+}
+
+impl From<MinMax> for Inputs {
+    /// Resistances scaled by their range.
+    fn from(scaling: MinMax) -> Self {
+        Self::new(Quantity::Resistance, InputScaling::MinMax(scaling))
+    }
+}
+
+impl Inputs {
+    /// This quantity with this scaling.
+    pub fn new(quantity: Quantity, scaling: InputScaling) -> Self {
+        Self { quantity, scaling }
+    }
+
+    /// Fits to training resistances in ohm (samples × M4). `noise` is the relative error (standard deviation) that the
+    /// training set lacks and later readings have; 0 if it has them already, or there is none.
+    ///
+    /// # Errors
+    /// No samples, values that are not finite, or a range that overflows.
+    pub fn fit(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>, noise: f64) -> Result<Self, ScalingError> {
+        let quantity = choice.quantity;
+        let values = resistances_ohm.mapv(|ohm| quantity.of(ohm));
+        let scaling = match choice.scaling {
+            ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),
+            ScalingChoice::Whitening => {
+                let per_relative = |column: ndarray::ArrayView1<'_, f64>| {
+                    let total: f64 = column.iter().map(|&ohm| quantity.per_relative_error(ohm)).sum();
+                    noise * total / column.len() as f64
+                };
+                let noise: Vec<f64> = resistances_ohm.columns().into_iter().map(per_relative).collect();
+                InputScaling::Whitening(Whitening::fit(values.view(), &noise)?)
+            }
+        };
+        Ok(Self { quantity, scaling })
+    }
+
+    /// What is taken of each resistance.
+    pub fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
+    /// The scaling.
+    pub fn scaling(&self) -> &InputScaling {
+        &self.scaling
+    }
+
+    /// Resistances of a sample: M4.
+    pub fn channels(&self) -> usize {
+        match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.channels(),
+            InputScaling::Whitening(scaling) => scaling.channels(),
+        }
+    }
+
+    /// Inputs of the network.
+    pub fn count(&self) -> usize {
+        match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.varying().len(),
+            InputScaling::Whitening(scaling) => scaling.components(),
+        }
+    }
+
+    /// Inputs (samples × inputs) from resistances in ohm (samples × M4).
+    pub fn of(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
+        let values = resistances_ohm.mapv(|ohm| self.quantity.of(ohm));
+        match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.scale(values.view()),
+            InputScaling::Whitening(scaling) => scaling.scale(values.view()),
+        }
+    }
+
+    /// The affine map behind the scaling: inputs = matrix · (values − centre), the matrix inputs × M4.
+    pub fn affine(&self) -> (Vec<f64>, Array2<f64>) {
+        match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.affine(),
+            InputScaling::Whitening(scaling) => (scaling.mean().to_vec(), scaling.matrix()),
+        }
+    }
+
+    /// Whether the file this came from made sense.
+    pub(crate) fn is_sound(&self) -> bool {
+        match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.is_sound(),
+            // Checked when it is read.
+            InputScaling::Whitening(_) => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn the_affine_map_is_what_the_scaling_does() {
+        let resistances = array![
+            [10.0, 20.0, 5.0],
+            [11.0, 26.0, 5.0],
+            [13.0, 21.0, 5.0],
+            [12.0, 29.0, 5.0]
+        ];
+        for quantity in Quantity::ALL {
+            for scaling in [ScalingChoice::MinMax, ScalingChoice::Whitening] {
+                let choice = InputChoice { quantity, scaling };
+                let inputs = Inputs::fit(choice, resistances.view(), 1e-3).unwrap();
+                assert_eq!((inputs.channels(), inputs.count()), (3, 2));
+                let (centre, matrix) = inputs.affine();
+                let ours = inputs.of(resistances.view());
+                for (sample, ohms) in resistances.rows().into_iter().enumerate() {
+                    for k in 0..2 {
+                        let expected: f64 = (0..3)
+                            .map(|c| matrix[[k, c]] * (quantity.of(ohms[c]) - centre[c]))
+                            .sum();
+                        assert!((ours[[sample, k]] - expected).abs() < 1e-10);
+                    }
+                }
+            }
+        }
+    }
+}

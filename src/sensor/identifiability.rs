@@ -1,0 +1,367 @@
+use std::fmt;
+
+use faer::Mat;
+use glam::DVec3;
+use thiserror::Error;
+
+use super::{Axes, RowConductance, SensorError, SensorModel};
+
+/// What the readings of one row-wire can tell about its nodes, from the singular values of the Jacobian of ln R.
+///
+/// With readings that are off by ε (relative, one standard deviation), a deformation pattern whose singular value is s
+/// is known to ε/s millimetres: the smallest value decides what noise the sensor can bear.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identifiability {
+    /// The row-wire, from 0.
+    pub row: usize,
+    /// Along which axes the nodes move.
+    pub axes: Axes,
+    /// Readings of the row: M4.
+    pub equations: usize,
+    /// Singular values of ∂ ln R/∂u in 1/mm, largest first, one for each unknown (0 where readings are too few).
+    pub singular_values_per_mm: Vec<f64>,
+    /// The pattern of unit length that changes the readings least: one displacement for each node.
+    pub worst_pattern: Vec<DVec3>,
+    /// How much the row's readings change when one node moves: rms over readings of ∂ ln R/∂u, for each axis, in 1/mm.
+    pub sensitivity_per_mm: Vec<DVec3>,
+}
+
+/// Two row-wires whose undeformed readings are most alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowPair {
+    /// One row-wire, from 0.
+    pub first: usize,
+    /// The other.
+    pub second: usize,
+    /// rms over readings of the difference of ln R.
+    pub difference: f64,
+}
+
+/// Why the singular values are not known.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum IdentifiabilityError {
+    /// The model has no resistance for the deformation.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The array has no such row-wire.
+    #[error("row {row} does not exist: the array has {rows} row-wires, numbered from 0")]
+    Row {
+        /// What was asked for.
+        row: usize,
+        /// What there is.
+        rows: usize,
+    },
+    /// The decomposition did not converge.
+    #[error("the singular values of row {0} did not converge: use lengths of similar size in the geometry")]
+    NotConverged(usize),
+}
+
+impl Identifiability {
+    /// The condition number from which [`IdentifiabilityWarning::IllConditioned`] is given: readings exact to 16
+    /// digits then leave fewer than 6 in the worst-seen pattern.
+    pub const LARGEST_CONDITION: f64 = 1e10;
+    /// The share of the prior spread that remains from which noise is called hopeless: readings then tell less than
+    /// a tenth of the variance.
+    pub const HOPELESS_SHARE: f64 = 0.95;
+    /// Rows whose undeformed readings differ less than this count as the same even without noise.
+    pub const SAME_ROWS: f64 = 1e-9;
+
+    /// Looks at row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them) and move along `axes`.
+    ///
+    /// # Errors
+    /// No such row, no resistance for the deformation, or a decomposition that does not converge.
+    pub fn of_row(
+        model: &SensorModel,
+        row: usize,
+        displacements_mm: &[DVec3],
+        axes: Axes,
+    ) -> Result<Self, IdentifiabilityError> {
+        let (rows, equations) = (model.scale.rows(), model.scale.columns());
+        if row >= rows {
+            return Err(IdentifiabilityError::Row { row, rows });
+        }
+        model.row_resistances(row, displacements_mm)?;
+        let mut conductance = RowConductance::new(model, axes);
+        conductance.evaluate(model, row, displacements_mm);
+        let unknowns = displacements_mm.len() * axes.count();
+        // ln R = ln g − ln s, so the signs turn; rows of zeros complete the basis where readings are too few.
+        let jacobian = Mat::from_fn(equations.max(unknowns), unknowns, |k, unknown| {
+            if k < equations {
+                -conductance.derivatives(unknown)[k] / conductance.sums()[k]
+            } else {
+                0.0
+            }
+        });
+        let svd = jacobian
+            .thin_svd()
+            .map_err(|_| IdentifiabilityError::NotConverged(row))?;
+        let worst = svd.V().col(unknowns - 1);
+        let nodes = 0..displacements_mm.len();
+        let by_axis = |value: &dyn Fn(usize) -> f64, node: usize| {
+            let mut vector = [0.0; 3];
+            for (place, &axis) in axes.indices().iter().enumerate() {
+                vector[axis] = value(node * axes.count() + place);
+            }
+            DVec3::from_array(vector)
+        };
+        let rms = |unknown: usize| jacobian.col(unknown).norm_l2() / (equations as f64).sqrt();
+        // Which way a pattern points means nothing; downwards is what presses.
+        let sign = if worst.sum() < 0.0 { -1.0 } else { 1.0 };
+        Ok(Self {
+            row,
+            axes,
+            equations,
+            singular_values_per_mm: svd.S().column_vector().iter().copied().collect(),
+            worst_pattern: nodes.clone().map(|node| by_axis(&|u| sign * worst[u], node)).collect(),
+            sensitivity_per_mm: nodes.map(|node| by_axis(&rms, node)).collect(),
+        })
+    }
+
+    /// Unknowns of the row.
+    pub fn unknowns(&self) -> usize {
+        self.singular_values_per_mm.len()
+    }
+
+    /// Largest singular value over the smallest; infinite where some pattern is not seen at all.
+    pub fn condition(&self) -> f64 {
+        match self.singular_values_per_mm[..] {
+            [largest, .., smallest] if smallest > 0.0 => largest / smallest,
+            [only] if only > 0.0 => 1.0,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// How far, in millimetres, the worst-seen pattern can be off when readings are off by `noise` (relative).
+    pub fn worst_spread_mm(&self, noise: f64) -> f64 {
+        noise / self.singular_values_per_mm.last().copied().unwrap_or(0.0)
+    }
+
+    /// What remains of a prior spread of `prior_mm` (standard deviation of each unknown) after a reading with `noise`
+    /// (relative), as a share of it: the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 tells that all is
+    /// known, 1 that the reading told nothing.
+    pub fn remaining_share(&self, noise: f64, prior_mm: f64) -> f64 {
+        let remaining = |&s: &f64| {
+            let seen = s * prior_mm / noise;
+            if seen.is_finite() {
+                1.0 / (1.0 + seen * seen)
+            } else {
+                0.0
+            }
+        };
+        (self.singular_values_per_mm.iter().map(remaining).sum::<f64>() / self.unknowns() as f64).sqrt()
+    }
+
+    /// The two row-wires whose undeformed readings are most alike; `None` for a single row-wire.
+    ///
+    /// A layout that is symmetric about a line between row-wires gives mirror rows the same readings: no decoder can
+    /// tell which one it reads unless the electronics say so.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance.
+    pub fn most_alike_rows(model: &SensorModel) -> Result<Option<RowPair>, SensorError> {
+        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+        let readings: Vec<Vec<f64>> = (0..model.scale.rows())
+            .map(|row| model.row_resistances(row, &rest))
+            .collect::<Result<_, _>>()?;
+        let mut closest: Option<RowPair> = None;
+        for (second, of_second) in readings.iter().enumerate() {
+            for (first, of_first) in readings[..second].iter().enumerate() {
+                let squares = of_first.iter().zip(of_second).map(|(a, b)| (a / b).ln().powi(2));
+                let difference = (squares.sum::<f64>() / of_first.len() as f64).sqrt();
+                if closest.is_none_or(|pair| difference < pair.difference) {
+                    closest = Some(RowPair {
+                        first,
+                        second,
+                        difference,
+                    });
+                }
+            }
+        }
+        Ok(closest)
+    }
+
+    /// What a user should know, worst first. `noise` is the relative error of a reading, `prior_mm` the standard
+    /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
+    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
+        let condition = self.condition();
+        let share = self.remaining_share(noise, prior_mm);
+        let alike = alike.filter(|pair| pair.difference <= noise.max(Self::SAME_ROWS));
+        let warnings = [
+            (self.equations < self.unknowns()).then_some(IdentifiabilityWarning::TooFewReadings {
+                equations: self.equations,
+                unknowns: self.unknowns(),
+            }),
+            alike.map(|pair| IdentifiabilityWarning::RowsAlike { pair, noise }),
+            (share >= Self::HOPELESS_SHARE).then_some(IdentifiabilityWarning::Hopeless { noise, share }),
+            (condition >= Self::LARGEST_CONDITION).then_some(IdentifiabilityWarning::IllConditioned { condition }),
+        ];
+        warnings.into_iter().flatten().collect()
+    }
+}
+
+/// What stands in the way of decoupling, and what to change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum IdentifiabilityWarning {
+    /// Fewer readings than unknowns.
+    TooFewReadings {
+        /// Readings of a row.
+        equations: usize,
+        /// Unknowns of a row.
+        unknowns: usize,
+    },
+    /// Two rows read the same.
+    RowsAlike {
+        /// Which.
+        pair: RowPair,
+        /// Relative error of a reading.
+        noise: f64,
+    },
+    /// Noise hides the deformation.
+    Hopeless {
+        /// Relative error of a reading.
+        noise: f64,
+        /// What remains of the prior spread.
+        share: f64,
+    },
+    /// Some pattern is hardly seen.
+    IllConditioned {
+        /// Largest singular value over the smallest.
+        condition: f64,
+    },
+}
+
+impl fmt::Display for IdentifiabilityWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::TooFewReadings { equations, unknowns } => write!(
+                f,
+                "a row has {unknowns} unknowns but only {equations} readings: some deformations cannot be seen; use at \
+                 least {unknowns} column-wires, or let nodes move along z only"
+            ),
+            Self::RowsAlike { pair, noise } => {
+                let (first, second) = (pair.first + 1, pair.second + 1);
+                write!(
+                    f,
+                    "row-wires {first} and {second} cannot be told apart: at rest their readings differ by {:.1e}, the \
+                     noise is {noise:.1e}; shift the column nodes so that no row mirrors another, or use a known row",
+                    pair.difference
+                )
+            }
+            Self::Hopeless { noise, share } => write!(
+                f,
+                "with noise of {noise:.1e} the readings hardly narrow the deformation ({:.0} % of its spread remains); \
+                 lower the noise, reduce the height, widen the node pitch, or add column-wires",
+                100.0 * share
+            ),
+            Self::IllConditioned { condition } => write!(
+                f,
+                "some deformation is seen {condition:.0e} times worse than another: even rounding blurs it; reduce the \
+                 height, widen the node pitch, add column-wires, or let nodes move along z only"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::ArrayScale;
+
+    fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
+        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+        Identifiability::of_row(model, row, &rest, axes).unwrap()
+    }
+
+    /// One node over one column node: R = g·d, so ∂ ln R/∂uz = −z/d².
+    #[test]
+    fn a_single_pair_is_known_in_closed_form() {
+        let mut model = SensorModel::new("1x1_1x1".parse().unwrap());
+        model.geometry.column_node_x0_mm = model.geometry.row_x0_mm + 12.0;
+        let seen = at_rest(&model, 0, Axes::Z);
+        assert!((seen.singular_values_per_mm[0] - 5.0 / 169.0).abs() < 1e-15);
+        assert_eq!(seen.condition(), 1.0);
+        assert!((seen.worst_pattern[0].z - 1.0).abs() < 1e-15);
+        assert!((seen.sensitivity_per_mm[0].z - 5.0 / 169.0).abs() < 1e-15);
+        assert!((seen.worst_spread_mm(1e-3) - 1e-3 * 169.0 / 5.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn moving_along_the_worst_pattern_changes_readings_least() {
+        let model = SensorModel::new(ArrayScale::default());
+        let seen = at_rest(&model, 4, Axes::Z);
+        let rest = model.row_resistances(4, &[DVec3::ZERO; 10]).unwrap();
+        let step_mm = 1e-3;
+        let change = |pattern: &[DVec3]| {
+            let moved: Vec<DVec3> = pattern.iter().map(|&p| step_mm * p).collect();
+            let moved = model.row_resistances(4, &moved).unwrap();
+            let squares = moved.iter().zip(&rest).map(|(a, b)| (a / b).ln().powi(2));
+            squares.sum::<f64>().sqrt() / step_mm
+        };
+        let smallest = seen.singular_values_per_mm[9];
+        assert!((change(&seen.worst_pattern) / smallest - 1.0).abs() < 0.05);
+        for node in 0..10 {
+            let mut single = [DVec3::ZERO; 10];
+            single[node] = DVec3::Z;
+            assert!(change(&single) > smallest);
+        }
+    }
+
+    #[test]
+    fn mirror_rows_are_found_and_named() {
+        let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let default = Identifiability::most_alike_rows(&model).unwrap().unwrap();
+        assert!(default.difference > 1e-3, "{default:?}");
+        // Column nodes at 7.5, 12.5, 17.5 are symmetric about x = 12.5, the middle of rows 8 to 17.
+        model.geometry.column_node_x0_mm = 7.5;
+        let pair = Identifiability::most_alike_rows(&model).unwrap().unwrap();
+        assert!(pair.difference < 1e-14, "{pair:?}");
+        assert_eq!(pair.first + pair.second, 9);
+        let warnings = at_rest(&model, 0, Axes::Z).warnings(0.0, 0.3, Some(pair));
+        let words = warnings[0].to_string();
+        assert!(
+            words.contains("cannot be told apart") && words.contains("shift"),
+            "{words}"
+        );
+        assert_eq!(
+            Identifiability::most_alike_rows(&SensorModel::new("1x6_3x18".parse().unwrap())),
+            Ok(None)
+        );
+    }
+
+    #[test]
+    fn too_few_readings_leave_a_pattern_unseen() {
+        let model = SensorModel::new("2x6_3x4".parse().unwrap());
+        let seen = at_rest(&model, 1, Axes::Z);
+        assert_eq!(seen.condition(), f64::INFINITY);
+        assert_eq!(seen.unknowns(), 6);
+        let length = seen.worst_pattern.iter().map(|p| p.length_squared()).sum::<f64>();
+        assert!((length - 1.0).abs() < 1e-12);
+        let warnings = seen.warnings(0.0, 0.3, None);
+        assert!(matches!(
+            warnings[0],
+            IdentifiabilityWarning::TooFewReadings {
+                equations: 4,
+                unknowns: 6
+            }
+        ));
+    }
+
+    #[test]
+    fn noise_is_hopeless_only_when_it_hides_nearly_everything() {
+        let seen = at_rest(&SensorModel::new(ArrayScale::default()), 0, Axes::Z);
+        assert_eq!(seen.remaining_share(0.0, 0.3), 0.0);
+        assert!(seen.warnings(1e-4, 0.3, None).is_empty());
+        assert!((seen.remaining_share(1e3, 0.3) - 1.0).abs() < 1e-6);
+        let words = seen.warnings(1.0, 0.3, None)[0].to_string();
+        assert!(words.contains("100 %") || words.contains("99 %"), "{words}");
+    }
+
+    #[test]
+    fn sideways_unknowns_are_worse_conditioned() {
+        let model = SensorModel::new(ArrayScale::default());
+        let (z, xyz) = (at_rest(&model, 3, Axes::Z), at_rest(&model, 3, Axes::Xyz));
+        assert_eq!((z.unknowns(), xyz.unknowns()), (10, 30));
+        assert!(xyz.condition() > z.condition());
+        assert!(z.worst_pattern.iter().all(|p| p.x == 0.0 && p.y == 0.0));
+    }
+}

@@ -1,0 +1,183 @@
+//! Scenes, inputs and decoders in the terminal.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+fn decoupler(arguments: &str, folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
+    command.args(arguments.split_whitespace()).current_dir(folder);
+    command.output().unwrap()
+}
+
+fn success(arguments: &str, folder: &Path) -> String {
+    let output = decoupler(arguments, folder);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn failure(arguments: &str, folder: &Path, status: i32) -> String {
+    let output = decoupler(arguments, folder);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(status), "{arguments}: {text}");
+    assert!(
+        text.starts_with("error: ") && text.lines().count() == 1,
+        "{arguments}: {text}"
+    );
+    text
+}
+
+const SMALL: &str = "--array 3x4_2x12 --hidden 4 --epochs 20 --samples 300 --validation-samples 30 --test-samples 30";
+
+#[test]
+fn training_reports_decoders_reference_and_size_of_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = |arguments: &str| -> Value {
+        serde_json::from_str(&success(&format!("train {SMALL} --json {arguments}"), folder.path())).unwrap()
+    };
+    let known = report("--preset best --noise 1e-3");
+    for name in ["mean", "ridge", "network", "network_f32", "rbf", "newton", "polish"] {
+        for figure in ["z_percent", "z_mm", "frame_us"] {
+            let value = known["decoders"][name][figure].as_f64();
+            assert!(value.is_some_and(|value| value > 0.0), "{name} {figure}: {value:?}");
+        }
+    }
+    assert!(known["reference"]["z_percent"].as_f64().unwrap() > 0.0);
+    assert_eq!((&known["unknowns"], &known["equations"]), (&12.into(), &36.into()));
+    assert_eq!(known["networks"], 3);
+    assert_eq!(known["published"], Value::Null);
+    let sideways = report("--preset best --rows 2 --axes xyz --loading smooth:4 --decoder newton,mean");
+    assert_eq!(
+        (&sideways["unknowns"], &sideways["equations"]),
+        (&12.into(), &12.into())
+    );
+    let names: Vec<_> = sideways["decoders"].as_object().unwrap().keys().collect();
+    assert_eq!(names, ["mean", "newton"]);
+    let log = report("--inputs log --scaling whiten --loading indenter");
+    assert_eq!(
+        (&log["networks"], &log["inputs"]["scaling"]),
+        (&1.into(), &"whitening".into())
+    );
+    assert_eq!(log["reference"]["z_mm"], 0.0);
+}
+
+#[test]
+fn what_was_simulated_is_decoded_row_by_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    success(
+        &format!("train {SMALL} --preset best --out net.json --decoder mean"),
+        path,
+    );
+    success(
+        "simulate --array 3x4_2x12 --preset best --samples 30 --decoder newton --out all.csv",
+        path,
+    );
+    let lines = |name: &str| -> Vec<Vec<String>> {
+        let text = fs::read_to_string(path.join(name)).unwrap();
+        text.lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect()
+    };
+    let all = lines("all.csv");
+    assert_eq!(all[0][2 + 12 + 12], "decoded_x_1");
+    for line in &all[1..] {
+        let number = |place: usize| line[place].parse::<f64>().unwrap();
+        for coordinate in 14..26 {
+            assert!((number(coordinate) - number(coordinate + 12)).abs() < 1e-9);
+        }
+    }
+    success("decode --network net.json --input all.csv --output in_order.csv", path);
+    // The same readings without the column of row-wires, and in another order with it.
+    let without: Vec<String> = all.iter().map(|line| line[2..14].join(",")).collect();
+    fs::write(path.join("without.csv"), without.join("\n")).unwrap();
+    success(
+        "decode --network net.json --input without.csv --output without_out.csv",
+        path,
+    );
+    assert_eq!(lines("without_out.csv"), lines("in_order.csv"));
+    let mut turned: Vec<String> = all.iter().map(|line| line.join(",")).collect();
+    turned[1..].reverse();
+    fs::write(path.join("turned.csv"), turned.join("\n")).unwrap();
+    success(
+        "decode --network net.json --input turned.csv --output turned_out.csv",
+        path,
+    );
+    let mut expected = lines("in_order.csv");
+    expected[1..].reverse();
+    assert_eq!(lines("turned_out.csv"), expected);
+    fs::write(path.join("part.csv"), without[..6].join("\n")).unwrap();
+    let message = failure("decode --network net.json --input part.csv --output x.csv", path, 1);
+    assert!(message.contains("no whole snapshots of 3 rows"), "{message}");
+    success(
+        "simulate --array 3x4_2x12 --rows 2 --samples 4 --noise 1e-3 --out row.csv",
+        path,
+    );
+    let row = lines("row.csv");
+    assert_eq!(row.len(), 5);
+    assert!(row[1..].iter().all(|line| line[1] == "2" && line[14] == "9.0"));
+}
+
+#[test]
+fn a_trade_is_told_in_text_and_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "trade --array 2x3_2x9 --hidden 2,3 --epochs 5 --samples 60 --test-samples 20 --noise 0,1e-2 \
+                     --under-percent 1e-6 --under-us 1e9";
+    let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
+    let levels = report["levels"].as_array().unwrap();
+    assert_eq!(levels.len(), 2);
+    for level in levels {
+        // Two presets, each with four decoders without a network and twice network, its single precision, and polish.
+        let points = level["points"].as_array().unwrap();
+        assert_eq!(points.len(), 2 * (4 + 2 * 3));
+        assert!(points.iter().any(|point| point["on_decoding_front"] == true));
+        assert!(
+            level["most_accurate_under"]["command"]
+                .as_str()
+                .unwrap()
+                .contains("--preset")
+        );
+    }
+    assert!(levels[0]["fastest_under"]["point"].is_u64());
+    assert_eq!(levels[1]["fastest_under"]["point"], Value::Null, "noise forbids it");
+    let text = success(
+        &format!("{arguments} --preset best --decoder newton,network"),
+        folder.path(),
+    );
+    assert!(
+        text.contains("Fastest under") && text.contains("network_f32") && !text.contains("paper  "),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases = [
+        ("train --preset worst", "paper or best"),
+        ("train --rows some", "all, known"),
+        ("train --axes xy", "z or xyz"),
+        ("train --loading smooth", "smooth:MM"),
+        ("train --inputs volts", "resistance, conductance or log"),
+        ("train --scaling none", "minmax or whiten"),
+        ("train --noise -1", "from 0"),
+        ("train --noise 2", "from 0 to 1"),
+        ("train --noise 0,1", "one number"),
+        ("train --decoder knn", "rbf, newton or polish"),
+        ("simulate --decoder mean,ridge", "one here"),
+        ("trade --hidden 0", "from 1"),
+    ];
+    for (arguments, expected) in cases {
+        let message = failure(arguments, folder.path(), 2);
+        assert!(message.contains(expected), "{arguments}: {message}");
+    }
+    let message = failure("train --rows 11", folder.path(), 1);
+    assert!(message.contains("rows 1 to 10"), "{message}");
+}
