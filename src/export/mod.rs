@@ -21,7 +21,6 @@ mod workspace_file;
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
 pub use experiment_figure::draw_experiment;
-pub(crate) use experiment_figure::repeat_name;
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
 pub use experiment_words::{describe_conditions, describe_failures};
 pub use format::{format_duration, format_number, format_percent};
