@@ -194,7 +194,7 @@ fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
     driver.click("▶ Train");
     driver.press_with(Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-    assert_eq!(driver.table().len(), 15);
+    assert_eq!(driver.table().len(), 20);
     assert!(driver.has("Decoupled surface"));
     driver.settle();
 }
