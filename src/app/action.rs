@@ -4,6 +4,7 @@ use super::{
     experiments::ExperimentAction,
     export_kind::ExportKind,
     file_task::FileTask,
+    identifiability::IdentifiabilityAction,
     paper_figure::PaperFigure,
     runs::RunsAction,
     shown_figure::ShownPicture,
@@ -48,6 +49,8 @@ pub enum Action {
     ShowView(View),
     /// Do this in the Experiments view.
     Experiments(ExperimentAction),
+    /// Do this in the Identifiability view.
+    Identifiability(IdentifiabilityAction),
     /// Whether each decoupled node has an error bar.
     ShowErrorBars(bool),
     /// Train what this figure of the paper shows, unless it is there, and look at it so.

@@ -11,6 +11,7 @@ mod dialogs;
 mod experiments;
 mod export_kind;
 mod file_task;
+mod identifiability;
 mod open;
 mod panels;
 mod paper_figure;
@@ -34,6 +35,7 @@ pub use experiments::{
 };
 pub use export_kind::ExportKind;
 pub use file_task::FileTask;
+pub use identifiability::{Analysis, AnalysisError, IdentifiabilityAction, IdentifiabilityState, Question};
 pub use open::{OpenError, open};
 pub use paper_figure::PaperFigure;
 pub use runs::{Compared, PLACES, RunsAction, RunsState};

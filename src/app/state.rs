@@ -6,6 +6,7 @@ use super::{
     experiments::ExperimentsState,
     export_kind::{ExportKind, file_name},
     file_task::FileTask,
+    identifiability::IdentifiabilityState,
     runs::RunsState,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
@@ -25,6 +26,8 @@ pub struct State {
     pub experiments: ExperimentsState,
     /// The run list and the Compare view.
     pub runs: RunsState,
+    /// The Identifiability view.
+    pub identifiability: IdentifiabilityState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -55,6 +58,8 @@ pub enum View {
     Experiments,
     /// Two finished trainings side by side.
     Compare,
+    /// What readings can tell at all.
+    Identifiability,
 }
 
 /// What the worker is doing.
@@ -288,6 +293,7 @@ impl State {
             view: View::default(),
             experiments: ExperimentsState::new(),
             runs: RunsState::default(),
+            identifiability: IdentifiabilityState::new(&RunSettings::default()),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,

@@ -6,6 +6,7 @@ use super::{
     action::Action,
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
+    identifiability::{self, IdentifiabilityAction, IdentifiabilityWorker},
     panels,
     paper_figure::PaperFigure,
     runs::{self, RunsAction, RunsRequest, RunsWorker},
@@ -23,6 +24,7 @@ pub struct DecouplerWindow {
     worker: Worker,
     experiments: ExperimentWorker,
     runs: RunsWorker,
+    identifiability: IdentifiabilityWorker,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -45,6 +47,10 @@ impl DecouplerWindow {
             runs: {
                 let ctx = ctx.clone();
                 RunsWorker::start(move || ctx.request_repaint())?
+            },
+            identifiability: {
+                let ctx = ctx.clone();
+                IdentifiabilityWorker::new(move || ctx.request_repaint())
             },
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
@@ -84,6 +90,7 @@ impl DecouplerWindow {
         }
         experiments::take_news(&mut self.state, &self.experiments);
         runs::take_news(&mut self.state, &self.runs);
+        identifiability::take_news(&mut self.state, &mut self.identifiability);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -260,7 +267,18 @@ impl DecouplerWindow {
                 state.typed = state.saving.take();
                 self.worker.ask(Request::Export(kind, path));
             }
-            Action::ShowView(view) => state.view = view,
+            Action::ShowView(view) => {
+                state.view = view;
+                if view == View::Identifiability {
+                    identifiability::enter(state, &mut self.identifiability);
+                }
+            }
+            Action::Identifiability(IdentifiabilityAction::UseSensor) => {
+                let settings = state.identifiability.hand_over(&state.draft);
+                state.view = View::Train;
+                self.configure(settings);
+            }
+            Action::Identifiability(action) => identifiability::apply(action, state, &mut self.identifiability),
             Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
             Action::ExportPicture(picture, path) => {
                 state.typed = state.saving.take();
@@ -353,7 +371,7 @@ impl DecouplerWindow {
         let mut actions = match state.view {
             View::Train => pressed_shortcuts(ui.ctx(), state),
             View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
-            View::Compare => Vec::new(),
+            View::Compare | View::Identifiability => Vec::new(),
         };
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
@@ -382,6 +400,7 @@ impl DecouplerWindow {
                 match state.view {
                     View::Train | View::Compare => panels::status_line_ui(ui, state),
                     View::Experiments => experiments::status_ui(ui, &state.experiments),
+                    View::Identifiability => identifiability::status_ui(ui, &state.identifiability),
                 };
             });
         Panel::left("configuration")
@@ -393,6 +412,7 @@ impl DecouplerWindow {
                     View::Train => panels::configuration_ui(ui, state),
                     View::Experiments => experiments::form_ui(ui, state),
                     View::Compare => runs::run_list_ui(ui, state),
+                    View::Identifiability => identifiability::form_ui(ui, state),
                 });
             });
         if has_report_beside && is_training_view {
@@ -409,6 +429,7 @@ impl DecouplerWindow {
                 View::Train => panels::workbench_ui(ui, state, layout),
                 View::Experiments => experiments::experiments_ui(ui, state),
                 View::Compare => runs::compare_ui(ui, state),
+                View::Identifiability => identifiability::identifiability_ui(ui, state),
             });
         });
         actions.extend(panels::save_form_ui(ui, state));

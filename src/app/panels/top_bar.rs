@@ -21,6 +21,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             (View::Train, "Train"),
             (View::Experiments, "Experiments"),
             (View::Compare, "Compare"),
+            (View::Identifiability, "Identifiability"),
         ];
         if let Some(view) = segmented_ui(ui, "View", &views, state.view, false) {
             actions.push(Action::ShowView(view));
@@ -35,7 +36,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                     let snapshots = state.test().map_or(0, |test| test.set.snapshots());
                     actions.extend(snapshot_ui(ui, state.look.snapshot, snapshots).map(Action::ShowSnapshot));
                 }
-                View::Experiments => {}
+                View::Experiments | View::Identifiability => {}
                 View::Compare => {
                     let picked = snapshot_ui(ui, state.runs.snapshot, state.runs.snapshots());
                     actions.extend(picked.map(|snapshot| RunsAction::ShowSnapshot(snapshot).into()));
