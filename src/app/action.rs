@@ -10,6 +10,7 @@ use super::{
     shown_figure::ShownPicture,
     state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
+    trade::TradeAction,
 };
 use crate::{
     evaluation::{NodeAddress, RunSettings},
@@ -51,6 +52,8 @@ pub enum Action {
     Experiments(ExperimentAction),
     /// Do this in the Identifiability view.
     Identifiability(IdentifiabilityAction),
+    /// Do this in the Trade-off view.
+    Trade(TradeAction),
     /// Whether each decoupled node has an error bar.
     ShowErrorBars(bool),
     /// Train what this figure of the paper shows, unless it is there, and look at it so.

@@ -22,6 +22,7 @@ mod state;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
+mod trade;
 mod window;
 mod worker;
 
@@ -42,4 +43,8 @@ pub use runs::{Compared, PLACES, RunsAction, RunsState};
 pub use shown_figure::ShownPicture;
 pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
 pub use test_view::{Frame, TestView};
+pub use trade::{
+    Thoroughness, TradeAction, TradeEnding, TradeFile, TradeForm, TradeFormError, TradeLimits, TradeOutcome, TradePlan,
+    TradeRunning, TradeState, WhichPresets,
+};
 pub use window::DecouplerWindow;

@@ -10,6 +10,7 @@ use super::{
     runs::RunsState,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
+    trade::TradeState,
     worker::{Began, Progress},
 };
 use crate::{
@@ -28,6 +29,8 @@ pub struct State {
     pub runs: RunsState,
     /// The Identifiability view.
     pub identifiability: IdentifiabilityState,
+    /// The Trade-off view.
+    pub trade: TradeState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -60,6 +63,8 @@ pub enum View {
     Compare,
     /// What readings can tell at all.
     Identifiability,
+    /// What each way of decoding costs and gains.
+    TradeOff,
 }
 
 /// What the worker is doing.
@@ -294,6 +299,7 @@ impl State {
             experiments: ExperimentsState::new(),
             runs: RunsState::default(),
             identifiability: IdentifiabilityState::new(&RunSettings::default()),
+            trade: TradeState::default(),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,
@@ -387,6 +393,7 @@ impl State {
         let name = match task {
             FileTask::Save(kind) => kind.file_name(settings),
             FileTask::SaveExperiment(topic, file) => ExperimentsState::file_name(topic, file),
+            FileTask::SaveTrade(file) => file.file_name(),
             FileTask::SavePicture(picture) => file_name(picture.file_word(self), task.extension(), settings),
             FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
         };

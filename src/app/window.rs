@@ -13,6 +13,7 @@ use super::{
     shortcuts::pressed_shortcuts,
     state::{Notice, Phase, Preview, RightCard, RunView, Saving, State, View},
     theme::{self, Theme, space},
+    trade::{self, TradeWorker},
     worker::{Event, Request, Worker},
 };
 use crate::{evaluation::RunSettings, training::StopReason};
@@ -25,6 +26,7 @@ pub struct DecouplerWindow {
     experiments: ExperimentWorker,
     runs: RunsWorker,
     identifiability: IdentifiabilityWorker,
+    trade: TradeWorker,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -51,6 +53,10 @@ impl DecouplerWindow {
             identifiability: {
                 let ctx = ctx.clone();
                 IdentifiabilityWorker::new(move || ctx.request_repaint())
+            },
+            trade: {
+                let ctx = ctx.clone();
+                TradeWorker::new(move || ctx.request_repaint())
             },
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
@@ -91,6 +97,7 @@ impl DecouplerWindow {
         experiments::take_news(&mut self.state, &self.experiments);
         runs::take_news(&mut self.state, &self.runs);
         identifiability::take_news(&mut self.state, &mut self.identifiability);
+        trade::take_news(&mut self.state, &self.trade);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -293,6 +300,12 @@ impl DecouplerWindow {
                 }
             }
             Action::Runs(action) => runs::apply(action, state, &self.runs),
+            Action::Trade(action) => {
+                if let Some(settings) = trade::apply(action, state, &mut self.trade) {
+                    state.view = View::Train;
+                    self.configure(settings);
+                }
+            }
             Action::OpenCheckpoint(path) => {
                 state.typed = state.saving.take();
                 // A training may have begun while the desktop's dialog was open.
@@ -371,6 +384,7 @@ impl DecouplerWindow {
         let mut actions = match state.view {
             View::Train => pressed_shortcuts(ui.ctx(), state),
             View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
+            View::TradeOff => trade::pressed_shortcuts(ui.ctx(), state),
             View::Compare | View::Identifiability => Vec::new(),
         };
         let palette = Theme::of(ui).palette;
@@ -401,6 +415,7 @@ impl DecouplerWindow {
                     View::Train | View::Compare => panels::status_line_ui(ui, state),
                     View::Experiments => experiments::status_ui(ui, &state.experiments),
                     View::Identifiability => identifiability::status_ui(ui, &state.identifiability),
+                    View::TradeOff => trade::status_ui(ui, &state.trade),
                 };
             });
         Panel::left("configuration")
@@ -413,6 +428,7 @@ impl DecouplerWindow {
                     View::Experiments => experiments::form_ui(ui, state),
                     View::Compare => runs::run_list_ui(ui, state),
                     View::Identifiability => identifiability::form_ui(ui, state),
+                    View::TradeOff => trade::form_ui(ui, state),
                 });
             });
         if has_report_beside && is_training_view {
@@ -430,6 +446,7 @@ impl DecouplerWindow {
                 View::Experiments => experiments::experiments_ui(ui, state),
                 View::Compare => runs::compare_ui(ui, state),
                 View::Identifiability => identifiability::identifiability_ui(ui, state),
+                View::TradeOff => trade::trade_ui(ui, state),
             });
         });
         actions.extend(panels::save_form_ui(ui, state));

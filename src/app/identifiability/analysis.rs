@@ -105,7 +105,9 @@ impl Analysis {
         let worst = (0..rows.len()).min_by(|&a, &b| smallest(&rows[a]).total_cmp(&smallest(&rows[b])));
         let worst = worst.unwrap_or(0);
         let is_paired = !scene.rows.are_known();
-        let alike = is_paired.then(|| Identifiability::most_alike_rows(sensor)).transpose()?;
+        let alike = is_paired
+            .then(|| Identifiability::most_alike_rows(sensor))
+            .transpose()?;
         let noise = relative_noise(sensor, scene.noise, &rows[worst], &displacements_mm)?;
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         let surface = match last {
@@ -226,12 +228,19 @@ mod tests {
             let pressed = vec![DVec3::Z * 0.5; 10];
             let alone = Identifiability::of_row(&question.sensor, row, &pressed, found.rows[row].axes).unwrap();
             assert_eq!(alone.singular_values_per_mm, found.rows[row].singular_values_per_mm);
-            let (least, worst) = (alone.singular_values_per_mm[9], found.worst_row().singular_values_per_mm[9]);
+            let (least, worst) = (
+                alone.singular_values_per_mm[9],
+                found.worst_row().singular_values_per_mm[9],
+            );
             assert!(worst <= least);
             let shown = &found.sensitivities[0].nodes_mm[10 * row..10 * row + 10];
             assert!(shown.iter().zip(&alone.sensitivity_per_mm).all(|(a, b)| a.z == b.z));
         }
-        let largest = found.patterns[0].nodes_mm.iter().map(|node| node.z.abs()).fold(0.0, f64::max);
+        let largest = found.patterns[0]
+            .nodes_mm
+            .iter()
+            .map(|node| node.z.abs())
+            .fold(0.0, f64::max);
         assert!((largest - 1.0).abs() < 1e-12);
         assert_eq!(found.noise, 0.0);
         assert_eq!(found.patterns_seen(), 10);
@@ -242,7 +251,9 @@ mod tests {
         let found = analysis(&Question::of(&RunSettings::default()));
         let nodes = &found.patterns[0].nodes_mm;
         for row in 1..10 {
-            let along: f64 = (0..10).map(|node| nodes[10 * row + node].z * nodes[10 * row - 10 + node].z).sum();
+            let along: f64 = (0..10)
+                .map(|node| nodes[10 * row + node].z * nodes[10 * row - 10 + node].z)
+                .sum();
             assert!(along >= 0.0, "row {row}");
         }
     }
@@ -271,7 +282,9 @@ mod tests {
         question.sensor.geometry.column_node_x0_mm = 7.5;
         let is_alike = |found: &Analysis| {
             let warnings = found.warnings.iter();
-            warnings.clone().any(|warning| matches!(warning, IdentifiabilityWarning::RowsAlike { .. }))
+            warnings
+                .clone()
+                .any(|warning| matches!(warning, IdentifiabilityWarning::RowsAlike { .. }))
         };
         assert!(is_alike(&analysis(&question)));
         question.scene.rows = Rows::Known;
@@ -286,7 +299,9 @@ mod tests {
         assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));
         assert!(Analysis::new(&question, Some(&found), || true).unwrap().is_none());
         question.sensor.geometry.height_mm = -1.0;
-        let message = Analysis::new(&question, Some(&found), || false).unwrap_err().to_string();
+        let message = Analysis::new(&question, Some(&found), || false)
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("height"), "{message}");
     }
 }

@@ -45,21 +45,12 @@ fn summary(analysis: &Analysis) -> String {
 
 fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
     let worst = analysis.worst_row();
-    let has_noise = analysis.noise > 0.0;
-    let noisy = |text: String| if has_noise { text } else { "no noise".to_owned() };
     let condition = worst.condition();
     let condition = if condition.is_finite() {
         format_number(condition)
     } else {
         "infinite".to_owned()
     };
-    let spread_mm = worst.worst_spread_mm(analysis.noise);
-    let spread = if spread_mm.is_finite() {
-        format!("{} mm", format_number(spread_mm))
-    } else {
-        "not at all".to_owned()
-    };
-    let share = 100.0 * worst.remaining_share(analysis.noise, analysis.prior_mm);
     let alike = analysis.alike.map_or_else(
         || "the row is known".to_owned(),
         |pair| {
@@ -71,7 +62,7 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
             )
         },
     );
-    vec![
+    let mut facts = vec![
         (
             "Unknowns of a row",
             "Coordinates to be found from the readings of one row-wire.",
@@ -94,33 +85,47 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
             (worst.row + 1).to_string(),
         ),
         (
+            "Rows most alike",
+            "The two row-wires with the most similar readings at rest, and by how much they differ (relative).",
+            alike,
+        ),
+    ];
+    if analysis.noise > 0.0 {
+        facts.extend(noise_facts(analysis));
+    }
+    facts
+}
+
+fn noise_facts(analysis: &Analysis) -> [(&'static str, &'static str, String); 4] {
+    let worst = analysis.worst_row();
+    let spread_mm = worst.worst_spread_mm(analysis.noise);
+    let spread = if spread_mm.is_finite() {
+        format!("{} mm", format_number(spread_mm))
+    } else {
+        "not at all".to_owned()
+    };
+    let share = 100.0 * worst.remaining_share(analysis.noise, analysis.prior_mm);
+    let prior = format_number(analysis.prior_mm);
+    [
+        (
             "Noise of a reading",
             "Relative, one standard deviation, from all sources of the scene.",
-            noisy(format_number(analysis.noise)),
+            format_number(analysis.noise),
         ),
         (
             "Patterns out of the noise",
             "Patterns of the worst row that readings narrow more than the scene alone does.",
-            noisy(format!("{} of {}", analysis.patterns_seen(), worst.unknowns())),
+            format!("{} of {}", analysis.patterns_seen(), worst.unknowns()),
         ),
         (
             "Worst pattern known to",
             "From readings alone, one standard deviation.",
-            noisy(spread),
+            spread,
         ),
         (
             "Spread that remains",
             "Of the deformation's spread before reading, what a reading leaves (root mean square over patterns).",
-            noisy(format!(
-                "{} % of {} mm",
-                format_number(share),
-                format_number(analysis.prior_mm)
-            )),
-        ),
-        (
-            "Rows most alike",
-            "The two row-wires with the most similar readings at rest, and by how much they differ (relative).",
-            alike,
+            format!("{} % of {prior} mm", format_number(share)),
         ),
     ]
 }

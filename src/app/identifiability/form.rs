@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Button, RichText, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeric, vec2};
+use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeric};
 
 use super::{IdentifiabilityAction, Question};
 use crate::{
@@ -8,9 +8,7 @@ use crate::{
         Action,
         panels::fields::{count_ui, quantity_ui},
         state::State,
-        theme::{
-            Theme, primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style, space, type_size,
-        },
+        theme::{Theme, dim_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style, space},
     },
     scene::{Movement, Rows},
     sensor::{ArrayScale, LARGEST_COUNT},
@@ -140,31 +138,26 @@ fn add_slider(ui: &mut Ui, name: &str, present: f64, slider: Slider<'_>) {
 
 fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     let question = &state.identifiability.question;
-    let width = ui.available_width();
     let can_use = !state.phase.is_busy() && question.sensor != state.draft.sensor;
-    let text = "Use this sensor in the Train view";
-    let button = primary_button(Theme::of(ui), text).min_size(vec2(width, space(7)));
     let why_not = if state.phase.is_busy() {
         "A training is under way there: its settings cannot change now"
     } else {
         "It is the sensor of the Train view"
     };
-    let button = ui.add_enabled(can_use, button);
-    if button
-        .on_hover_text("Takes the array and its geometry over into the Train view; the scene there stays")
-        .on_disabled_hover_text(why_not)
-        .clicked()
-    {
-        actions.push(IdentifiabilityAction::UseSensor.into());
-    }
     let can_reset = *question != Question::of(&state.draft);
-    let reset = Button::new("Back to the Train view's sensor and scene").min_size(vec2(width, 0.0));
-    if ui.add_enabled(can_reset, reset).clicked() {
-        actions.push(IdentifiabilityAction::TakeDraft.into());
-    }
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
+    ui.vertical_centered_justified(|ui| {
+        let button = primary_button(Theme::of(ui), "Use this sensor in the Train view");
+        let button = ui.add_enabled(can_use, button);
+        if button
+            .on_hover_text("Takes the array and its geometry over into the Train view; the scene there stays")
+            .on_disabled_hover_text(why_not)
+            .clicked()
+        {
+            actions.push(IdentifiabilityAction::UseSensor.into());
+        }
+        let reset = ui.add_enabled(can_reset, Button::new("Back to the Train view's"));
+        if reset.on_hover_text("Its sensor and its scene again").clicked() {
+            actions.push(IdentifiabilityAction::TakeDraft.into());
+        }
+    });
 }

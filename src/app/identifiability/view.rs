@@ -2,16 +2,16 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{Analysis, IdentifiabilityAction, IdentifiabilityState, facts::facts_ui, singular_values::singular_values_ui};
+use super::{
+    Analysis, IdentifiabilityAction, IdentifiabilityState, facts::facts_ui, singular_values::singular_values_ui,
+};
 use crate::{
     app::{
         Action,
         state::State,
         surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
         test_view::Frame,
-        theme::{
-            Theme, card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, semibold, space, type_size,
-        },
+        theme::{Theme, card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, semibold, space, type_size},
     },
     export::format_number,
 };
@@ -61,7 +61,9 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
-    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| singular_values_ui(ui, analysis));
+    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
+        singular_values_ui(ui, analysis)
+    });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "identifiability facts", |ui| {
             if let Some(problem) = &shown.problem {
@@ -170,7 +172,10 @@ pub fn status_ui(ui: &mut Ui, shown: &IdentifiabilityState) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&shown.problem, &shown.analysis) {
         _ if shown.is_pending => (palette.accent, "Computing".to_owned()),
-        (Some(_), _) => (palette.bad, "This sensor or scene is impossible: the note says why".to_owned()),
+        (Some(_), _) => (
+            palette.bad,
+            "This sensor or scene is impossible: the note says why".to_owned(),
+        ),
         (None, Some(analysis)) => match analysis.warnings.len() {
             0 => (palette.good, "Nothing stands in the way of decoupling".to_owned()),
             1 => (palette.warning, "1 warning".to_owned()),

@@ -22,6 +22,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             (View::Experiments, "Experiments"),
             (View::Compare, "Compare"),
             (View::Identifiability, "Identifiability"),
+            (View::TradeOff, "Trade-off"),
         ];
         if let Some(view) = segmented_ui(ui, "View", &views, state.view, false) {
             actions.push(Action::ShowView(view));
@@ -36,7 +37,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                     let snapshots = state.test().map_or(0, |test| test.set.snapshots());
                     actions.extend(snapshot_ui(ui, state.look.snapshot, snapshots).map(Action::ShowSnapshot));
                 }
-                View::Experiments | View::Identifiability => {}
+                View::Experiments | View::Identifiability | View::TradeOff => {}
                 View::Compare => {
                     let picked = snapshot_ui(ui, state.runs.snapshot, state.runs.snapshots());
                     actions.extend(picked.map(|snapshot| RunsAction::ShowSnapshot(snapshot).into()));
