@@ -3,7 +3,7 @@
 use eframe::egui::{
     Color32, CursorIcon, Id, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
 };
-use egui_plot::{HLine, Line, LineStyle, MarkerShape, PlotPoint, PlotPoints, PlotUi, Points, VLine};
+use egui_plot::{HLine, Line, LineStyle, MarkerShape, PlotPoint, PlotUi, Points, VLine};
 
 use super::{
     TradeAction, TradeLimits,
@@ -14,7 +14,7 @@ use crate::{
         Action,
         charts::{
             Key, Mark,
-            plot_style::{log_marks, log_text, plot},
+            plot_style::{log_marks, log_marks_across, log_text, plot},
         },
         state::State,
         theme::{Palette, Theme, dim_ui, semibold, type_size},
@@ -74,7 +74,7 @@ pub fn chart_ui(ui: &mut Ui, state: &State, level: &TradeLevel, cost: TradeCost)
         TradeCost::Training => "trade training",
     };
     let chart = plot(ui, id, cost.name(), "Z error (%)")
-        .x_grid_spacer(log_marks)
+        .x_grid_spacer(log_marks_across)
         .y_grid_spacer(log_marks)
         .allow_drag(false)
         .allow_zoom(false)
@@ -181,8 +181,11 @@ fn front(plot_ui: &mut PlotUi<'_>, level: &TradeLevel, cost: TradeCost, colour: 
         }
         steps.push(place);
     }
-    let line = Line::new("no other is better", PlotPoints::from(steps));
-    plot_ui.line(line.color(colour.gamma_multiply(0.7)).width(1.4));
+    // Corner by corner: a line through points that nearly coincide would be drawn with spikes.
+    for ends in steps.windows(2) {
+        let line = Line::new("no other is better", ends.to_vec());
+        plot_ui.line(line.color(colour.gamma_multiply(0.7)).width(1.4));
+    }
 }
 
 /// The limits of the two questions, where they lie among the points.

@@ -94,7 +94,7 @@ pub enum TradeFormError {
 const MOST_POINTS: usize = 1000;
 
 const NOISES: &str = "0, 1e-4, 1e-3, 1e-2";
-const HIDDEN: &str = "6, 12, 24";
+const HIDDEN: &str = "6, 12";
 
 impl Default for TradeForm {
     fn default() -> Self {
@@ -194,8 +194,8 @@ mod tests {
     #[test]
     fn the_form_begins_with_a_quick_look_at_everything() {
         let plan = TradeForm::default().plan(&RunSettings::default()).unwrap();
-        // Four without a network, then three sizes with two precisions and polish.
-        assert_eq!(plan.points(), 4 * 2 * (4 + 3 * 3));
+        // Four without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 4 * 2 * (4 + 2 * 3));
         let best = plan.settings(Preset::Best, 1e-3);
         assert_eq!((best.samples, best.training.stopping.epochs), (2000, 60));
         assert_eq!((best.scene.rows, best.scene.noise.relative), (Rows::Known, 1e-3));

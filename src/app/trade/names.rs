@@ -41,6 +41,15 @@ pub fn frame_time(microseconds: f64) -> String {
     }
 }
 
+/// A level of noise, as one would type it.
+pub fn noise_name(noise: f64) -> String {
+    if noise == 0.0 || noise >= 0.01 {
+        noise.to_string()
+    } else {
+        format!("{noise:e}")
+    }
+}
+
 /// A time of training.
 pub fn training_time(seconds: f64) -> String {
     Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)

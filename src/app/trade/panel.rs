@@ -2,7 +2,7 @@ use eframe::egui::{TextEdit, Ui, vec2};
 
 use super::{
     Thoroughness, TradeAction, TradeForm, WhichPresets,
-    names::decoder_name,
+    names::{decoder_name, noise_name},
     news::{can_measure, is_quiet},
 };
 use crate::{
@@ -17,7 +17,6 @@ use crate::{
     },
     dataset::LARGEST_SAMPLES,
     evaluation::{DecoderKind, Preset},
-    export::format_duration,
     training::StoppingRules,
 };
 
@@ -155,17 +154,13 @@ fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
 }
 
 fn progress_ui(ui: &mut Ui, state: &State) {
-    let (Some(running), Some(outcome)) = (&state.trade.running, &state.trade.outcome) else {
+    let (Some(_), Some(outcome)) = (&state.trade.running, &state.trade.outcome) else {
         return;
     };
     ui.add_space(space(1));
     let (done, all) = outcome.points();
     progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32);
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
-    let noise = outcome.plan.noises[level.unwrap_or(0)];
-    let elapsed = format_duration(running.begun.elapsed());
-    dim_ui(
-        ui,
-        &format!("{done} of {all} points, at noise {noise}, after {elapsed}"),
-    );
+    let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
+    dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
 }

@@ -6,6 +6,7 @@ use super::{
     TradeAction, TradeEnding, TradeFile, TradeOutcome, TradeState,
     chart::{chart_ui, keys},
     choices::choices_ui,
+    names::noise_name,
     table::table_ui,
 };
 use crate::{
@@ -91,15 +92,6 @@ fn level_ui(ui: &mut Ui, trade: &TradeState, outcome: &TradeOutcome, actions: &m
     };
     actions.extend(picked.map(TradeAction::ShowLevel).map(Action::from));
     dim_ui(ui, "Noise");
-}
-
-/// As one would type it.
-fn noise_name(noise: f64) -> String {
-    if noise == 0.0 || noise >= 0.01 {
-        noise.to_string()
-    } else {
-        format!("{noise:e}")
-    }
 }
 
 fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, actions: &mut Vec<Action>) {
