@@ -95,7 +95,7 @@ fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 
 fn scene_ui(ui: &mut Ui, question: &mut Question) {
     let scene = &mut question.scene;
-    let known = [(false, "Row not told"), (true, "Row known")];
+    let known = [(false, "Row unknown"), (true, "Row known")];
     if let Some(is_known) = segmented_ui(ui, "Whether the row is known", &known, scene.rows.are_known(), true) {
         scene.rows = if is_known { Rows::Known } else { Rows::All };
     }

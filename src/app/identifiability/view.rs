@@ -62,7 +62,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        singular_values_ui(ui, analysis)
+        singular_values_ui(ui, analysis);
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "identifiability facts", |ui| {

@@ -4,7 +4,7 @@ use super::{TradeForm, TradeFormError, TradePlan, worker::TradeNumber};
 use crate::evaluation::{RunSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
 
 /// Everything the Trade-off view reads.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct TradeState {
     /// What is to be measured.
     pub form: TradeForm,
@@ -73,19 +73,6 @@ impl Default for TradeLimits {
         Self {
             percent: 1.0,
             microseconds: 10.0,
-        }
-    }
-}
-
-impl Default for TradeState {
-    fn default() -> Self {
-        Self {
-            form: TradeForm::default(),
-            running: None,
-            outcome: None,
-            level: 0,
-            marked: None,
-            limits: TradeLimits::default(),
         }
     }
 }
