@@ -163,4 +163,10 @@ fn progress_ui(ui: &mut Ui, state: &State) {
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
     let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
     dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
+    if !is_quiet(state) {
+        note_ui(
+            ui,
+            "A training or an experiment is under way: it makes these times longer.",
+        );
+    }
 }
