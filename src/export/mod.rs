@@ -15,6 +15,7 @@ mod samples;
 mod soundness;
 mod tables;
 pub(crate) mod ticks;
+mod trade_file;
 mod unfinished;
 mod workspace_file;
 
@@ -27,5 +28,6 @@ pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
 pub use samples::{write_coordinates_header, write_numbers, write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
+pub use trade_file::{trade_plot, write_trade};
 pub use unfinished::exit_leaving_nothing;
 pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

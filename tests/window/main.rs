@@ -9,8 +9,10 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+mod identifying;
 mod looking;
 mod pictures;
+mod trading;
 mod training;
 
 #[path = "../support/mod.rs"]
