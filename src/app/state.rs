@@ -149,7 +149,7 @@ impl RunView {
             baselines,
         } = began;
         Self {
-            published: PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples),
+            published: settings.published(),
             settings,
             asked: settings,
             weights,

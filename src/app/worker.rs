@@ -23,7 +23,6 @@ use super::{
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     export::{CheckpointFile, NetworkFile},
-    scene::Rows,
     training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
 };
 
@@ -429,13 +428,6 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
 
 fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
     let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
-    if let Rows::One(_) = file.settings.scene.rows {
-        return Err(format!(
-            "'{}' reads one row only, and the window shows whole arrays: go on with it in a terminal, by decoupler \
-             train --resume",
-            path.display()
-        ));
-    }
     let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
     resumed.map_err(|error| format!("'{}': {error}", path.display()))
 }

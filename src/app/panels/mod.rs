@@ -3,9 +3,13 @@
 mod charts_card;
 mod configuration;
 pub(super) mod fields;
+mod network_section;
+mod noise_section;
 mod notice;
+mod preset_section;
 mod report;
 mod save_form;
+mod scene_section;
 mod sensor_section;
 mod spread;
 mod status_line;

@@ -248,14 +248,13 @@ fn format_short_time(time: Duration) -> String {
 const PATH_BUTTON_WIDTH: f32 = space(24);
 
 fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
     ui.horizontal(|ui| {
         let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button(theme, task.name()).min_size([width, space(7)].into());
+        let button = ghost_button(task.name()).min_size([width, space(7)].into());
         if ui.add(button).on_hover_text(task.description()).clicked() {
             actions.push(Action::ChooseFile(task));
         }
-        let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
         let is_enabled = path.enabled();
         path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, task.path_name()));
         if path.on_hover_text("Type the path instead of choosing it").clicked() {
