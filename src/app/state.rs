@@ -3,6 +3,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use ndarray::Array2;
 
 use super::{
+    decoders::DecodersState,
     experiments::ExperimentsState,
     export_kind::{ExportKind, file_name},
     file_task::FileTask,
@@ -33,6 +34,8 @@ pub struct State {
     pub preview: Option<Preview>,
     /// The present or last training.
     pub run: Option<RunView>,
+    /// What other decoders make of its test set.
+    pub decoders: DecodersState,
     /// How it is looked at.
     pub look: Look,
     /// The snapshot being drawn.
@@ -292,6 +295,7 @@ impl State {
             phase: Phase::Idle,
             preview: None,
             run: None,
+            decoders: DecodersState::default(),
             look: Look {
                 snapshot: 0,
                 camera: OrbitCamera::default(),

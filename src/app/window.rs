@@ -4,6 +4,7 @@ use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     action::Action,
+    decoders::DecoderMeasuring,
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
     panels,
@@ -23,6 +24,7 @@ pub struct DecouplerWindow {
     worker: Worker,
     experiments: ExperimentWorker,
     runs: RunsWorker,
+    measuring: DecoderMeasuring,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -46,6 +48,7 @@ impl DecouplerWindow {
                 let ctx = ctx.clone();
                 RunsWorker::start(move || ctx.request_repaint())?
             },
+            measuring: DecoderMeasuring::default(),
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
@@ -84,6 +87,7 @@ impl DecouplerWindow {
         }
         experiments::take_news(&mut self.state, &self.experiments);
         runs::take_news(&mut self.state, &self.runs);
+        self.measuring.take_news(&mut self.state.decoders);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -118,6 +122,7 @@ impl DecouplerWindow {
                 }
             }
             Event::Began(Ok(began)) => {
+                self.measuring.forget(&mut state.decoders);
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
                 state.phase = Phase::Training;
@@ -128,6 +133,7 @@ impl DecouplerWindow {
                 state.notice = Some(Notice::Failed(error.to_string()));
             }
             Event::Opened(Ok(began)) => {
+                self.measuring.forget(&mut state.decoders);
                 state.draft = began.settings;
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
@@ -141,6 +147,7 @@ impl DecouplerWindow {
                 state.notice = Some(Notice::Failed(error));
             }
             Event::Continued(Ok(settings)) => {
+                self.measuring.forget(&mut state.decoders);
                 if let Some(run) = &mut state.run {
                     run.asked = RunSettings {
                         training: state.draft.training,
@@ -166,7 +173,23 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
                 state.refresh_frames();
+                self.measure_decoders();
             }
+            Event::Networks(number, networks) if self.measuring.awaits(number) => match (networks, &state.run) {
+                (Ok(networks), Some(run)) => {
+                    let (test, ctx) = (Arc::clone(&run.test.set), self.ctx.clone());
+                    let measured = self
+                        .measuring
+                        .begin(run.settings, *networks, test, move || ctx.request_repaint());
+                    if let Err(error) = measured {
+                        state.decoders.end(&format!("no thread could be started: {error}"));
+                    }
+                }
+                (Err(reason), _) => state.decoders.end(&reason),
+                (Ok(_), None) => {}
+            },
+            // The network is another one by now.
+            Event::Networks(..) => {}
             Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
             Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
             Event::Exported(Ok(path)) => {
@@ -205,6 +228,7 @@ impl DecouplerWindow {
                     state.draft.training = run.asked.training;
                 }
                 state.phase = Phase::Training;
+                self.measuring.forget(&mut state.decoders);
                 self.worker.ask(Request::Resume);
             }
             Action::Continue if state.can_continue() => {
@@ -232,6 +256,10 @@ impl DecouplerWindow {
             Action::ShowErrorBars(has_error_bars) => {
                 state.look.has_error_bars = has_error_bars;
                 state.refresh_frames();
+            }
+            Action::ShowDecoders(is_open) => {
+                state.decoders.is_open = is_open;
+                self.measure_decoders();
             }
             Action::ShowPaperFigure(figure) => self.show_paper_figure(figure),
             Action::SetDark(is_dark) => {
@@ -295,6 +323,16 @@ impl DecouplerWindow {
                 }
                 Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
             },
+        }
+    }
+
+    /// Asks for the networks to be measured beside other decoders, once they stand still and their table is unfolded.
+    fn measure_decoders(&mut self) {
+        let state = &mut self.state;
+        let is_standing = matches!(state.phase, Phase::Paused | Phase::Ended(_));
+        if state.decoders.is_open && is_standing && state.decoders.measured.is_none() {
+            let number = self.measuring.expect(&mut state.decoders);
+            self.worker.ask(Request::Networks(number));
         }
     }
 

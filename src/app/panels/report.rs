@@ -9,14 +9,17 @@ use super::{
 use crate::{
     app::{
         action::Action,
+        decoders::{REFERENCE, decoders_ui},
         export_kind::ExportKind,
         file_task::FileTask,
         shown_figure::ShownPicture,
         state::{Phase, RunResult, RunView, State},
+        test_view::TestView,
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, Errors, PublishedErrors, error_rows},
+    evaluation::{Baselines, ErrorRow, Errors, Outlook, error_rows},
     export::{format_duration, format_number},
+    sensor::Identifiability,
     training::StopReason,
 };
 
@@ -27,9 +30,12 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         section_heading_ui(ui, "Errors on the test set");
         let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
         if let Some((run, result)) = shown {
-            error_table_ui(ui, &error_rows(&result.errors, &run.baselines, run.published.as_ref()));
+            let baselines = soundly(&run.baselines, &run.test);
+            error_table_ui(ui, &error_rows(&result.errors, &baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
-            worst_node_ui(ui, result, &mut actions);
+            conditioning_ui(ui, &run.test);
+            worst_node_ui(ui, &run.test, result, &mut actions);
+            decoders_ui(ui, state, baselines.reference.as_ref(), &mut actions);
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.starts);
         } else {
@@ -60,9 +66,10 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
 
 /// The table with the network's row still empty.
 fn expectation_ui(ui: &mut Ui, state: &State) {
-    if let Some(baselines) = state.preview.as_ref().and_then(|preview| preview.baselines) {
-        let draft = &state.draft;
-        let published = PublishedErrors::of(draft.sensor.scale, draft.hidden, draft.samples);
+    let known = state.preview.as_ref();
+    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
+        let baselines = soundly(&baselines, &preview.test);
+        let published = state.draft.published();
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
             *row = ErrorRow {
@@ -76,6 +83,7 @@ fn expectation_ui(ui: &mut Ui, state: &State) {
             };
         }
         error_table_ui(ui, &rows);
+        conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
     let text = "Press Train to fill in the network's row. The paper's network takes a few seconds.";
@@ -113,13 +121,21 @@ fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let palette = Theme::of(ui).palette;
     let row = |row: &ErrorRow| Row {
         name: row.name,
+        meaning: match row.name {
+            "training mean" => "Always the mean of the training set",
+            "linear map" => "The best affine map on resistance",
+            NETWORK => "The network with the lowest validation error so far",
+            "reference" => REFERENCE,
+            "published" => "What the paper reports for this array, hidden nodes and samples",
+            _ => "",
+        },
         cells: row.values()[..COLUMNS.len()]
             .iter()
             .map(|value| format_number(*value))
             .collect(),
         colour: match row.name {
             NETWORK => palette.accent,
-            "published" => palette.dim,
+            "published" | "reference" => palette.dim,
             _ => palette.text,
         },
         is_strong: row.name == NETWORK,
@@ -150,11 +166,50 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
         note_ui(ui, &format!("{fault} {remedy}"));
     } else if result.errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
-        dim_ui(ui, &format!("On z {times} times as accurate as the linear map."));
+        let limit = baselines.reference.filter(|limit| limit.z_mm > 0.0);
+        let text = match limit {
+            None => format!("On z {times} times as accurate as the linear map."),
+            Some(limit) => {
+                let ratio = format_number(result.errors.z_mm / limit.z_mm);
+                format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
+            }
+        };
+        dim_ui(ui, &text);
     }
     if run.asked != state.draft {
         dim_ui(ui, "The settings have changed since this training.");
     }
+}
+
+/// The baselines without a reference where nothing is known of it: without noise it is 0 by definition, but in a scene
+/// so badly conditioned rounding decides.
+fn soundly(baselines: &Baselines, test: &TestView) -> Baselines {
+    let is_blurred = test.outlook.as_ref().is_some_and(is_badly_conditioned);
+    Baselines {
+        reference: baselines.reference.filter(|limit| limit.z_mm > 0.0 || !is_blurred),
+        ..*baselines
+    }
+}
+
+fn is_badly_conditioned(outlook: &Outlook) -> bool {
+    outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
+}
+
+/// Says that the scene is badly conditioned, lest its errors be taken for the network's fault.
+fn conditioning_ui(ui: &mut Ui, test: &TestView) {
+    let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
+        return;
+    };
+    ui.add_space(space(2));
+    let condition = match outlook.worst_row.condition() {
+        condition if condition.is_finite() => format!("{condition:.0e}"),
+        _ => "infinite".to_owned(),
+    };
+    let text = format!(
+        "This scene is badly conditioned (condition number {condition}): whatever the decoder, some deformations cannot be \
+         told apart. Settings, Scene says what to change."
+    );
+    note_ui(ui, &text);
 }
 
 /// What to change after a training that ended so.
@@ -174,7 +229,7 @@ fn dim_ui(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
-fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
+fn worst_node_ui(ui: &mut Ui, test: &TestView, result: &RunResult, actions: &mut Vec<Action>) {
     let worst = result.errors.worst_node;
     ui.add_space(space(1));
     ui.horizontal(|ui| {
@@ -184,7 +239,7 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
             let place = format!(
                 "snapshot {}, row {}, node {}",
                 worst.snapshot + 1,
-                worst.row + 1,
+                test.rows.get(worst.row).map_or(0, |row| row + 1),
                 worst.node + 1
             );
             if ui

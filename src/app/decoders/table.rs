@@ -1,0 +1,138 @@
+use eframe::egui::{CollapsingHeader, RichText, Ui};
+
+use super::DecoderResult;
+use crate::{
+    app::{
+        action::Action,
+        panels::{Column, Row, table_ui},
+        state::{Phase, State},
+        theme::{Theme, note_ui, space, type_size},
+    },
+    evaluation::{DecoderKind, DecoderReport, Errors, Precision},
+    export::format_number,
+};
+
+const COLUMNS: [Column; 4] = [
+    Column {
+        heading: "Z %",
+        meaning: "AveZerr on the test set: mean |error| of z in percent of the coordinate z",
+    },
+    Column {
+        heading: "× limit",
+        meaning: "Mean |error| of z over that of the Bayesian reference. Without noise the reference is exact, and there \
+                  is no ratio.",
+    },
+    Column {
+        heading: "residual",
+        meaning: "How far the readings are from those of the answer: root mean square of the relative difference. It \
+                  needs no ground truth, so a real sensor has it too: as large as the noise is good, larger is doubtful.",
+    },
+    Column {
+        heading: "µs",
+        meaning: "Time to decode a frame, all rows read at one moment, on one thread: the median of many",
+    },
+];
+
+/// The other decoders on the same test set, folded away until the user asks for them.
+pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actions: &mut Vec<Action>) {
+    let decoders = &state.decoders;
+    ui.add_space(space(1));
+    let header = CollapsingHeader::new("More decoders")
+        .open(Some(decoders.is_open))
+        .show(ui, |ui| {
+            if let Some(measured) = &decoders.measured {
+                measured_ui(ui, measured, reference);
+            } else {
+                let text = match state.phase {
+                    Phase::Died => "The network was lost with the training thread: train again.",
+                    _ => "They are measured when the training is paused or has ended.",
+                };
+                dim_ui(ui, text);
+            }
+        });
+    let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, time, and \
+                distance from what is possible";
+    if header.header_response.on_hover_text(hint).clicked() {
+        actions.push(Action::ShowDecoders(!decoders.is_open));
+    }
+}
+
+fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Errors>) {
+    let palette = Theme::of(ui).palette;
+    let limit_mm = reference.map(|limit| limit.z_mm).filter(|&limit_mm| limit_mm > 0.0);
+    let rows = measured.iter().map(|result| Row {
+        name: name(result),
+        meaning: meaning(result.kind),
+        cells: match &result.report {
+            None => vec!["…".to_owned(); COLUMNS.len()],
+            Some(Err(_)) => vec![format_number(None); COLUMNS.len()],
+            Some(Ok(report)) => figures(report, limit_mm).map(format_number).to_vec(),
+        },
+        colour: if result.kind == DecoderKind::Network {
+            palette.accent
+        } else {
+            palette.text
+        },
+        is_strong: false,
+    });
+    let limit = reference.map(|limit| Row {
+        name: "limit",
+        meaning: REFERENCE,
+        cells: [limit.z_percent, limit_mm.map(|_| 1.0), None, None]
+            .map(format_number)
+            .to_vec(),
+        colour: palette.dim,
+        is_strong: false,
+    });
+    let rows: Vec<Row> = rows.chain(limit).collect();
+    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+    for result in measured {
+        if let Some(Err(reason)) = &result.report {
+            note_ui(ui, &format!("{}: {reason}", name(result)));
+        }
+    }
+}
+
+/// What the reference row is.
+pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
+                             loading, with Eq. (2) linearised at the truth. On average no decoder comes below it.";
+
+/// In the order of [`COLUMNS`].
+fn figures(report: &DecoderReport, limit_mm: Option<f64>) -> [Option<f64>; 4] {
+    [
+        report.errors.z_percent,
+        limit_mm.map(|limit_mm| report.errors.z_mm / limit_mm),
+        Some(report.residual),
+        Some(report.frame_us),
+    ]
+}
+
+fn name(result: &DecoderResult) -> &'static str {
+    match (result.kind, result.precision) {
+        (DecoderKind::Mean, _) => "mean",
+        (DecoderKind::Ridge, _) => "ridge map",
+        (DecoderKind::Network, Precision::Double) => "network f64",
+        (DecoderKind::Network, Precision::Single) => "network f32",
+        (DecoderKind::RadialBasis, _) => "radial basis",
+        (DecoderKind::Newton, _) => "Newton",
+        (DecoderKind::Polish, _) => "polished",
+    }
+}
+
+fn meaning(kind: DecoderKind) -> &'static str {
+    match kind {
+        DecoderKind::Mean => "Always the mean of the training set",
+        DecoderKind::Ridge => "The best affine map of the inputs chosen on the left, ridge-regularised",
+        DecoderKind::Network => "The trained network, computed with so many bits",
+        DecoderKind::RadialBasis => "A radial-basis network: Gaussians around centres among the training samples",
+        DecoderKind::Newton => {
+            "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior"
+        }
+        DecoderKind::Polish => "The network's answer, improved by at most three of Newton's steps",
+    }
+}
+
+fn dim_ui(ui: &mut Ui, text: &str) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(text).size(type_size().note).color(dim));
+}
