@@ -46,7 +46,7 @@ fn what_a_network_has_to_beat_stands_there_before_a_training() {
         };
         table_of(&run).into_iter().map(blank).collect()
     };
-    assert_eq!(driver.table()[..15], pending(&driver));
+    assert_eq!(driver.table()[..20], pending(&driver));
     assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
     assert!(!driver.is_enabled("Network…"), "there is nothing to export yet");
 

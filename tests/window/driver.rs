@@ -254,7 +254,7 @@ impl Driver {
     }
 }
 
-const ROWS: [&str; 4] = ["training mean", "linear map", "network", "published"];
+const ROWS: [&str; 5] = ["training mean", "linear map", "network", "reference", "published"];
 
 /// The settings of [`Driver::configure_small`].
 pub(crate) fn small() -> RunSettings {

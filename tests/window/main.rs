@@ -5,12 +5,14 @@
 mod comparing;
 mod configuring;
 mod continuing;
+mod decoders;
 mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
 mod looking;
 mod pictures;
+mod scenes;
 mod training;
 
 #[path = "../support/mod.rs"]

@@ -23,7 +23,7 @@ fn a_training_ends_with_the_librarys_own_numbers() {
     driver.train();
     let run = trained(small());
     assert_eq!(driver.table(), table_of(&run));
-    assert_eq!(driver.table().len(), 15, "three rows of five figures");
+    assert_eq!(driver.table().len(), 20, "four rows of five figures");
     let reason = run.stop_reason().unwrap();
     assert!(driver.has(&format!("Finished: {reason}")), "{reason}");
     let epochs = run.leader().latest().epoch;
@@ -194,7 +194,7 @@ fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
     driver.click("▶ Train");
     driver.press_with(Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-    assert_eq!(driver.table().len(), 15);
+    assert_eq!(driver.table().len(), 20);
     assert!(driver.has("Decoupled surface"));
     driver.settle();
 }

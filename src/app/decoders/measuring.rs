@@ -115,3 +115,41 @@ impl fmt::Debug for DecoderMeasuring {
         f.debug_struct("DecoderMeasuring").finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::Run;
+
+    #[test]
+    fn decoders_that_cannot_be_measured_say_why_and_none_is_left_waiting() {
+        let mut settings = RunSettings {
+            hidden: 2,
+            samples: 20,
+            validation_samples: 0,
+            test_samples: 4,
+            ..RunSettings::default()
+        };
+        settings.sensor.scale = "2x3_2x9".parse().unwrap();
+        let run = Run::prepare(settings).unwrap();
+        let (mut measuring, mut state) = (DecoderMeasuring::default(), DecodersState::default());
+        let number = measuring.expect(&mut state);
+        assert!(measuring.awaits(number) && state.is_measuring());
+        let (waking, woken) = channel();
+        let impossible = RunSettings { samples: 0, ..settings };
+        let wake = move || drop(waking.send(()));
+        measuring
+            .begin(impossible, run.network(), Arc::clone(run.test()), wake)
+            .unwrap();
+        // Until the thread has ended.
+        while woken.recv().is_ok() {}
+        measuring.take_news(&mut state);
+        assert!(!state.is_measuring());
+        for result in state.measured.iter().flatten() {
+            let reason = result.report.clone().unwrap().unwrap_err();
+            assert!(reason.contains("training samples"), "{reason}");
+        }
+        measuring.forget(&mut state);
+        assert!(state.measured.is_none() && !measuring.awaits(number));
+    }
+}

@@ -4,7 +4,7 @@ use super::DecoderResult;
 use crate::{
     app::{
         action::Action,
-        panels::{Column, Row, table_ui},
+        panels::{Column, Row, fields::capitalised, table_ui},
         state::{Phase, State},
         theme::{Theme, note_ui, space, type_size},
     },
@@ -88,7 +88,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
     for result in measured {
         if let Some(Err(reason)) = &result.report {
-            note_ui(ui, &format!("{}: {reason}", name(result)));
+            note_ui(ui, &format!("{}: {reason}", capitalised(name(result))));
         }
     }
 }
@@ -135,4 +135,23 @@ fn meaning(kind: DecoderKind) -> &'static str {
 fn dim_ui(ui: &mut Ui, text: &str) {
     let dim = Theme::of(ui).palette.dim;
     ui.label(RichText::new(text).size(type_size().note).color(dim));
+}
+
+#[cfg(test)]
+mod tests {
+    use egui_kittest::{Harness, kittest::Queryable as _};
+
+    use super::*;
+
+    #[test]
+    fn a_decoder_that_fails_says_why_and_the_others_stand() {
+        let mut state = State::new(true);
+        state.decoders.is_open = true;
+        state.decoders.measured = Some(DecoderResult::pending());
+        state.decoders.take(0, Err("no resistance at rest".to_owned()));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        harness.get_by_label("Mean: no resistance at rest");
+        harness.get_by_label("mean, Z %: –");
+        harness.get_by_label("Newton, Z %: …");
+    }
 }

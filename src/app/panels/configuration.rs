@@ -24,12 +24,12 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut actions = Vec::new();
     scrolled_ui(ui, "configuration", |ui| {
         let is_busy = state.phase.is_busy();
+        ui.add_enabled_ui(!is_busy, |ui| preset_section_ui(ui, &mut draft));
+        let followed = present(&draft);
         ui.add_enabled_ui(!is_busy && state.phase != Phase::Died, |ui| {
             paper_section_ui(ui, &mut actions);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
-            preset_section_ui(ui, &mut draft);
-            let followed = present(&draft);
             sensor_section_ui(ui, &mut draft);
             let noise = draft.scene.noise;
             scene_section_ui(ui, &mut draft, outlook(state));

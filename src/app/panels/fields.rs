@@ -37,14 +37,18 @@ pub fn quantity_ui(
 pub fn percent_ui(ui: &mut Ui, name: &str, hint: &str, share: &mut f64, range_percent: RangeInclusive<f64>) {
     let mut percent = in_percent(*share);
     if quantity_ui(ui, name, hint, &mut percent, range_percent, "%").changed() {
-        *share = percent / 100.0;
+        *share = to_twelve_digits(percent / 100.0);
     }
 }
 
-/// A share of one in percent, to twelve significant digits: 100 · 0.07 would show as 7.000000000000001.
+/// A share of one in percent.
 pub fn in_percent(share: f64) -> f64 {
-    let percent = 100.0 * share;
-    format!("{percent:.11e}").parse().unwrap_or(percent)
+    to_twelve_digits(100.0 * share)
+}
+
+/// 100 · 0.07 would show as 7.000000000000001, and 0.7 % would be another share than 0.007.
+fn to_twelve_digits(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
 }
 
 /// One of a few options side by side, each with its meaning. Returns the one newly picked.
@@ -56,6 +60,7 @@ pub fn options_ui<T: Copy + PartialEq>(
     selected: T,
 ) -> Option<T> {
     ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
         ui.label(name).on_hover_text(hint);
         let layout = Layout::right_to_left(Align::Center);
         ui.with_layout(layout, |ui| explained_options_ui(ui, name, options, selected, false))

@@ -1,6 +1,7 @@
 //! The parts of the window. Each reads the state and returns what the user meant.
 
 mod charts_card;
+mod conditioning;
 mod configuration;
 pub(super) mod fields;
 mod network_section;

@@ -3,6 +3,7 @@ use std::time::Duration;
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
+    conditioning::{conditioning_ui, soundly},
     spread::spread_ui,
     table::{Column, Row, table_ui},
 };
@@ -17,9 +18,8 @@ use crate::{
         test_view::TestView,
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{Baselines, ErrorRow, Errors, Outlook, error_rows},
+    evaluation::{ErrorRow, Errors, error_rows},
     export::{format_duration, format_number},
-    sensor::Identifiability,
     training::StopReason,
 };
 
@@ -179,37 +179,6 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     if run.asked != state.draft {
         dim_ui(ui, "The settings have changed since this training.");
     }
-}
-
-/// The baselines without a reference where nothing is known of it: without noise it is 0 by definition, but in a scene
-/// so badly conditioned rounding decides.
-fn soundly(baselines: &Baselines, test: &TestView) -> Baselines {
-    let is_blurred = test.outlook.as_ref().is_some_and(is_badly_conditioned);
-    Baselines {
-        reference: baselines.reference.filter(|limit| limit.z_mm > 0.0 || !is_blurred),
-        ..*baselines
-    }
-}
-
-fn is_badly_conditioned(outlook: &Outlook) -> bool {
-    outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
-}
-
-/// Says that the scene is badly conditioned, lest its errors be taken for the network's fault.
-fn conditioning_ui(ui: &mut Ui, test: &TestView) {
-    let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
-        return;
-    };
-    ui.add_space(space(2));
-    let condition = match outlook.worst_row.condition() {
-        condition if condition.is_finite() => format!("{condition:.0e}"),
-        _ => "infinite".to_owned(),
-    };
-    let text = format!(
-        "This scene is badly conditioned (condition number {condition}): whatever the decoder, some deformations cannot be \
-         told apart. Settings, Scene says what to change."
-    );
-    note_ui(ui, &text);
 }
 
 /// What to change after a training that ended so.
