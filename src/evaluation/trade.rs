@@ -11,7 +11,7 @@ pub struct TradePoint {
     pub settings: RunSettings,
     /// The decoder, its errors, and its time for a frame.
     pub report: DecoderReport,
-    /// Processor time of training and fitting, in seconds.
+    /// Time of training or fitting in seconds, of all rows together, as if one after another.
     pub training_seconds: f64,
     /// The limit that physics sets in this scene.
     pub reference: Errors,

@@ -221,7 +221,7 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         ("is cut off", sound[..sound.len() / 2].to_owned()),
         ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
         ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
-        ("has version 9", sound.replacen("\"version\":1", "\"version\":9", 1)),
+        ("has version 9", sound.replacen("\"version\":2", "\"version\":9", 1)),
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
