@@ -137,7 +137,7 @@ mod tests {
         assert!(measuring.awaits(number) && state.is_measuring());
         let (waking, woken) = channel();
         let impossible = RunSettings { samples: 0, ..settings };
-        let wake = move || drop(waking.send(()));
+        let wake = move || waking.send(()).unwrap_or(());
         measuring
             .begin(impossible, run.network(), Arc::clone(run.test()), wake)
             .unwrap();

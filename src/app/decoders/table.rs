@@ -12,15 +12,16 @@ use crate::{
     export::format_number,
 };
 
+const TIMES_LIMIT: &str = "× limit";
+
 const COLUMNS: [Column; 4] = [
     Column {
         heading: "Z %",
         meaning: "AveZerr on the test set: mean |error| of z in percent of the coordinate z",
     },
     Column {
-        heading: "× limit",
-        meaning: "Mean |error| of z over that of the Bayesian reference. Without noise the reference is exact, and there \
-                  is no ratio.",
+        heading: TIMES_LIMIT,
+        meaning: "Mean |error| of z over that of the Bayesian reference, below which no decoder comes",
     },
     Column {
         heading: "residual",
@@ -59,14 +60,19 @@ pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actio
 
 fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Errors>) {
     let palette = Theme::of(ui).palette;
-    let limit_mm = reference.map(|limit| limit.z_mm).filter(|&limit_mm| limit_mm > 0.0);
+    // Without noise there is no limit, and nothing to be compared with it.
+    let limit = reference.filter(|limit| limit.z_mm > 0.0);
+    let columns: Vec<Column> = COLUMNS
+        .into_iter()
+        .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
+        .collect();
     let rows = measured.iter().map(|result| Row {
         name: name(result),
         meaning: meaning(result.kind),
         cells: match &result.report {
-            None => vec!["…".to_owned(); COLUMNS.len()],
-            Some(Err(_)) => vec![format_number(None); COLUMNS.len()],
-            Some(Ok(report)) => figures(report, limit_mm).map(format_number).to_vec(),
+            None => vec!["…".to_owned(); columns.len()],
+            Some(Err(_)) => vec![format_number(None); columns.len()],
+            Some(Ok(report)) => figures(report, limit),
         },
         colour: if result.kind == DecoderKind::Network {
             palette.accent
@@ -75,17 +81,15 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
         },
         is_strong: false,
     });
-    let limit = reference.map(|limit| Row {
+    let of_limit = limit.map(|limit| Row {
         name: "limit",
         meaning: REFERENCE,
-        cells: [limit.z_percent, limit_mm.map(|_| 1.0), None, None]
-            .map(format_number)
-            .to_vec(),
+        cells: [limit.z_percent, Some(1.0), None, None].map(format_number).to_vec(),
         colour: palette.dim,
         is_strong: false,
     });
-    let rows: Vec<Row> = rows.chain(limit).collect();
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+    let rows: Vec<Row> = rows.chain(of_limit).collect();
+    ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
         if let Some(Err(reason)) = &result.report {
             note_ui(ui, &format!("{}: {reason}", capitalised(name(result))));
@@ -97,14 +101,15 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
 pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
                              loading, with Eq. (2) linearised at the truth. On average no decoder comes below it.";
 
-/// In the order of [`COLUMNS`].
-fn figures(report: &DecoderReport, limit_mm: Option<f64>) -> [Option<f64>; 4] {
-    [
-        report.errors.z_percent,
-        limit_mm.map(|limit_mm| report.errors.z_mm / limit_mm),
-        Some(report.residual),
-        Some(report.frame_us),
-    ]
+/// In the order of [`COLUMNS`], without the ratio where there is no limit.
+fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
+    let ratio = limit.map(|limit| Some(report.errors.z_mm / limit.z_mm));
+    let figures = [Some(report.errors.z_percent)].into_iter().chain([
+        ratio,
+        Some(Some(report.residual)),
+        Some(Some(report.frame_us)),
+    ]);
+    figures.flatten().map(format_number).collect()
 }
 
 fn name(result: &DecoderResult) -> &'static str {

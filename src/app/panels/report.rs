@@ -86,8 +86,12 @@ fn expectation_ui(ui: &mut Ui, state: &State) {
         conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
-    let text = "Press Train to fill in the network's row. The paper's network takes a few seconds.";
-    dim_ui(ui, text);
+    let text = "Press Train to fill in the network's row.";
+    if state.draft.is_papers_scene() {
+        dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
+    } else {
+        dim_ui(ui, text);
+    }
 }
 
 /// The name of the network's row.
