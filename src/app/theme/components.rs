@@ -58,7 +58,6 @@ pub struct PrimaryButton {
 
 impl PrimaryButton {
     /// At least this large.
-    #[must_use]
     pub fn min_size(mut self, min_size: Vec2) -> Self {
         self.min_size = min_size;
         self
