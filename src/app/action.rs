@@ -74,6 +74,8 @@ pub enum Action {
     ExportPicture(ShownPicture, PathBuf),
     /// Take up the training saved in this file.
     OpenCheckpoint(PathBuf),
+    /// Unfold the table of other decoders, or fold it.
+    ShowDecoders(bool),
     /// Do this with the run list.
     Runs(RunsAction),
     /// Close the question for a path.

@@ -3,7 +3,7 @@ use std::path::Path;
 use thiserror::Error;
 
 use crate::{
-    evaluation::{PublishedErrors, Run, RunSettings, error_rows},
+    evaluation::{Run, RunSettings, error_rows},
     export::{
         CheckpointFile, CheckpointFileError, NetworkFile, NetworkFileError, WriteError, atomic_write, write_errors,
         write_loss_curves,
@@ -106,7 +106,7 @@ impl ExportKind {
             Self::Errors => {
                 let settings = run.settings();
                 let (_, errors) = run.decouple_test();
-                let published = PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples);
+                let published = settings.published();
                 let rows = error_rows(&errors, run.baselines(), published.as_ref());
                 atomic_write(path, |writer| write_errors(&rows, writer))?;
             }

@@ -7,6 +7,7 @@
 mod action;
 mod charts;
 mod continuation;
+mod decoders;
 mod dialogs;
 mod experiments;
 mod export_kind;
@@ -29,6 +30,7 @@ mod worker;
 use crate::export::ticks;
 
 pub use action::Action;
+pub use decoders::{DecoderResult, DecodersState};
 pub use dialogs::DialogKind;
 pub use experiments::{
     AxisForm, AxisKind, Ending, ExperimentAction, ExperimentFile, ExperimentsState, Form, FormError, ListError,

@@ -3,6 +3,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use ndarray::Array2;
 
 use super::{
+    decoders::DecodersState,
     experiments::ExperimentsState,
     export_kind::{ExportKind, file_name},
     file_task::FileTask,
@@ -39,6 +40,8 @@ pub struct State {
     pub preview: Option<Preview>,
     /// The present or last training.
     pub run: Option<RunView>,
+    /// What other decoders make of its test set.
+    pub decoders: DecodersState,
     /// How it is looked at.
     pub look: Look,
     /// The snapshot being drawn.
@@ -159,7 +162,7 @@ impl RunView {
             baselines,
         } = began;
         Self {
-            published: PublishedErrors::of(settings.sensor.scale, settings.hidden, settings.samples),
+            published: settings.published(),
             settings,
             asked: settings,
             weights,
@@ -304,6 +307,7 @@ impl State {
             phase: Phase::Idle,
             preview: None,
             run: None,
+            decoders: DecodersState::default(),
             look: Look {
                 snapshot: 0,
                 camera: OrbitCamera::default(),

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     dataset::Dataset,
-    evaluation::{Run, RunError, RunSettings},
+    evaluation::{Outlook, Run, RunError, RunSettings},
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
@@ -20,8 +20,12 @@ pub struct TestView {
     pub surface: Arc<SurfaceMap>,
     /// The sensor they were drawn for.
     pub sensor: SensorModel,
+    /// The row-wires read, from 0: those of the nodes drawn.
+    pub rows: Vec<usize>,
     /// The distance a node can travel.
     pub stroke_mm: f64,
+    /// What can be hoped for in the scene; none where that takes long or cannot be told.
+    pub outlook: Option<Outlook>,
 }
 
 impl TestView {
@@ -39,9 +43,10 @@ impl TestView {
     /// Nodes through which no surface can be laid.
     pub fn of(settings: &RunSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
         let sensor = settings.sensor;
-        let x_mm: Vec<f64> = (0..sensor.scale.rows())
-            .map(|row| sensor.geometry.row_x_mm(row))
-            .collect();
+        let row_count = sensor.scale.rows();
+        // Of a row that does not exist there is no set either.
+        let rows = settings.scene.rows.read(row_count).unwrap_or_default();
+        let x_mm: Vec<f64> = rows.iter().map(|&row| sensor.geometry.row_x_mm(row)).collect();
         let nodes = 0..sensor.scale.nodes_per_row();
         let y_mm: Vec<f64> = nodes
             .map(|node| sensor.geometry.node_y_mm(sensor.scale, node))
@@ -50,7 +55,9 @@ impl TestView {
             set,
             surface: Arc::new(SurfaceMap::new(&x_mm, &y_mm)?),
             sensor,
+            rows,
             stroke_mm: settings.stroke_mm(),
+            outlook: outlook(settings),
         })
     }
 
@@ -67,6 +74,20 @@ impl TestView {
         let grid_mm = self.surface.evaluate(&z_mm);
         Frame { nodes_mm, grid_mm }
     }
+}
+
+/// The outlook of arrays for which it takes a moment; those of the paper take a millisecond.
+fn outlook(settings: &RunSettings) -> Option<Outlook> {
+    /// About a third of a second.
+    const MOST_PRODUCTS: usize = 500_000_000;
+    let scale = settings.sensor.scale;
+    let unknowns = settings.scene.unknowns_per_row(scale);
+    let matrix = unknowns.saturating_mul(scale.columns().max(unknowns));
+    let products = matrix.saturating_mul(unknowns).saturating_mul(scale.rows());
+    if products > MOST_PRODUCTS {
+        return None;
+    }
+    Outlook::of(settings).ok()
 }
 
 /// Why there is nothing to draw.

@@ -4,6 +4,7 @@ use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     action::Action,
+    decoders::DecoderMeasuring,
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
     identifiability::{self, IdentifiabilityAction, IdentifiabilityWorker},
@@ -27,6 +28,7 @@ pub struct DecouplerWindow {
     runs: RunsWorker,
     identifiability: IdentifiabilityWorker,
     trade: TradeWorker,
+    measuring: DecoderMeasuring,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -58,6 +60,7 @@ impl DecouplerWindow {
                 let ctx = ctx.clone();
                 TradeWorker::new(move || ctx.request_repaint())
             },
+            measuring: DecoderMeasuring::default(),
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
@@ -98,6 +101,7 @@ impl DecouplerWindow {
         runs::take_news(&mut self.state, &self.runs);
         identifiability::take_news(&mut self.state, &mut self.identifiability);
         trade::take_news(&mut self.state, &self.trade);
+        self.measuring.take_news(&mut self.state.decoders);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -132,6 +136,7 @@ impl DecouplerWindow {
                 }
             }
             Event::Began(Ok(began)) => {
+                self.measuring.forget(&mut state.decoders);
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
                 state.phase = Phase::Training;
@@ -142,6 +147,7 @@ impl DecouplerWindow {
                 state.notice = Some(Notice::Failed(error.to_string()));
             }
             Event::Opened(Ok(began)) => {
+                self.measuring.forget(&mut state.decoders);
                 state.draft = began.settings;
                 state.preview = None;
                 state.run = Some(RunView::new(*began));
@@ -155,6 +161,7 @@ impl DecouplerWindow {
                 state.notice = Some(Notice::Failed(error));
             }
             Event::Continued(Ok(settings)) => {
+                self.measuring.forget(&mut state.decoders);
                 if let Some(run) = &mut state.run {
                     run.asked = RunSettings {
                         training: state.draft.training,
@@ -180,7 +187,23 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
                 state.refresh_frames();
+                self.measure_decoders();
             }
+            Event::Networks(number, networks) if self.measuring.awaits(number) => match (networks, &state.run) {
+                (Ok(networks), Some(run)) => {
+                    let (test, ctx) = (Arc::clone(&run.test.set), self.ctx.clone());
+                    let measured = self
+                        .measuring
+                        .begin(run.settings, *networks, test, move || ctx.request_repaint());
+                    if let Err(error) = measured {
+                        state.decoders.end(&format!("no thread could be started: {error}"));
+                    }
+                }
+                (Err(reason), _) => state.decoders.end(&reason),
+                (Ok(_), None) => {}
+            },
+            // The network is another one by now.
+            Event::Networks(..) => {}
             Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
             Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
             Event::Exported(Ok(path)) => {
@@ -219,6 +242,7 @@ impl DecouplerWindow {
                     state.draft.training = run.asked.training;
                 }
                 state.phase = Phase::Training;
+                self.measuring.forget(&mut state.decoders);
                 self.worker.ask(Request::Resume);
             }
             Action::Continue if state.can_continue() => {
@@ -246,6 +270,10 @@ impl DecouplerWindow {
             Action::ShowErrorBars(has_error_bars) => {
                 state.look.has_error_bars = has_error_bars;
                 state.refresh_frames();
+            }
+            Action::ShowDecoders(is_open) => {
+                state.decoders.is_open = is_open;
+                self.measure_decoders();
             }
             Action::ShowPaperFigure(figure) => self.show_paper_figure(figure),
             Action::SetDark(is_dark) => {
@@ -326,6 +354,16 @@ impl DecouplerWindow {
                 }
                 Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
             },
+        }
+    }
+
+    /// Asks for the networks to be measured beside other decoders, once they stand still and their table is unfolded.
+    fn measure_decoders(&mut self) {
+        let state = &mut self.state;
+        let is_standing = matches!(state.phase, Phase::Paused | Phase::Ended(_));
+        if state.decoders.is_open && is_standing && state.decoders.measured.is_none() {
+            let number = self.measuring.expect(&mut state.decoders);
+            self.worker.ask(Request::Networks(number));
         }
     }
 

@@ -23,7 +23,7 @@ use super::{
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
     export::{CheckpointFile, NetworkFile},
-    scene::Rows,
+    network::Networks,
     training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
 };
 
@@ -55,6 +55,8 @@ pub enum Request {
     Resume,
     /// End the training; its network stays.
     Stop,
+    /// Hand over the best networks so far; the answer bears this number.
+    Networks(u64),
     /// Write a file about the present training.
     Export(ExportKind, PathBuf),
 }
@@ -77,6 +79,8 @@ pub enum Event {
     Progressed(Box<Progress>),
     /// The training on show has ended: what is to be kept of it, or why nothing can be.
     Finished(Result<Box<NetworkFile>, String>),
+    /// The best networks so far, or why there are none; with the number of the request.
+    Networks(u64, Result<Box<Networks>, String>),
     /// A file was written, or why not.
     Exported(Result<PathBuf, String>),
 }
@@ -304,6 +308,11 @@ impl Labour {
                 }
                 self.report_progress();
             }
+            Request::Networks(number) => {
+                let networks = self.run.as_ref().map(|run| Box::new(run.network()));
+                let networks = networks.ok_or_else(|| LOST.to_owned());
+                self.report.send(Event::Networks(number, networks));
+            }
             Request::Export(kind, path) => {
                 let result = match &self.run {
                     Some(run) => kind.write(run, &path).map(|()| path).map_err(|error| error.to_string()),
@@ -429,13 +438,6 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
 
 fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
     let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
-    if let Rows::One(_) = file.settings.scene.rows {
-        return Err(format!(
-            "'{}' reads one row only, and the window shows whole arrays: go on with it in a terminal, by decoupler \
-             train --resume",
-            path.display()
-        ));
-    }
     let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
     resumed.map_err(|error| format!("'{}': {error}", path.display()))
 }

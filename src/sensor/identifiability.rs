@@ -253,6 +253,10 @@ impl fmt::Display for IdentifiabilityWarning {
                  lower the noise, reduce the height, widen the node pitch, or add column-wires",
                 100.0 * share
             ),
+            Self::IllConditioned { condition } if condition.is_infinite() => f.write_str(
+                "some deformation changes no reading at all; reduce the height, widen the node pitch, add column-wires, or \
+                 let nodes move along z only",
+            ),
             Self::IllConditioned { condition } => write!(
                 f,
                 "some deformation is seen {condition:.0e} times worse than another: even rounding blurs it; reduce the \

@@ -102,3 +102,26 @@ fn an_idle_window_draws_nothing() {
     driver.settle();
     assert!(driver.harness().run() <= 2, "with another picture");
 }
+
+#[test]
+fn buttons_answer_the_pointer() {
+    let mut driver = Driver::open();
+    for theme in ["Light", "Dark"] {
+        for button in ["▶ Train", theme, "Fig. 4", "Type the path of a checkpoint"] {
+            // Inside the edge, beside the text.
+            let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);
+            let colour = |driver: &mut Driver| {
+                driver.harness().run_steps(2);
+                let picture = driver.harness().render().unwrap();
+                picture.get_pixel(place.x as u32, place.y as u32).0
+            };
+            let at_rest = colour(&mut driver);
+            driver.harness().hover_at(place);
+            let hovered = colour(&mut driver);
+            assert_ne!(at_rest, hovered, "{button}");
+            driver.harness().remove_cursor();
+            assert_eq!(colour(&mut driver), at_rest, "{button}");
+        }
+        driver.click_button(theme);
+    }
+}

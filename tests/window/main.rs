@@ -5,6 +5,7 @@
 mod comparing;
 mod configuring;
 mod continuing;
+mod decoders;
 mod driver;
 mod experiments;
 mod exporting;
@@ -12,6 +13,7 @@ mod extremes;
 mod identifying;
 mod looking;
 mod pictures;
+mod scenes;
 mod trading;
 mod training;
 

@@ -7,7 +7,7 @@ use crate::{
         panels::fields::{count_ui, field_ui},
         state::State,
         theme::{
-            Theme, dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
+            dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
             segmented_ui, space,
         },
     },
@@ -204,11 +204,11 @@ fn base_ui(ui: &mut Ui, form: &mut Form, state: &State) {
 }
 
 fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let (theme, experiments) = (Theme::of(ui), &state.experiments);
+    let experiments = &state.experiments;
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
-        let run = ui.add_enabled(experiments.can_run(), primary_button(theme, "▶ Run").min_size(size));
+        let run = ui.add_enabled(experiments.can_run(), primary_button("▶ Run").min_size(size));
         if run
             .on_hover_text("Run all trainings in the background (Ctrl+Enter)")
             .clicked()
@@ -216,7 +216,7 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             actions.push(ExperimentAction::Run.into());
         }
         let can_cancel = experiments.running.is_some();
-        let cancel = ui.add_enabled(can_cancel, ghost_button(theme, "■ Cancel").min_size(size));
+        let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
         if cancel
             .on_hover_text("End it; what is finished stays (Ctrl+.)")
             .clicked()

@@ -65,7 +65,7 @@ fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
 fn export_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Action>) {
     let has_figures = outcome.trials().0 > 0;
     ui.add_enabled_ui(has_figures, |ui| {
-        let button = MenuButton::from_button(ghost_button(Theme::of(ui), "Export"));
+        let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
             ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
             for file in ExperimentFile::ALL {
@@ -84,7 +84,7 @@ fn export_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Ac
 fn open_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Action>) {
     let marked = state.experiments.marked;
     let can_open = marked.is_some() && !state.phase.is_busy();
-    let button = ui.add_enabled(can_open, ghost_button(Theme::of(ui), "Open in Train view"));
+    let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let why_not = if marked.is_some() {
         "A training is under way there: its settings cannot change now"
     } else {

@@ -8,7 +8,7 @@ use crate::{
         Action,
         panels::fields::{count_ui, quantity_ui},
         state::State,
-        theme::{Theme, dim_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style, space},
+        theme::{dim_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style, space},
     },
     scene::{Movement, Rows},
     sensor::{ArrayScale, LARGEST_COUNT},
@@ -146,7 +146,7 @@ fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     };
     let can_reset = *question != Question::of(&state.draft);
     ui.vertical_centered_justified(|ui| {
-        let button = primary_button(Theme::of(ui), "Use this sensor in the Train view");
+        let button = primary_button("Use this sensor in the Train view");
         let button = ui.add_enabled(can_use, button);
         if button
             .on_hover_text("Takes the array and its geometry over into the Train view; the scene there stays")

@@ -1,7 +1,10 @@
-use eframe::egui::{CollapsingHeader, ComboBox, RichText, Slider, Stroke, Ui};
+use eframe::egui::{CollapsingHeader, ComboBox, RichText, Ui};
 
 use super::{
-    fields::{capitalised, count_ui, field_ui, input_text, quantity_ui},
+    fields::{capitalised, count_ui, input_text, quantity_ui},
+    network_section::network_section_ui,
+    preset_section::{applied, present, preset_section_ui},
+    scene_section::{samples_section_ui, scene_section_ui},
     sensor_section::sensor_section_ui,
 };
 use crate::{
@@ -9,11 +12,9 @@ use crate::{
         action::Action,
         paper_figure::PaperFigure,
         state::{Phase, State},
-        theme::{Theme, ghost_button, scrolled_ui, section_heading_ui, slider_style, space, type_size},
+        theme::{Theme, ghost_button, scrolled_ui, section_heading_ui, space, type_size},
     },
-    dataset::LARGEST_SAMPLES,
-    evaluation::{MOST_STARTS, RunSettings},
-    network::{HiddenSuggestions, LARGEST_HIDDEN, Shape},
+    evaluation::{MOST_STARTS, Outlook, RunSettings},
     training::{Method, StoppingRules},
 };
 
@@ -23,12 +24,20 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let mut actions = Vec::new();
     scrolled_ui(ui, "configuration", |ui| {
         let is_busy = state.phase.is_busy();
+        ui.add_enabled_ui(!is_busy, |ui| preset_section_ui(ui, &mut draft));
+        let followed = present(&draft);
         ui.add_enabled_ui(!is_busy && state.phase != Phase::Died, |ui| {
             paper_section_ui(ui, &mut actions);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);
-            scene_section_ui(ui, &mut draft);
+            let noise = draft.scene.noise;
+            scene_section_ui(ui, &mut draft, outlook(state));
+            // How many samples are best depends on whether there is noise.
+            if let Some(preset) = followed.filter(|_| draft.scene.noise != noise) {
+                draft = applied(preset, &draft);
+            }
+            samples_section_ui(ui, &mut draft);
             network_section_ui(ui, &mut draft);
         });
         // What is held can be continued with another method.
@@ -54,6 +63,17 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     actions
 }
 
+/// What can be hoped for in the scene of the draft, where that is known.
+fn outlook(state: &State) -> Option<&Outlook> {
+    let (settings, test) = match (&state.preview, &state.run) {
+        (Some(preview), _) => (&preview.settings, &preview.test),
+        (None, Some(run)) => (&run.settings, &run.test),
+        (None, None) => return None,
+    };
+    let is_same = (settings.sensor, settings.scene) == (state.draft.sensor, state.draft.scene);
+    test.outlook.as_ref().filter(|_| is_same)
+}
+
 /// The paper's figures of single networks, one click each.
 fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     section_heading_ui(ui, "The paper's figures");
@@ -62,97 +82,12 @@ fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     let width = ((ui.available_width() - gap * (count - 1.0)) / count).floor();
     ui.horizontal(|ui| {
         for figure in PaperFigure::ALL {
-            let button = ghost_button(Theme::of(ui), figure.name()).min_size([width, space(7)].into());
+            let button = ghost_button(figure.name()).min_size([width, space(7)].into());
             if ui.add(button).on_hover_text(figure.description()).clicked() {
                 actions.push(Action::ShowPaperFigure(figure));
             }
         }
     });
-}
-
-fn scene_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
-    section_heading_ui(ui, "Scene");
-    let dim = Theme::of(ui).palette.dim;
-    let text = "Every node of every row pressed down by a random amount, as in the paper";
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
-    let mut percent = 100.0 * draft.scene.largest_compression;
-    let hint = "The most a node is pressed down, in percent of the height.";
-    if quantity_ui(ui, "Largest compression", hint, &mut percent, 0.001..=99.0, "%").changed() {
-        draft.scene.largest_compression = percent / 100.0;
-    }
-    let rows = draft.sensor.scale.rows();
-    let hint = format!("What the method fits; whole snapshots of {rows} rows are drawn.");
-    count_ui(ui, "Training samples", &hint, &mut draft.samples, 1..=LARGEST_SAMPLES);
-    let hint = "Drawn beside the training samples; they choose the best weights and stop the training. 0 for none.";
-    count_ui(
-        ui,
-        "Validation samples",
-        hint,
-        &mut draft.validation_samples,
-        0..=LARGEST_SAMPLES,
-    );
-    let hint = "Never trained on: all errors are measured here, and the snapshots shown are these.";
-    count_ui(ui, "Test samples", hint, &mut draft.test_samples, 1..=LARGEST_SAMPLES);
-    let hint = "Everything random follows from it: the same seed gives the same network.";
-    field_ui(ui, "Seed", hint, |ui| {
-        ui.add_sized(
-            [space(16), space(6)],
-            eframe::egui::DragValue::new(&mut draft.seed.0).speed(0.1),
-        )
-    });
-}
-
-fn network_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
-    section_heading_ui(ui, "Network");
-    let hint = "Nodes of the tanh layer between resistances and coordinates.";
-    count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
-    let scale = draft.sensor.scale;
-    let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
-    let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
-    hidden_slider_ui(ui, &mut draft.hidden, [suggestions.logarithm, low, high]);
-    let dim = Theme::of(ui).palette.dim;
-    let (n, m) = (scale.columns(), scale.coordinates_per_row());
-    let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
-        .on_hover_text(format!(
-            "Of the paper, for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
-             (Eq. 12). A start, not a bound."
-        ));
-    // Of the coordinates x varies with the row and z with the load; y never does.
-    let varying_axes = if scale.rows() > 1 { 2 } else { 1 };
-    let shape = Shape {
-        inputs: n,
-        hidden: draft.hidden,
-        outputs: varying_axes * scale.nodes_per_row(),
-    };
-    let text = format!("{n} inputs, {} outputs, {} weights", shape.outputs, shape.weights());
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
-        .on_hover_text(
-            "Inputs are the resistances of a row-wire; outputs are those coordinates of its nodes that vary.",
-        );
-}
-
-/// A slider for small networks, with small marks at the suggestions.
-fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
-    const MOST: usize = 64;
-    ui.scope(|ui| {
-        slider_style(ui);
-        ui.spacing_mut().slider_width = ui.available_width();
-        let slider = Slider::new(hidden, 1..=MOST)
-            .show_value(false)
-            .clamping(eframe::egui::SliderClamping::Never);
-        let response = ui.add(slider);
-        let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
-        let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-        for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
-            let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
-            let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
-            ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
-        }
-        let value = *hidden as f64;
-        response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
-    });
-    ui.add_space(space(1));
 }
 
 fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings, is_new: bool) {

@@ -2,9 +2,9 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Align, DragValue, Layout, Response, Ui, emath::Numeric};
+use eframe::egui::{Align, ComboBox, DragValue, Layout, Response, Ui, emath::Numeric};
 
-use crate::app::theme::space;
+use crate::app::theme::{explained_options_ui, space};
 
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
@@ -31,6 +31,69 @@ pub fn quantity_ui(
     unit: &str,
 ) -> Response {
     field_ui(ui, name, hint, |ui| number_ui(ui, value, range, unit))
+}
+
+/// A quantity kept as a share of one and shown in percent.
+pub fn percent_ui(ui: &mut Ui, name: &str, hint: &str, share: &mut f64, range_percent: RangeInclusive<f64>) {
+    let mut percent = in_percent(*share);
+    if quantity_ui(ui, name, hint, &mut percent, range_percent, "%").changed() {
+        *share = to_twelve_digits(percent / 100.0);
+    }
+}
+
+/// A share of one in percent.
+pub fn in_percent(share: f64) -> f64 {
+    to_twelve_digits(100.0 * share)
+}
+
+/// 100 · 0.07 would show as 7.000000000000001, and 0.7 % would be another share than 0.007.
+fn to_twelve_digits(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
+/// One of a few options side by side, each with its meaning. Returns the one newly picked.
+pub fn options_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    hint: &str,
+    options: &[(T, &str, &str)],
+    selected: T,
+) -> Option<T> {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(name).on_hover_text(hint);
+        let layout = Layout::right_to_left(Align::Center);
+        ui.with_layout(layout, |ui| explained_options_ui(ui, name, options, selected, false))
+            .inner
+    })
+    .inner
+}
+
+/// One of a list that opens, each with its meaning. Returns the one newly picked.
+pub fn list_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    hint: &str,
+    options: &[(T, &str, &str)],
+    selected: T,
+) -> Option<T> {
+    let shown = options.iter().find(|(option, ..)| *option == selected);
+    let mut picked = None;
+    field_ui(ui, name, hint, |ui| {
+        let combo = ComboBox::from_id_salt(name)
+            .selected_text(shown.map_or("", |(_, text, _)| *text))
+            .width(space(31));
+        let combo = combo.show_ui(ui, |ui| {
+            for &(option, text, meaning) in options {
+                let choice = ui.selectable_label(option == selected, text).on_hover_text(meaning);
+                if choice.clicked() && option != selected {
+                    picked = Some(option);
+                }
+            }
+        });
+        combo.response
+    });
+    picked
 }
 
 fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, unit: &str) -> Response {

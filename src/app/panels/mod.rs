@@ -1,11 +1,16 @@
 //! The parts of the window. Each reads the state and returns what the user meant.
 
 mod charts_card;
+mod conditioning;
 mod configuration;
 pub(super) mod fields;
+mod network_section;
+mod noise_section;
 mod notice;
+mod preset_section;
 mod report;
 mod save_form;
+mod scene_section;
 mod sensor_section;
 mod spread;
 mod status_line;

@@ -3,19 +3,22 @@ use std::time::Duration;
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
+    conditioning::{conditioning_ui, soundly},
     spread::spread_ui,
     table::{Column, Row, table_ui},
 };
 use crate::{
     app::{
         action::Action,
+        decoders::{REFERENCE, decoders_ui},
         export_kind::ExportKind,
         file_task::FileTask,
         shown_figure::ShownPicture,
         state::{Phase, RunResult, RunView, State},
+        test_view::TestView,
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, Errors, PublishedErrors, error_rows},
+    evaluation::{ErrorRow, Errors, error_rows},
     export::{format_duration, format_number},
     training::StopReason,
 };
@@ -27,9 +30,12 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         section_heading_ui(ui, "Errors on the test set");
         let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
         if let Some((run, result)) = shown {
-            error_table_ui(ui, &error_rows(&result.errors, &run.baselines, run.published.as_ref()));
+            let baselines = soundly(&run.baselines, &run.test);
+            error_table_ui(ui, &error_rows(&result.errors, &baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
-            worst_node_ui(ui, result, &mut actions);
+            conditioning_ui(ui, &run.test);
+            worst_node_ui(ui, &run.test, result, &mut actions);
+            decoders_ui(ui, state, baselines.reference.as_ref(), &mut actions);
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.starts);
         } else {
@@ -60,9 +66,10 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
 
 /// The table with the network's row still empty.
 fn expectation_ui(ui: &mut Ui, state: &State) {
-    if let Some(baselines) = state.preview.as_ref().and_then(|preview| preview.baselines) {
-        let draft = &state.draft;
-        let published = PublishedErrors::of(draft.sensor.scale, draft.hidden, draft.samples);
+    let known = state.preview.as_ref();
+    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
+        let baselines = soundly(&baselines, &preview.test);
+        let published = state.draft.published();
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
             *row = ErrorRow {
@@ -76,10 +83,15 @@ fn expectation_ui(ui: &mut Ui, state: &State) {
             };
         }
         error_table_ui(ui, &rows);
+        conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
-    let text = "Press Train to fill in the network's row. The paper's network takes a few seconds.";
-    dim_ui(ui, text);
+    let text = "Press Train to fill in the network's row.";
+    if state.draft.is_papers_scene() {
+        dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
+    } else {
+        dim_ui(ui, text);
+    }
 }
 
 /// The name of the network's row.
@@ -113,13 +125,21 @@ fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let palette = Theme::of(ui).palette;
     let row = |row: &ErrorRow| Row {
         name: row.name,
+        meaning: match row.name {
+            "training mean" => "Always the mean of the training set",
+            "linear map" => "The best affine map on resistance",
+            NETWORK => "The network with the lowest validation error so far",
+            "reference" => REFERENCE,
+            "published" => "What the paper reports for this array, hidden nodes and samples",
+            _ => "",
+        },
         cells: row.values()[..COLUMNS.len()]
             .iter()
             .map(|value| format_number(*value))
             .collect(),
         colour: match row.name {
             NETWORK => palette.accent,
-            "published" => palette.dim,
+            "published" | "reference" => palette.dim,
             _ => palette.text,
         },
         is_strong: row.name == NETWORK,
@@ -150,7 +170,15 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
         note_ui(ui, &format!("{fault} {remedy}"));
     } else if result.errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
-        dim_ui(ui, &format!("On z {times} times as accurate as the linear map."));
+        let limit = baselines.reference.filter(|limit| limit.z_mm > 0.0);
+        let text = match limit {
+            None => format!("On z {times} times as accurate as the linear map."),
+            Some(limit) => {
+                let ratio = format_number(result.errors.z_mm / limit.z_mm);
+                format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
+            }
+        };
+        dim_ui(ui, &text);
     }
     if run.asked != state.draft {
         dim_ui(ui, "The settings have changed since this training.");
@@ -174,7 +202,7 @@ fn dim_ui(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
-fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
+fn worst_node_ui(ui: &mut Ui, test: &TestView, result: &RunResult, actions: &mut Vec<Action>) {
     let worst = result.errors.worst_node;
     ui.add_space(space(1));
     ui.horizontal(|ui| {
@@ -184,7 +212,7 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
             let place = format!(
                 "snapshot {}, row {}, node {}",
                 worst.snapshot + 1,
-                worst.row + 1,
+                test.rows.get(worst.row).map_or(0, |row| row + 1),
                 worst.node + 1
             );
             if ui
@@ -248,14 +276,13 @@ fn format_short_time(time: Duration) -> String {
 const PATH_BUTTON_WIDTH: f32 = space(24);
 
 fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
     ui.horizontal(|ui| {
         let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button(theme, task.name()).min_size([width, space(7)].into());
+        let button = ghost_button(task.name()).min_size([width, space(7)].into());
         if ui.add(button).on_hover_text(task.description()).clicked() {
             actions.push(Action::ChooseFile(task));
         }
-        let path = ui.add(ghost_button(theme, "Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
         let is_enabled = path.enabled();
         path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, task.path_name()));
         if path.on_hover_text("Type the path instead of choosing it").clicked() {

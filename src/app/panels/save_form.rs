@@ -45,16 +45,11 @@ pub fn save_form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             }
             ui.add_space(space(3));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let theme = Theme::of(ui);
                 let is_named = !path.trim().is_empty();
-                if ui
-                    .add_enabled(is_named, primary_button(theme, saving.task.verb()))
-                    .clicked()
-                    || (entered && is_named)
-                {
+                if ui.add_enabled(is_named, primary_button(saving.task.verb())).clicked() || (entered && is_named) {
                     actions.push(saving.task.at(PathBuf::from(path.trim())));
                 }
-                if ui.add(ghost_button(theme, "Cancel")).clicked() {
+                if ui.add(ghost_button("Cancel")).clicked() {
                     actions.push(Action::CancelSave);
                 }
             });

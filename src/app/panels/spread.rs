@@ -54,6 +54,7 @@ pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
         let figures = spread.map(|spread| [spread.smallest, spread.median, spread.largest]);
         Some(Row {
             name,
+            meaning: "",
             cells: figures?.into_iter().map(format_number).collect(),
             colour: palette.text,
             is_strong: false,

@@ -180,7 +180,8 @@ fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
     ui.spacing_mut().item_spacing.y = 0.0;
     let per_row = test.sensor.scale.nodes_per_row();
     ui.horizontal(|ui| {
-        let name = format!("Row {}, node {}", node / per_row + 1, node % per_row + 1);
+        let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
+        let name = format!("Row {row}, node {}", node % per_row + 1);
         ui.label(RichText::new(name).font(semibold(type_size().note)));
         let [x, y] = [actual.x, actual.y].map(format_number);
         let place = RichText::new(format!("x {x}, y {y} mm")).size(type_size().note);

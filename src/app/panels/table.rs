@@ -17,6 +17,8 @@ pub struct Column {
 /// A named row with one cell for each column.
 pub struct Row {
     pub name: &'static str,
+    /// What it is, under the pointer; empty for nothing.
+    pub meaning: &'static str,
     pub cells: Vec<String>,
     pub colour: Color32,
     pub is_strong: bool,
@@ -65,7 +67,10 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
             ui,
             &mut |ui, at, rect| match at.checked_sub(1) {
                 None => {
-                    cell_ui(ui, rect, Align::Min, text(&capitalised(row.name)));
+                    let response = cell_ui(ui, rect, Align::Min, text(&capitalised(row.name)));
+                    if !row.meaning.is_empty() {
+                        response.on_hover_text(row.meaning);
+                    }
                 }
                 Some(at) => {
                     let (heading, cell) = (columns[at].heading, &row.cells[at]);

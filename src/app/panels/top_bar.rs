@@ -73,16 +73,15 @@ fn theme_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     } else {
         ("Dark", "Switch to the dark theme")
     };
-    let button = ui.add(ghost_button(Theme::of(ui), text)).on_hover_text(label);
+    let button = ui.add(ghost_button(text)).on_hover_text(label);
     if button.clicked() {
         actions.push(Action::SetDark(!is_dark));
     }
 }
 
 fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
     let is_busy = state.phase.is_busy();
-    let stop = ui.add_enabled(is_busy, ghost_button(theme, "■ Stop"));
+    let stop = ui.add_enabled(is_busy, ghost_button("■ Stop"));
     if stop
         .on_hover_text("End the training; the best network so far stays (Ctrl+.)")
         .clicked()
@@ -97,14 +96,14 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     };
     let can_pause = matches!(state.phase, Phase::Training | Phase::Paused);
     if ui
-        .add_enabled(can_pause, ghost_button(theme, text))
+        .add_enabled(can_pause, ghost_button(text))
         .on_hover_text("Hold the training, or go on (Ctrl+P)")
         .clicked()
     {
         actions.push(action);
     }
     let can_train = !is_busy && state.phase != Phase::Died;
-    let train = ui.add_enabled(can_train, primary_button(theme, "▶ Train"));
+    let train = ui.add_enabled(can_train, primary_button("▶ Train"));
     let can_continue = state.can_continue();
     let hint = if can_continue {
         "Begin anew: draw the sets and train the network (Ctrl+Enter)"
@@ -117,7 +116,7 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     if can_continue {
         let hint = "Go on from the present weights with the method and the epochs on the left, counted from here; Train \
                     begins anew";
-        let go_on = ui.add(ghost_button(theme, "Continue"));
+        let go_on = ui.add(ghost_button("Continue"));
         if go_on.on_hover_text(hint).clicked() {
             actions.push(Action::Continue);
         }

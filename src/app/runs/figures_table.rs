@@ -61,6 +61,7 @@ pub fn figures_ui(ui: &mut Ui, runs: &RunsState) {
     let colour = Theme::of(ui).palette.text;
     let row = |(name, figure): &(&'static str, FigureOf)| Row {
         name,
+        meaning: "",
         cells: (0..2)
             .map(|place| runs.pinned(place).map_or_else(|| format_number(None), figure))
             .collect(),

@@ -2,7 +2,7 @@
 
 use eframe::egui::{
     self, Align, Button, Color32, CornerRadius, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea,
-    Sense, Stroke, Ui, UiBuilder, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
+    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
 };
 
 use super::Theme;
@@ -50,20 +50,50 @@ pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
 }
 
 /// The one button that matters most.
-pub fn primary_button(theme: &Theme, text: impl Into<String>) -> Button<'static> {
-    let text = RichText::new(text)
-        .font(semibold(type_size().body))
-        .color(theme.palette.on_accent);
-    Button::new(text)
-        .fill(theme.palette.accent)
-        .min_size(vec2(0.0, space(7)))
+#[must_use = "a button shows only where it is added"]
+pub struct PrimaryButton {
+    text: String,
+    min_size: Vec2,
+}
+
+impl PrimaryButton {
+    /// At least this large.
+    pub fn min_size(mut self, min_size: Vec2) -> Self {
+        self.min_size = min_size;
+        self
+    }
+}
+
+impl Widget for PrimaryButton {
+    fn ui(self, ui: &mut Ui) -> Response {
+        let palette = Theme::of(ui).palette;
+        let coloured = |ui: &mut Ui| {
+            let widgets = &mut ui.visuals_mut().widgets;
+            widgets.inactive.weak_bg_fill = palette.accent;
+            widgets.hovered.weak_bg_fill = palette.accent_hovered;
+            widgets.active.weak_bg_fill = palette.accent_hovered;
+            // On the accent its own colour could not be seen.
+            widgets.active.bg_stroke.color = palette.text;
+            let text = RichText::new(self.text)
+                .font(semibold(type_size().body))
+                .color(palette.on_accent);
+            ui.add(Button::new(text).min_size(self.min_size))
+        };
+        ui.scope(coloured).inner
+    }
+}
+
+/// The one button that matters most.
+pub fn primary_button(text: impl Into<String>) -> PrimaryButton {
+    PrimaryButton {
+        text: text.into(),
+        min_size: vec2(0.0, space(7)),
+    }
 }
 
 /// A button as high as [`primary_button`], in the colour of controls.
-pub fn ghost_button(theme: &Theme, text: impl Into<WidgetText>) -> Button<'static> {
-    Button::new(text.into())
-        .fill(theme.palette.raised)
-        .min_size(vec2(0.0, space(7)))
+pub fn ghost_button(text: impl Into<WidgetText>) -> Button<'static> {
+    Button::new(text.into()).min_size(vec2(0.0, space(7)))
 }
 
 /// A tinted note: something the user should weigh.
@@ -109,6 +139,18 @@ pub fn segmented_ui<T: Copy + PartialEq>(
     selected: T,
     fill_width: bool,
 ) -> Option<T> {
+    let options: Vec<_> = options.iter().map(|&(option, text)| (option, text, "")).collect();
+    explained_options_ui(ui, label, &options, selected, fill_width)
+}
+
+/// As [`segmented_ui`], each option with its meaning, which shows under the pointer.
+pub fn explained_options_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    label: &str,
+    options: &[(T, &str, &str)],
+    selected: T,
+    fill_width: bool,
+) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let padding = 2.0;
     let width = (ui.available_width() - 2.0 * padding) / options.len().max(1) as f32;
@@ -124,14 +166,18 @@ pub fn segmented_ui<T: Copy + PartialEq>(
             ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
             ui.horizontal(|ui| {
-                for &(option, text) in reading_order(ui, options) {
+                for &(option, text, meaning) in reading_order(ui, options) {
                     let is_selected = option == selected;
                     let min_width = if fill_width { width.floor() } else { 0.0 };
                     let button = Button::selectable(is_selected, text)
                         .frame_when_inactive(true)
                         .corner_radius(radius() - 1)
                         .min_size(vec2(min_width, space(6)));
-                    let clicked = ui.add(button).clicked();
+                    let mut response = ui.add(button);
+                    if !meaning.is_empty() {
+                        response = response.on_hover_text(meaning);
+                    }
+                    let clicked = response.clicked();
                     if clicked && !is_selected {
                         picked = Some(option);
                     }

@@ -21,6 +21,8 @@ pub struct Palette {
     pub dim: Color32,
     /// What is selected, the network's own result, the one primary button.
     pub accent: Color32,
+    /// The primary button under the pointer.
+    pub accent_hovered: Color32,
     /// Text on the accent.
     pub on_accent: Color32,
     /// Behind a selected option: the accent, mixed into the raised colour.
@@ -54,6 +56,7 @@ impl Palette {
         text: Color32::from_rgb(0xe7, 0xea, 0xf0),
         dim: Color32::from_rgb(0x98, 0xa2, 0xb3),
         accent: Color32::from_rgb(0x5b, 0x9d, 0xff),
+        accent_hovered: Color32::from_rgb(0x85, 0xb6, 0xff),
         on_accent: Color32::from_rgb(0x0b, 0x12, 0x20),
         selected: Color32::from_rgb(0x2a, 0x3d, 0x5b),
         good: Color32::from_rgb(0x4c, 0xc3, 0x8a),
@@ -82,6 +85,7 @@ impl Palette {
         text: Color32::from_rgb(0x1b, 0x24, 0x30),
         dim: Color32::from_rgb(0x5b, 0x64, 0x72),
         accent: Color32::from_rgb(0x1f, 0x6f, 0xeb),
+        accent_hovered: Color32::from_rgb(0x45, 0x8a, 0xf5),
         on_accent: Color32::from_rgb(0xff, 0xff, 0xff),
         selected: Color32::from_rgb(0xd6, 0xe4, 0xfa),
         good: Color32::from_rgb(0x1a, 0x7f, 0x4b),

@@ -95,7 +95,7 @@ fn marked_ui(ui: &mut Ui, state: &State, marked: usize, point: &TradePoint, acti
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let can_load = !state.phase.is_busy();
-            let load = ui.add_enabled(can_load, ghost_button(Theme::of(ui), "Load into Train view"));
+            let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
             if load
                 .on_hover_text("Take its sensor, scene and network settings for the next training")
                 .on_disabled_hover_text("A training is under way there: its settings cannot change now")

@@ -122,11 +122,10 @@ fn meaning(kind: DecoderKind) -> &'static str {
 }
 
 fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
-        let measure = primary_button(theme, "▶ Measure").min_size(size);
+        let measure = primary_button("▶ Measure").min_size(size);
         let measure = ui.add_enabled(can_measure(state), measure);
         let why_not = if !is_quiet(state) {
             "A training or an experiment is under way: it would disturb the times"
@@ -142,7 +141,7 @@ fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
         {
             actions.push(TradeAction::Measure.into());
         }
-        let cancel = ghost_button(theme, "■ Cancel").min_size(size);
+        let cancel = ghost_button("■ Cancel").min_size(size);
         let cancel = ui.add_enabled(state.trade.running.is_some(), cancel);
         if cancel
             .on_hover_text("End it; what is measured stays (Ctrl+.)")

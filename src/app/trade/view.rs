@@ -96,7 +96,7 @@ fn level_ui(ui: &mut Ui, trade: &TradeState, outcome: &TradeOutcome, actions: &m
 
 fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, actions: &mut Vec<Action>) {
     ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
-        let button = MenuButton::from_button(ghost_button(Theme::of(ui), "Export"));
+        let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
             ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
             for file in TradeFile::ALL {

@@ -1,0 +1,162 @@
+use eframe::egui::{CollapsingHeader, RichText, Ui};
+
+use super::DecoderResult;
+use crate::{
+    app::{
+        action::Action,
+        panels::{Column, Row, fields::capitalised, table_ui},
+        state::{Phase, State},
+        theme::{Theme, note_ui, space, type_size},
+    },
+    evaluation::{DecoderKind, DecoderReport, Errors, Precision},
+    export::format_number,
+};
+
+const TIMES_LIMIT: &str = "× limit";
+
+const COLUMNS: [Column; 4] = [
+    Column {
+        heading: "Z %",
+        meaning: "AveZerr on the test set: mean |error| of z in percent of the coordinate z",
+    },
+    Column {
+        heading: TIMES_LIMIT,
+        meaning: "Mean |error| of z over that of the Bayesian reference, below which no decoder comes",
+    },
+    Column {
+        heading: "residual",
+        meaning: "How far the readings are from those of the answer: root mean square of the relative difference. It \
+                  needs no ground truth, so a real sensor has it too: as large as the noise is good, larger is doubtful.",
+    },
+    Column {
+        heading: "µs",
+        meaning: "Time to decode a frame, all rows read at one moment, on one thread: the median of many",
+    },
+];
+
+/// The other decoders on the same test set, folded away until the user asks for them.
+pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actions: &mut Vec<Action>) {
+    let decoders = &state.decoders;
+    ui.add_space(space(1));
+    let header = CollapsingHeader::new("More decoders")
+        .open(Some(decoders.is_open))
+        .show(ui, |ui| {
+            if let Some(measured) = &decoders.measured {
+                measured_ui(ui, measured, reference);
+            } else {
+                let text = match state.phase {
+                    Phase::Died => "The network was lost with the training thread: train again.",
+                    _ => "They are measured when the training is paused or has ended.",
+                };
+                dim_ui(ui, text);
+            }
+        });
+    let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, time, and \
+                distance from what is possible";
+    if header.header_response.on_hover_text(hint).clicked() {
+        actions.push(Action::ShowDecoders(!decoders.is_open));
+    }
+}
+
+fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Errors>) {
+    let palette = Theme::of(ui).palette;
+    // Without noise there is no limit, and nothing to be compared with it.
+    let limit = reference.filter(|limit| limit.z_mm > 0.0);
+    let columns: Vec<Column> = COLUMNS
+        .into_iter()
+        .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
+        .collect();
+    let rows = measured.iter().map(|result| Row {
+        name: name(result),
+        meaning: meaning(result.kind),
+        cells: match &result.report {
+            None => vec!["…".to_owned(); columns.len()],
+            Some(Err(_)) => vec![format_number(None); columns.len()],
+            Some(Ok(report)) => figures(report, limit),
+        },
+        colour: if result.kind == DecoderKind::Network {
+            palette.accent
+        } else {
+            palette.text
+        },
+        is_strong: false,
+    });
+    let of_limit = limit.map(|limit| Row {
+        name: "limit",
+        meaning: REFERENCE,
+        cells: [limit.z_percent, Some(1.0), None, None].map(format_number).to_vec(),
+        colour: palette.dim,
+        is_strong: false,
+    });
+    let rows: Vec<Row> = rows.chain(of_limit).collect();
+    ui.scope(|ui| table_ui(ui, &columns, &rows));
+    for result in measured {
+        if let Some(Err(reason)) = &result.report {
+            note_ui(ui, &format!("{}: {reason}", capitalised(name(result))));
+        }
+    }
+}
+
+/// What the reference row is.
+pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
+                             loading, with Eq. (2) linearised at the truth. On average no decoder comes below it.";
+
+/// In the order of [`COLUMNS`], without the ratio where there is no limit.
+fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
+    let ratio = limit.map(|limit| Some(report.errors.z_mm / limit.z_mm));
+    let figures = [Some(report.errors.z_percent)].into_iter().chain([
+        ratio,
+        Some(Some(report.residual)),
+        Some(Some(report.frame_us)),
+    ]);
+    figures.flatten().map(format_number).collect()
+}
+
+fn name(result: &DecoderResult) -> &'static str {
+    match (result.kind, result.precision) {
+        (DecoderKind::Mean, _) => "mean",
+        (DecoderKind::Ridge, _) => "ridge map",
+        (DecoderKind::Network, Precision::Double) => "network f64",
+        (DecoderKind::Network, Precision::Single) => "network f32",
+        (DecoderKind::RadialBasis, _) => "radial basis",
+        (DecoderKind::Newton, _) => "Newton",
+        (DecoderKind::Polish, _) => "polished",
+    }
+}
+
+fn meaning(kind: DecoderKind) -> &'static str {
+    match kind {
+        DecoderKind::Mean => "Always the mean of the training set",
+        DecoderKind::Ridge => "The best affine map of the inputs chosen on the left, ridge-regularised",
+        DecoderKind::Network => "The trained network, computed with so many bits",
+        DecoderKind::RadialBasis => "A radial-basis network: Gaussians around centres among the training samples",
+        DecoderKind::Newton => {
+            "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior"
+        }
+        DecoderKind::Polish => "The network's answer, improved by at most three of Newton's steps",
+    }
+}
+
+fn dim_ui(ui: &mut Ui, text: &str) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(text).size(type_size().note).color(dim));
+}
+
+#[cfg(test)]
+mod tests {
+    use egui_kittest::{Harness, kittest::Queryable as _};
+
+    use super::*;
+
+    #[test]
+    fn a_decoder_that_fails_says_why_and_the_others_stand() {
+        let mut state = State::new(true);
+        state.decoders.is_open = true;
+        state.decoders.measured = Some(DecoderResult::pending());
+        state.decoders.take(0, Err("no resistance at rest".to_owned()));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        harness.get_by_label("Mean: no resistance at rest");
+        harness.get_by_label("mean, Z %: –");
+        harness.get_by_label("Newton, Z %: …");
+    }
+}

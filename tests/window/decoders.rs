@@ -1,0 +1,128 @@
+//! The table of other decoders.
+
+use decoupler::{
+    app::DecoderResult,
+    evaluation::{DecoderSet, Run, RunSettings},
+    export::format_number,
+    scene::{Noise, Rows},
+};
+use eframe::egui::{Key, Modifiers};
+
+use crate::{
+    configuring::choose_method,
+    driver::{Driver, small, trained},
+};
+
+const NAMES: [&str; 7] = [
+    "mean",
+    "ridge map",
+    "network f64",
+    "network f32",
+    "radial basis",
+    "Newton",
+    "polished",
+];
+
+/// Waits until every decoder is measured.
+fn wait_for_all(driver: &mut Driver) {
+    driver.wait("all decoders", |driver| {
+        let decoders = &driver.state().decoders;
+        decoders.measured.is_some() && !decoders.is_measuring()
+    });
+}
+
+/// What does not depend on the clock in the table that is unfolded.
+fn table(driver: &Driver) -> Vec<String> {
+    let texts = driver.texts();
+    let is_cell = |text: &String| NAMES.iter().any(|name| text.starts_with(&format!("{name}, ")));
+    let is_time = |text: &String| text.contains(", µs: ");
+    texts
+        .into_iter()
+        .filter(|text| is_cell(text) && !is_time(text))
+        .collect()
+}
+
+/// The same from the library.
+fn table_of(run: &Run) -> Vec<String> {
+    let set = DecoderSet::of_run(run).unwrap();
+    let limit = run.baselines().reference.filter(|limit| limit.z_mm > 0.0);
+    let of_decoder = |(wanted, name): (DecoderResult, &str)| {
+        let report = set.measure(wanted.kind, wanted.precision, run.test()).unwrap().unwrap();
+        let ratio = limit.map(|limit| report.errors.z_mm / limit.z_mm);
+        let figures = [
+            Some(("Z %", report.errors.z_percent)),
+            ratio.map(|ratio| ("× limit", Some(ratio))),
+            Some(("residual", Some(report.residual))),
+        ];
+        let cell = |(heading, value)| format!("{name}, {heading}: {}", format_number(value));
+        figures.into_iter().flatten().map(cell).collect::<Vec<_>>()
+    };
+    DecoderResult::pending()
+        .into_iter()
+        .zip(NAMES)
+        .flat_map(of_decoder)
+        .collect()
+}
+
+fn noisy() -> RunSettings {
+    let mut settings = small();
+    settings.scene.rows = Rows::Known;
+    settings.scene.noise = Noise::relative(1e-3);
+    settings
+}
+
+#[test]
+fn the_decoders_figures_are_the_librarys() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    assert!(table(&driver).is_empty(), "folded away until asked for");
+    driver.click("More decoders");
+    wait_for_all(&mut driver);
+    assert_eq!(table(&driver), table_of(&trained(small())));
+    let times = driver.texts().into_iter().filter(|text| text.contains(", µs: "));
+    let times: Vec<String> = times.filter(|text| !text.starts_with("limit")).collect();
+    assert!(
+        times.len() == NAMES.len() && times.iter().all(|text| !text.ends_with('–')),
+        "{times:?}"
+    );
+    driver.settle();
+
+    // The next training is measured by itself, once it has ended.
+    driver.click_button("Known");
+    driver.click("Noise on resistance");
+    driver.enter("Relative noise", "0.1");
+    assert_eq!(driver.state().draft, noisy());
+    driver.train();
+    wait_for_all(&mut driver);
+    assert_eq!(table(&driver), table_of(&trained(noisy())));
+    driver.click("More decoders");
+    assert!(table(&driver).is_empty());
+    driver.settle();
+}
+
+#[test]
+fn a_training_under_way_is_not_measured_before_it_stands_still() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    driver.click("More decoders");
+    wait_for_all(&mut driver);
+    choose_method(&mut driver, "Momentum, Eq. (11)");
+    driver.enter("Epochs", "1000000");
+    driver.click("▶ Train");
+    driver.wait_for_epochs(2);
+    assert_eq!(driver.state().decoders.measured, None);
+    assert!(driver.has("They are measured when the training is paused or has ended."));
+    driver.press_with(Modifiers::COMMAND, Key::P);
+    wait_for_all(&mut driver);
+    assert_eq!(table(&driver).len(), 2 * NAMES.len());
+    driver.press_with(Modifiers::COMMAND, Key::P);
+    assert_eq!(
+        driver.state().decoders.measured,
+        None,
+        "the network is another one from now on"
+    );
+    driver.press_with(Modifiers::COMMAND, Key::Period);
+    wait_for_all(&mut driver);
+}

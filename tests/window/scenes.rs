@@ -1,0 +1,328 @@
+//! Scenes, inputs and presets in the window, and files written before there were scenes.
+
+use std::{fs, path::Path};
+
+use decoupler::{
+    app::Phase,
+    evaluation::{Outlook, Preset, RunSettings},
+    export::format_number,
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
+    training::StoppingRules,
+};
+
+use crate::driver::{Driver, small, table_of, trained};
+
+/// Picks an option of a list.
+fn choose(driver: &mut Driver, list: &str, option: &str) {
+    driver.click(list);
+    driver.click_button(option);
+}
+
+/// Waits until the test set of the draft is on show.
+fn wait_for_scene(driver: &mut Driver) {
+    driver.wait("the scene's test set", |driver| {
+        let (state, draft) = (driver.state(), driver.state().draft);
+        let shown = match (&state.preview, &state.run) {
+            (Some(preview), _) => Some(preview.settings),
+            (None, run) => run.as_ref().map(|run| run.settings),
+        };
+        shown.is_some_and(|shown| (shown.sensor, shown.scene) == (draft.sensor, draft.scene))
+    });
+}
+
+#[test]
+fn known_rows_train_one_small_network_for_each_row() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    assert!(driver.has("60 unknowns, 180 equations a frame"));
+    assert!(driver.has("18 inputs, 12 outputs, 198 weights"));
+    driver.click_button("Known");
+    // (18 + 1) · 6 + (6 + 1) · 6: x of a known row does not vary.
+    assert!(driver.has("10 networks of 18 inputs, 6 outputs and 156 weights: 1560 in all"));
+    wait_for_scene(&mut driver);
+    driver.train();
+    let mut settings = small();
+    settings.scene.rows = Rows::Known;
+    let run = trained(settings);
+    assert_eq!(run.network().each().len(), 10);
+    assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
+    assert_eq!(driver.table(), table_of(&run));
+    assert!(driver.has("Decoupled surface"));
+    driver.settle();
+}
+
+#[test]
+fn one_row_is_all_that_is_drawn() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click_button("One");
+    driver.enter("Row", "4");
+    assert_eq!(driver.state().draft.scene.rows, Rows::One(3));
+    assert!(driver.has("6 unknowns, 18 equations a frame"));
+    wait_for_scene(&mut driver);
+    assert_eq!(driver.state().frames.actual.nodes_mm.len(), 6);
+    assert!(driver.has("1 of 100"), "a snapshot is one sample");
+    driver.train();
+    let mut settings = small();
+    settings.scene.rows = Rows::One(3);
+    assert_eq!(driver.table(), table_of(&trained(settings)));
+    driver.click("Show");
+    for tab in ["Nodes", "Histogram", "Regression"] {
+        driver.click(tab);
+        driver.settle();
+    }
+    driver.click_button("Top view");
+    driver.settle();
+    assert!(driver.has("Decoupled surface"));
+
+    // A smaller array has a last row too.
+    driver.enter("Array scale", "2x3_2x9");
+    assert_eq!(driver.state().draft.scene.rows, Rows::One(1));
+    wait_for_scene(&mut driver);
+    driver.settle();
+}
+
+#[test]
+fn noise_inputs_and_scaling_reach_the_librarys_settings() {
+    let mut driver = Driver::open();
+    driver.click("Noise on resistance");
+    assert!(!driver.has("Noise in"), "it means nothing without noise");
+    driver.enter("Relative noise", "0.1");
+    driver.enter("Additive noise", "0.25");
+    driver.enter("Converter bits", "14");
+    driver.enter("Drift", "0.7");
+    driver.click_button("Test");
+    choose(&mut driver, "Inputs", "Log-resistance");
+    driver.click_button("Whitening");
+    let draft = driver.state().draft;
+    let noise = Noise {
+        relative: 0.001,
+        additive_ohm: 0.25,
+        converter_bits: Some(14),
+        drift: 0.007,
+        sets: NoisySets::Test,
+    };
+    assert_eq!(draft.scene.noise, noise);
+    let inputs = InputChoice {
+        quantity: Quantity::LogResistance,
+        scaling: ScalingChoice::Whitening,
+    };
+    assert_eq!(draft.inputs, inputs);
+    let scene = Scene {
+        noise,
+        ..Scene::default()
+    };
+    let paper = RunSettings::default();
+    assert_eq!(
+        draft,
+        RunSettings { scene, inputs, ..paper },
+        "and nothing else changed"
+    );
+    driver.click("Noise on resistance");
+    assert!(driver.has("0.1 % relative, 0.25 Ω, 14 bits, 0.7 % drift, in test only"));
+    assert!(!driver.has("Published"), "the paper's figures are of another scene");
+}
+
+#[test]
+fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click("Noise on resistance");
+    driver.enter("Relative noise", "0.1");
+    driver.enter("Training samples", "2000");
+    driver.enter("Epochs", "40");
+    driver.click_button("Whitening");
+    wait_for_scene(&mut driver);
+    driver.train();
+    let mut settings = small();
+    settings.scene.noise = Noise::relative(0.001);
+    (settings.samples, settings.training.stopping.epochs) = (2000, 40);
+    settings.inputs.scaling = ScalingChoice::Whitening;
+    let run = trained(settings);
+    assert_eq!(driver.table(), table_of(&run));
+    let limit = run.baselines().reference.unwrap();
+    assert!(limit.z_mm > 0.0);
+    let ratio = run.decouple_test().1.z_mm / limit.z_mm;
+    let said = format!("{} times the limit that noise sets", format_number(ratio));
+    assert!(driver.says(&said), "{said}: {:#?}", driver.texts());
+}
+
+#[test]
+fn only_the_settings_of_what_is_chosen_are_shown() {
+    let mut driver = Driver::open();
+    let shows = |driver: &Driver, names: &[&str]| {
+        for name in [
+            "Row",
+            "Largest shift",
+            "Correlation length",
+            "Shape",
+            "Radius from",
+            "Radius to",
+            "Largest tilt",
+            "Spread",
+        ] {
+            assert_eq!(driver.has(name), names.contains(&name), "{name}");
+        }
+    };
+    shows(&driver, &[]);
+    choose(&mut driver, "Loading", "Smooth field");
+    shows(&driver, &["Correlation length"]);
+    driver.enter("Correlation length", "6.5");
+    let correlation_length_mm = 6.5;
+    assert_eq!(
+        driver.state().draft.scene.loading,
+        Loading::SmoothField { correlation_length_mm }
+    );
+    choose(&mut driver, "Loading", "Indenter");
+    shows(&driver, &["Shape", "Radius from", "Radius to", "Spread"]);
+    assert_eq!(
+        driver.state().draft.scene.loading,
+        Loading::Indenter(Indenter::default())
+    );
+    choose(&mut driver, "Shape", "Cylinder");
+    shows(
+        &driver,
+        &["Shape", "Radius from", "Radius to", "Largest tilt", "Spread"],
+    );
+    driver.enter("Radius from", "8");
+    driver.enter("Largest tilt", "12");
+    let Loading::Indenter(indenter) = driver.state().draft.scene.loading else {
+        panic!("{:?}", driver.state().draft.scene)
+    };
+    let (smallest, largest) = (8.0, 8.0);
+    let cylinder = IndenterShape::Cylinder {
+        radius_mm: Span { smallest, largest },
+        largest_tilt_degrees: 12.0,
+    };
+    assert_eq!(indenter.shape, cylinder, "the largest radius follows the smallest");
+    choose(&mut driver, "Shape", "Edge");
+    shows(&driver, &["Shape", "Largest tilt", "Spread"]);
+    choose(&mut driver, "Loading", "Random nodes");
+    driver.click_button("One");
+    driver.click_button("x, y, z");
+    shows(&driver, &["Row", "Largest shift"]);
+    driver.click_button("All");
+    driver.click_button("z");
+    assert_eq!(driver.state().draft, RunSettings::default());
+    wait_for_scene(&mut driver);
+    driver.settle();
+}
+
+#[test]
+fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
+    let mut driver = Driver::open();
+    driver.click("10×6");
+    driver.enter("Hidden nodes", "7");
+    driver.click_button("x, y, z");
+    let before = driver.state().draft;
+    driver.click_button("Best");
+    let draft = driver.state().draft;
+    let best = Preset::Best.settings();
+    assert_eq!(
+        (draft.inputs, draft.samples, draft.training),
+        (best.inputs, best.samples, best.training)
+    );
+    assert_eq!((draft.sensor, draft.hidden), (before.sensor, 7));
+    assert_eq!(
+        (draft.scene.rows, draft.scene.movement),
+        (Rows::Known, Movement::SIDEWAYS)
+    );
+
+    // With noise the best network needs more samples, and the preset says so.
+    driver.click("Noise on resistance");
+    driver.enter("Relative noise", "0.1");
+    let noisy = Preset::Best.settings_in(Noise::relative(0.001));
+    assert_ne!(noisy.samples, best.samples);
+    assert_eq!(driver.state().draft.samples, noisy.samples);
+    let StoppingRules { epochs, .. } = driver.state().draft.training.stopping;
+    assert_eq!(epochs, noisy.training.stopping.epochs);
+    driver.enter("Relative noise", "0");
+    assert_eq!(driver.state().draft, draft);
+
+    // Who has samples of their own keeps them.
+    driver.enter("Training samples", "300");
+    driver.enter("Relative noise", "0.1");
+    assert_eq!(driver.state().draft.samples, 300);
+    driver.enter("Relative noise", "0");
+    driver.click_button("Paper");
+    assert_eq!(driver.state().draft, before);
+    wait_for_scene(&mut driver);
+}
+
+#[test]
+fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    let condition = |driver: &Driver| {
+        let texts = driver.texts();
+        let text = texts.iter().find(|text| text.starts_with("Condition number"));
+        text.unwrap().clone()
+    };
+    let of = |settings: &RunSettings| {
+        let outlook = Outlook::of(settings).unwrap();
+        let number = format_number(outlook.worst_row.condition());
+        format!("Condition number {number}")
+    };
+    assert_eq!(condition(&driver), of(&driver.state().draft));
+    assert!(!driver.says("badly conditioned"));
+    driver.click_button("x, y, z");
+    assert!(driver.has("180 unknowns, 180 equations a frame"));
+    wait_for_scene(&mut driver);
+    assert_eq!(condition(&driver), of(&driver.state().draft));
+    assert!(driver.says("even rounding blurs it"));
+    driver.train();
+    assert!(driver.says("This scene is badly conditioned (condition number"));
+    let table = driver.table();
+    let reference = table.iter().filter(|cell| cell.starts_with("reference"));
+    assert_eq!(reference.count(), 0, "nothing is known of a limit here: {table:?}");
+    for row in ["training mean", "linear map", "network"] {
+        let y = table.iter().find(|cell| cell.starts_with(&format!("{row}, Y %")));
+        assert!(
+            y.is_some_and(|cell| !cell.ends_with('–') && !cell.ends_with(" 0")),
+            "{table:?}"
+        );
+    }
+    for tab in ["Nodes", "Histogram", "Regression"] {
+        driver.click(tab);
+        driver.settle();
+    }
+    driver.click_button("Error");
+    driver.click_button("Top view");
+    driver.settle();
+    for text in driver.texts() {
+        let mut words = text.split(|letter: char| !letter.is_alphanumeric());
+        assert!(words.all(|word| word != "NaN" && word != "inf"), "{text}");
+    }
+}
+
+#[test]
+fn files_written_before_there_were_scenes_still_open() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let mut driver = Driver::open();
+    driver.click("Type the path of a checkpoint");
+    let checkpoint = fixtures.join("checkpoint_version_1.json");
+    driver.type_into("File", &checkpoint.display().to_string());
+    driver.click_button("Open");
+    driver.wait("the training", |driver| driver.state().run.is_some());
+    driver.wait("its result", |driver| driver.state().result().is_some());
+    let draft = driver.state().draft;
+    assert_eq!((draft.scene, draft.inputs), (Scene::default(), InputChoice::PAPER));
+    assert!(matches!(driver.state().phase, Phase::Paused | Phase::Ended(_)));
+    assert!(driver.has("Decoupled surface"));
+
+    let network = fs::read_to_string(fixtures.join("network_version_1.json")).unwrap();
+    let workspace = format!(
+        r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":1,"name":"Old","network":{network}}}],"pinned":[1,null]}}"#
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("workspace.json");
+    fs::write(&path, workspace).unwrap();
+    let mut driver = Driver::open_keeping(&path);
+    driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
+    assert_eq!(driver.state().notice, None);
+    let kept = &driver.state().runs.workspace.runs[0].file.settings;
+    assert_eq!((kept.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
+    driver.click_button("Compare");
+    driver.wait("its surface", |driver| driver.state().runs.compared[0].is_some());
+}
