@@ -11,7 +11,7 @@ use crate::{
         panels::fields::count_ui,
         state::State,
         theme::{
-            Theme, dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
+            dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
             segmented_ui, space,
         },
     },
