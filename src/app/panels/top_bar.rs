@@ -1,5 +1,5 @@
 use eframe::egui::{
-    Align, Button, Label, Layout, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
+    Align, Button, FontId, Label, Layout, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
 };
 
 use crate::app::{
@@ -147,8 +147,11 @@ fn snapshot_ui(ui: &mut Ui, shown: usize, snapshots: usize) -> Option<usize> {
     {
         picked = Some(shown - 1);
     }
-    if ui.available_width() > space(26) {
-        ui.label(RichText::new("Test snapshot").color(Theme::of(ui).palette.dim));
+    let dim = Theme::of(ui).palette.dim;
+    let font = FontId::proportional(type_size().body);
+    let galley = ui.painter().layout_no_wrap("Test snapshot".to_owned(), font, dim);
+    if ui.available_width() >= galley.size().x {
+        ui.label(RichText::new("Test snapshot").color(dim));
     }
     picked
 }

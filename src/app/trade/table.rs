@@ -31,7 +31,7 @@ enum Column {
 
 impl Column {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
-    const WIDTH: f32 = space(17);
+    const WIDTH: f32 = space(18);
 
     fn heading(self) -> &'static str {
         match self {
