@@ -56,7 +56,7 @@ impl Skin {
     fn view<'a>(&'a self, theme: &'a Theme, colours: Colours, mode: ViewMode) -> SurfaceView<'a> {
         let range_mm = match colours {
             Colours::Height => 4.0..=5.0,
-            Colours::Error => -0.25..=0.25,
+            _ => -0.25..=0.25,
         };
         SurfaceView {
             label: "Actual surface",

@@ -91,7 +91,9 @@ pub(crate) fn print() {
     };
     let inputs = Array2::from_shape_fn((1000, shape.inputs), |(row, column)| wave(row, column));
     let teacher = Mlp::from_weights(shape, (0..shape.weights()).map(|index| wave(index, 3)).collect());
-    let targets = teacher.forward(inputs.view());
+    // Not to be reached exactly: else the damping vanishes, and rounding decides the path of both.
+    let noise = Array2::from_shape_fn((1000, shape.outputs), |(row, output)| 0.1 * wave(row, 500 + output));
+    let targets = teacher.forward(inputs.view()) + noise;
     let start = Mlp::from_weights(shape, (0..shape.weights()).map(|index| 0.3 * wave(index, 1)).collect());
     let problem = Problem {
         training: Examples::new(inputs.view(), targets.view()),

@@ -4,11 +4,13 @@ use super::{
     experiments::ExperimentAction,
     export_kind::ExportKind,
     file_task::FileTask,
+    identifiability::IdentifiabilityAction,
     paper_figure::PaperFigure,
     runs::RunsAction,
     shown_figure::ShownPicture,
     state::{BottomTab, RightCard, View},
     surface_view::{OrbitCamera, ViewMode},
+    trade::TradeAction,
 };
 use crate::{
     evaluation::{NodeAddress, RunSettings},
@@ -48,6 +50,10 @@ pub enum Action {
     ShowView(View),
     /// Do this in the Experiments view.
     Experiments(ExperimentAction),
+    /// Do this in the Identifiability view.
+    Identifiability(IdentifiabilityAction),
+    /// Do this in the Trade-off view.
+    Trade(TradeAction),
     /// Whether each decoupled node has an error bar.
     ShowErrorBars(bool),
     /// Train what this figure of the paper shows, unless it is there, and look at it so.

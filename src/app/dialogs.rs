@@ -77,7 +77,7 @@ impl Dialogs {
         }
         let asked = Instant::now();
         let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match task {
-            FileTask::Save(_) | FileTask::SaveExperiment(..) | FileTask::SavePicture(_) => {
+            FileTask::Save(_) | FileTask::SaveExperiment(..) | FileTask::SaveTrade(_) | FileTask::SavePicture(_) => {
                 if let Some(name) = suggestion.file_name() {
                     dialog = dialog.set_file_name(name.to_string_lossy());
                 }

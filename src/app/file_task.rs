@@ -5,6 +5,7 @@ use super::{
     experiments::{ExperimentAction, ExperimentFile, Topic},
     export_kind::ExportKind,
     shown_figure::ShownPicture,
+    trade::{TradeAction, TradeFile},
 };
 use crate::export::figures::PictureFormat;
 
@@ -15,6 +16,8 @@ pub enum FileTask {
     Save(ExportKind),
     /// Write it about the results of an experiment.
     SaveExperiment(Topic, ExperimentFile),
+    /// Write it about the speed and accuracy measured.
+    SaveTrade(TradeFile),
     /// Write this picture in view to it.
     SavePicture(ShownPicture),
     /// Go on from the training saved in it.
@@ -25,7 +28,7 @@ impl FileTask {
     /// The word for it.
     pub fn verb(self) -> &'static str {
         match self {
-            Self::Save(_) | Self::SaveExperiment(..) | Self::SavePicture(_) => "Save",
+            Self::Save(_) | Self::SaveExperiment(..) | Self::SaveTrade(_) | Self::SavePicture(_) => "Save",
             Self::OpenCheckpoint => "Open",
         }
     }
@@ -35,6 +38,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.file_kind(),
             Self::SaveExperiment(_, file) => file.file_kind(),
+            Self::SaveTrade(file) => file.file_kind(),
             Self::SavePicture(ShownPicture::Surfaces) => "picture of the surfaces",
             Self::SavePicture(ShownPicture::Chart) => "picture of the chart",
             Self::OpenCheckpoint => ExportKind::Checkpoint.file_kind(),
@@ -46,6 +50,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.extension(),
             Self::SaveExperiment(_, file) => file.extension(),
+            Self::SaveTrade(file) => file.extension(),
             Self::SavePicture(_) => PictureFormat::Png.extension(),
             Self::OpenCheckpoint => ExportKind::Checkpoint.extension(),
         }
@@ -56,6 +61,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.name(),
             Self::SaveExperiment(_, file) => file.name(),
+            Self::SaveTrade(file) => file.name(),
             Self::SavePicture(ShownPicture::Surfaces) => "Surfaces, PNG or SVG…",
             Self::SavePicture(ShownPicture::Chart) => "Chart, PNG or SVG…",
             Self::OpenCheckpoint => "Open checkpoint…",
@@ -66,7 +72,9 @@ impl FileTask {
     pub fn path_name(self) -> String {
         let file = self.file_kind();
         match self {
-            Self::Save(_) | Self::SaveExperiment(..) | Self::SavePicture(_) => format!("Type a path for the {file}"),
+            Self::Save(_) | Self::SaveExperiment(..) | Self::SaveTrade(_) | Self::SavePicture(_) => {
+                format!("Type a path for the {file}")
+            }
             Self::OpenCheckpoint => format!("Type the path of a {file}"),
         }
     }
@@ -76,6 +84,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => kind.description(),
             Self::SaveExperiment(_, file) => file.description(),
+            Self::SaveTrade(file) => file.description(),
             Self::SavePicture(ShownPicture::Surfaces) => {
                 "Actual and decoupled surface as they are in view, for print: on a light ground, as PNG or SVG as the name \
                  ends."
@@ -95,6 +104,7 @@ impl FileTask {
         match self {
             Self::Save(kind) => Action::Export(kind, path),
             Self::SavePicture(picture) => Action::ExportPicture(picture, path),
+            Self::SaveTrade(file) => TradeAction::Save(file, path).into(),
             Self::SaveExperiment(topic, file) => ExperimentAction::Save(topic, file, path).into(),
             Self::OpenCheckpoint => Action::OpenCheckpoint(path),
         }

@@ -12,6 +12,7 @@ mod dialogs;
 mod experiments;
 mod export_kind;
 mod file_task;
+mod identifiability;
 mod open;
 mod panels;
 mod paper_figure;
@@ -22,6 +23,7 @@ mod state;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
+mod trade;
 mod window;
 mod worker;
 
@@ -36,10 +38,15 @@ pub use experiments::{
 };
 pub use export_kind::ExportKind;
 pub use file_task::FileTask;
+pub use identifiability::{Analysis, AnalysisError, IdentifiabilityAction, IdentifiabilityState, Question};
 pub use open::{OpenError, open};
 pub use paper_figure::PaperFigure;
 pub use runs::{Compared, PLACES, RunsAction, RunsState};
 pub use shown_figure::ShownPicture;
 pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
 pub use test_view::{Frame, TestView};
+pub use trade::{
+    Thoroughness, TradeAction, TradeEnding, TradeFile, TradeForm, TradeFormError, TradeLimits, TradeOutcome, TradePlan,
+    TradeRunning, TradeState, WhichPresets,
+};
 pub use window::DecouplerWindow;

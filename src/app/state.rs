@@ -7,9 +7,11 @@ use super::{
     experiments::ExperimentsState,
     export_kind::{ExportKind, file_name},
     file_task::FileTask,
+    identifiability::IdentifiabilityState,
     runs::RunsState,
     surface_view::{OrbitCamera, ViewMode},
     test_view::{Frame, TestView},
+    trade::TradeState,
     worker::{Began, Progress},
 };
 use crate::{
@@ -26,6 +28,10 @@ pub struct State {
     pub experiments: ExperimentsState,
     /// The run list and the Compare view.
     pub runs: RunsState,
+    /// The Identifiability view.
+    pub identifiability: IdentifiabilityState,
+    /// The Trade-off view.
+    pub trade: TradeState,
     /// Settings of the next training.
     pub draft: RunSettings,
     /// What the worker is doing.
@@ -58,6 +64,10 @@ pub enum View {
     Experiments,
     /// Two finished trainings side by side.
     Compare,
+    /// What readings can tell at all.
+    Identifiability,
+    /// What each way of decoding costs and gains.
+    TradeOff,
 }
 
 /// What the worker is doing.
@@ -291,6 +301,8 @@ impl State {
             view: View::default(),
             experiments: ExperimentsState::new(),
             runs: RunsState::default(),
+            identifiability: IdentifiabilityState::new(&RunSettings::default()),
+            trade: TradeState::default(),
             draft: RunSettings::default(),
             phase: Phase::Idle,
             preview: None,
@@ -385,6 +397,7 @@ impl State {
         let name = match task {
             FileTask::Save(kind) => kind.file_name(settings),
             FileTask::SaveExperiment(topic, file) => ExperimentsState::file_name(topic, file),
+            FileTask::SaveTrade(file) => file.file_name(),
             FileTask::SavePicture(picture) => file_name(picture.file_word(self), task.extension(), settings),
             FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
         };

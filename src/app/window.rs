@@ -7,12 +7,14 @@ use super::{
     decoders::DecoderMeasuring,
     dialogs::{Answer, DialogKind, Dialogs},
     experiments::{self, ExperimentWorker},
+    identifiability::{self, IdentifiabilityAction, IdentifiabilityWorker},
     panels,
     paper_figure::PaperFigure,
     runs::{self, RunsAction, RunsRequest, RunsWorker},
     shortcuts::pressed_shortcuts,
     state::{Notice, Phase, Preview, RightCard, RunView, Saving, State, View},
     theme::{self, Theme, space},
+    trade::{self, TradeWorker},
     worker::{Event, Request, Worker},
 };
 use crate::{evaluation::RunSettings, training::StopReason};
@@ -25,6 +27,8 @@ pub struct DecouplerWindow {
     experiments: ExperimentWorker,
     runs: RunsWorker,
     measuring: DecoderMeasuring,
+    identifiability: IdentifiabilityWorker,
+    trade: TradeWorker,
     dialogs: Dialogs,
     ctx: Context,
 }
@@ -49,6 +53,14 @@ impl DecouplerWindow {
                 RunsWorker::start(move || ctx.request_repaint())?
             },
             measuring: DecoderMeasuring::default(),
+            identifiability: {
+                let ctx = ctx.clone();
+                IdentifiabilityWorker::new(move || ctx.request_repaint())
+            },
+            trade: {
+                let ctx = ctx.clone();
+                TradeWorker::new(move || ctx.request_repaint())
+            },
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };
@@ -88,6 +100,8 @@ impl DecouplerWindow {
         experiments::take_news(&mut self.state, &self.experiments);
         runs::take_news(&mut self.state, &self.runs);
         self.measuring.take_news(&mut self.state.decoders);
+        identifiability::take_news(&mut self.state, &mut self.identifiability);
+        trade::take_news(&mut self.state, &self.trade);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
                 Answer::Chosen(task, path) => self.apply(task.at(path)),
@@ -288,7 +302,18 @@ impl DecouplerWindow {
                 state.typed = state.saving.take();
                 self.worker.ask(Request::Export(kind, path));
             }
-            Action::ShowView(view) => state.view = view,
+            Action::ShowView(view) => {
+                state.view = view;
+                if view == View::Identifiability {
+                    identifiability::enter(state, &mut self.identifiability);
+                }
+            }
+            Action::Identifiability(IdentifiabilityAction::UseSensor) => {
+                let settings = state.identifiability.hand_over(&state.draft);
+                state.view = View::Train;
+                self.configure(settings);
+            }
+            Action::Identifiability(action) => identifiability::apply(action, state, &mut self.identifiability),
             Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
             Action::ExportPicture(picture, path) => {
                 state.typed = state.saving.take();
@@ -303,6 +328,12 @@ impl DecouplerWindow {
                 }
             }
             Action::Runs(action) => runs::apply(action, state, &self.runs),
+            Action::Trade(action) => {
+                if let Some(settings) = trade::apply(action, state, &mut self.trade) {
+                    state.view = View::Train;
+                    self.configure(settings);
+                }
+            }
             Action::OpenCheckpoint(path) => {
                 state.typed = state.saving.take();
                 // A training may have begun while the desktop's dialog was open.
@@ -391,7 +422,8 @@ impl DecouplerWindow {
         let mut actions = match state.view {
             View::Train => pressed_shortcuts(ui.ctx(), state),
             View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
-            View::Compare => Vec::new(),
+            View::TradeOff => trade::pressed_shortcuts(ui.ctx(), state),
+            View::Compare | View::Identifiability => Vec::new(),
         };
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
@@ -420,6 +452,8 @@ impl DecouplerWindow {
                 match state.view {
                     View::Train | View::Compare => panels::status_line_ui(ui, state),
                     View::Experiments => experiments::status_ui(ui, &state.experiments),
+                    View::Identifiability => identifiability::status_ui(ui, &state.identifiability),
+                    View::TradeOff => trade::status_ui(ui, &state.trade),
                 };
             });
         Panel::left("configuration")
@@ -431,6 +465,8 @@ impl DecouplerWindow {
                     View::Train => panels::configuration_ui(ui, state),
                     View::Experiments => experiments::form_ui(ui, state),
                     View::Compare => runs::run_list_ui(ui, state),
+                    View::Identifiability => identifiability::form_ui(ui, state),
+                    View::TradeOff => trade::form_ui(ui, state),
                 });
             });
         if has_report_beside && is_training_view {
@@ -447,6 +483,8 @@ impl DecouplerWindow {
                 View::Train => panels::workbench_ui(ui, state, layout),
                 View::Experiments => experiments::experiments_ui(ui, state),
                 View::Compare => runs::compare_ui(ui, state),
+                View::Identifiability => identifiability::identifiability_ui(ui, state),
+                View::TradeOff => trade::trade_ui(ui, state),
             });
         });
         actions.extend(panels::save_form_ui(ui, state));

@@ -29,7 +29,7 @@ use crate::{
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
 /// between them in which the user is answered at once, also where frames are drawn without a graphics card.
-const REPORT_INTERVAL: Duration = Duration::from_millis(66);
+const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
@@ -183,11 +183,11 @@ impl Worker {
     }
 }
 
-/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about three times its
+/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about fifteen times its
 /// share, and training is not starved by other programs.
 pub(super) fn yield_to_window() {
     /// Of 0 to 99, where about 50 is normal.
-    const BELOW_NORMAL: u8 = 37;
+    const BELOW_NORMAL: u8 = 18;
     if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {
         // Where the system refuses, training merely competes with the window.
         let _ = ThreadPriority::Crossplatform(priority).set_for_current();

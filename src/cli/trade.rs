@@ -8,12 +8,12 @@ use super::{
     failure::Failure,
     interruption::Graceful,
     scene_arguments::SceneArguments,
-    trade_report::{Level, Limits, print_json, print_text},
+    trade_report::{Limits, print_json, print_text},
     training_arguments::number,
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Preset, RunSettings, measure_trade},
+    evaluation::{Preset, RunSettings, TradeLevel, measure_trade},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::StoppingRules,
@@ -84,7 +84,7 @@ impl Trade {
                 })?;
                 bar.inc(1);
             }
-            levels.push(Level { noise, points });
+            levels.push(TradeLevel { noise, points });
         }
         bar.finish_and_clear();
         drop(graceful);

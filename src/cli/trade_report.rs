@@ -7,16 +7,10 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use crate::{
-    evaluation::{RunSettings, TradePoint, fastest_under, most_accurate_under, pareto_front},
+    evaluation::{RunSettings, TradeCost, TradeLevel, TradePoint, fastest_under, most_accurate_under},
     export::{format_duration, format_number},
     sensor::ArrayScale,
 };
-
-/// The points at one level of noise.
-pub(super) struct Level {
-    pub(super) noise: f64,
-    pub(super) points: Vec<TradePoint>,
-}
 
 /// What choices are asked for.
 #[derive(Clone, Copy)]
@@ -25,13 +19,10 @@ pub(super) struct Limits {
     pub(super) microseconds: Option<f64>,
 }
 
-impl Level {
-    /// Whether each point is on the front of decoding time, and on that of training time.
-    fn fronts(&self) -> Vec<(bool, bool)> {
-        let front = |of: fn(&TradePoint) -> (f64, f64)| pareto_front(&self.points.iter().map(of).collect::<Vec<_>>());
-        let decoding = front(TradePoint::decoding).into_iter();
-        decoding.zip(front(TradePoint::training)).collect()
-    }
+/// Whether each point is on the front of decoding time, and on that of training time.
+fn fronts(level: &TradeLevel) -> Vec<(bool, bool)> {
+    let decoding = level.front(TradeCost::Decoding).into_iter();
+    decoding.zip(level.front(TradeCost::Training)).collect()
 }
 
 /// The command that trains this choice.
@@ -117,7 +108,7 @@ struct Choice {
 }
 
 /// The choices asked for: with their limit, the place of the point.
-fn choices(level: &Level, limits: Limits) -> [Option<Choice>; 2] {
+fn choices(level: &TradeLevel, limits: Limits) -> [Option<Choice>; 2] {
     let choice = |limit: Option<f64>, choose: fn(&[TradePoint], f64) -> Option<&TradePoint>| {
         let limit = limit?;
         let chosen = choose(&level.points, limit);
@@ -135,7 +126,7 @@ fn choices(level: &Level, limits: Limits) -> [Option<Choice>; 2] {
 }
 
 /// Prints one JSON object.
-pub(super) fn print_json(array: ArrayScale, levels: &[Level], limits: Limits) -> Result<(), Failure> {
+pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limits) -> Result<(), Failure> {
     let point = |(point, (on_decoding_front, on_training_front)): (&TradePoint, (bool, bool))| PointReport {
         preset: point.preset.to_string(),
         decoder: point.report.kind.to_string(),
@@ -156,11 +147,11 @@ pub(super) fn print_json(array: ArrayScale, levels: &[Level], limits: Limits) ->
         on_training_front,
         command: command(point),
     };
-    let level = |level: &Level| {
+    let level = |level: &TradeLevel| {
         let [fastest_under, most_accurate_under] = choices(level, limits);
         LevelReport {
             noise: level.noise,
-            points: level.points.iter().zip(level.fronts()).map(point).collect(),
+            points: level.points.iter().zip(fronts(level)).map(point).collect(),
             fastest_under,
             most_accurate_under,
         }
@@ -177,11 +168,11 @@ pub(super) fn print_json(array: ArrayScale, levels: &[Level], limits: Limits) ->
 }
 
 /// Prints a table for each level of noise.
-pub(super) fn print_text(array: ArrayScale, levels: &[Level], limits: Limits) -> Result<(), Failure> {
+pub(super) fn print_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits) -> Result<(), Failure> {
     write_text(array, levels, limits, &mut stdout().lock()).map_err(Failure::Output)
 }
 
-fn write_text(array: ArrayScale, levels: &[Level], limits: Limits, out: &mut impl Write) -> io::Result<()> {
+fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "{array}: time for a frame (one thread) and training time against the error of z"
@@ -196,7 +187,7 @@ fn write_text(array: ArrayScale, levels: &[Level], limits: Limits, out: &mut imp
     )
 }
 
-fn write_level(level: &Level, limits: Limits, out: &mut impl Write) -> io::Result<()> {
+fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::Result<()> {
     write!(out, "\nNoise {}", level.noise)?;
     if let Some(point) = level.points.first() {
         let reference = point.reference;
@@ -208,7 +199,7 @@ fn write_level(level: &Level, limits: Limits, out: &mut impl Write) -> io::Resul
         "\n{:<7}{:<13}{:>7}{:>12}{:>12}{:>13}{:>12}{:>12}",
         "preset", "decoder", "hidden", "Z %", "Z mm", "x reference", "us a frame", "training"
     )?;
-    for (point, (on_decoding_front, on_training_front)) in level.points.iter().zip(level.fronts()) {
+    for (point, (on_decoding_front, on_training_front)) in level.points.iter().zip(fronts(level)) {
         let hidden = point.hidden().map_or(String::new(), |hidden| hidden.to_string());
         let training = Duration::try_from_secs_f64(point.training_seconds).unwrap_or_default();
         writeln!(

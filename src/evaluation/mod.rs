@@ -17,6 +17,7 @@ mod start_trainer;
 mod starts;
 mod table;
 mod trade;
+mod trade_level;
 
 pub use decoder_set::{DecoderKind, DecoderKindError, DecoderReport, DecoderSet, Precision};
 pub use errors::{Errors, NodeAddress};
@@ -33,3 +34,4 @@ pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
 pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under, pareto_front};
+pub use trade_level::{TradeCost, TradeLevel};

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::{
-    experiment_points::{CellPoint, trial_points, z_points},
+    experiment_points::{CellPoint, repeat_name, trial_points, z_points},
     figures::{HeatMap, Hue, Marker, Picture, Plot, PlotAxis, PlotPoint, Series, Span},
 };
 use crate::{
@@ -182,14 +182,6 @@ fn repeats(results: &ExperimentResults) -> Plot {
         series,
         spans: Vec::new(),
         width_pt: Plot::WIDE_PT,
-    }
-}
-
-/// What the trials of a cross-validation are counted by.
-pub(crate) fn repeat_name(results: &ExperimentResults) -> &'static str {
-    match results.experiment.seeds {
-        1 => "repeat",
-        _ => "trial",
     }
 }
 

@@ -63,6 +63,14 @@ pub fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Erro
         .collect()
 }
 
+/// What the trials of a cross-validation are counted by.
+pub fn repeat_name(results: &ExperimentResults) -> &'static str {
+    match results.experiment.seeds {
+        1 => "repeat",
+        _ => "trial",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::num::NonZero;

@@ -189,7 +189,7 @@ fn figures_of_the_paper_are_one_click() {
 
 /// Types `path` into the form behind `button` and saves; waits for the answer.
 fn save(driver: &mut Driver, button: &str, path: &Path) {
-    driver.click(button);
+    driver.open_form(button);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the answer", |driver| driver.state().notice.is_some());

@@ -21,7 +21,7 @@ const OPEN: &str = "Type the path of a checkpoint";
 
 /// Types `path` into the form behind `button` and confirms.
 fn give_path(driver: &mut Driver, button: &str, path: &Path) {
-    driver.click(button);
+    driver.open_form(button);
     driver.type_into("File", &path.display().to_string());
     driver.click_button(if button == OPEN { "Open" } else { "Save" });
 }
@@ -53,7 +53,7 @@ fn start_endless(driver: &mut Driver) {
 /// Presses Pause and waits until the last epoch under way is shown.
 fn pause(driver: &mut Driver) {
     driver.click("⏸ Pause");
-    std::thread::sleep(std::time::Duration::from_millis(100));
+    std::thread::sleep(std::time::Duration::from_millis(500));
     driver.harness().run_steps(2);
     assert_eq!(driver.state().phase, Phase::Paused);
 }

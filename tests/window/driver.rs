@@ -181,6 +181,20 @@ impl Driver {
         self.harness.step();
     }
 
+    /// Clicks the button that asks for a path until the form is there: news from the worker may move it away from
+    /// under the pointer.
+    #[track_caller]
+    pub(crate) fn open_form(&mut self, button: &str) {
+        for _ in 0..5 {
+            self.click(button);
+            self.harness.run_steps(SCROLLING);
+            if self.has("File") {
+                return;
+            }
+        }
+        panic!("no form came; the window shows {:#?}", self.texts());
+    }
+
     /// Types `text` into the field labelled so, in place of what is there, and confirms with Enter.
     #[track_caller]
     pub(crate) fn enter(&mut self, label: &str, text: &str) {

@@ -23,7 +23,7 @@ fn trained_driver() -> Driver {
 
 /// Types `path` into the form behind `button` and saves; waits for the answer.
 fn save(driver: &mut Driver, button: &str, path: &Path) {
-    driver.click(button);
+    driver.open_form(button);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the answer", |driver| driver.state().notice.is_some());
@@ -126,11 +126,11 @@ fn a_form_is_closed_without_writing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("errors.csv").display().to_string();
     let mut driver = trained_driver();
-    driver.click(ERRORS);
+    driver.open_form(ERRORS);
     driver.type_into("File", &path);
     driver.click_button("Cancel");
     assert!(!driver.has("File"));
-    driver.click(ERRORS);
+    driver.open_form(ERRORS);
     driver.type_into("File", &path);
     driver.press(Key::Escape);
     assert!(!driver.has("File"));
@@ -138,7 +138,7 @@ fn a_form_is_closed_without_writing() {
     assert!(driver.state().notice.is_none());
     assert!(names(folder.path()).is_empty());
 
-    driver.click(ERRORS);
+    driver.open_form(ERRORS);
     driver.type_into("File", "  ");
     assert!(!driver.is_enabled("Save"), "a file needs a name");
     let (phase, shown) = (driver.state().phase, driver.state().look.snapshot);

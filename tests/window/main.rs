@@ -10,9 +10,11 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+mod identifying;
 mod looking;
 mod pictures;
 mod scenes;
+mod trading;
 mod training;
 
 #[path = "../support/mod.rs"]

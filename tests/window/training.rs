@@ -141,7 +141,7 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
     driver.click("⏸ Pause");
     driver.wait("the pause", |driver| driver.has("Paused"));
     // The epoch that was under way when the button was pressed.
-    thread::sleep(Duration::from_millis(100));
+    thread::sleep(Duration::from_millis(500));
     driver.harness().run_steps(2);
     let held = driver.epochs();
     for _ in 0..50 {

@@ -78,17 +78,26 @@ fn marks_of_step((low, high): (f64, f64), step_size: f64) -> Vec<GridMark> {
     marks.map(|value| GridMark { value, step_size }).collect()
 }
 
-/// Marks for a chart that draws the decimal logarithm: whole decades, 2 and 5 between them where there is room, and
-/// round numbers within less than a decade.
+/// Marks for an upright axis that shows the decimal logarithm: whole decades, 2 and 5 between them where there is room,
+/// and round numbers within less than a decade.
 pub fn log_marks(input: GridInput) -> Vec<GridMark> {
+    log_marks_apart(&input, NUMBER_HEIGHT)
+}
+
+/// As [`log_marks`] for an axis across.
+pub fn log_marks_across(input: GridInput) -> Vec<GridMark> {
+    log_marks_apart(&input, NUMBER_WIDTH)
+}
+
+fn log_marks_apart(input: &GridInput, apart: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     if !(low.is_finite() && high.is_finite() && high > low) {
         return Vec::new();
     }
     if high - low < 0.9 {
-        return marks_within_a_decade(input);
+        return marks_within_a_decade(input, apart);
     }
-    let line = value_of(NUMBER_HEIGHT, &input);
+    let line = value_of(apart, input);
     let has_room = 2.0_f64.log10() > line;
     let steps: &[f64] = if has_room { &[1.0, 2.0, 5.0] } else { &[1.0] };
     // So few decades that their numbers do not touch.
@@ -102,10 +111,10 @@ pub fn log_marks(input: GridInput) -> Vec<GridMark> {
     seen.map(|value| GridMark { value, step_size }).collect()
 }
 
-fn marks_within_a_decade(input: GridInput) -> Vec<GridMark> {
+fn marks_within_a_decade(input: &GridInput, apart: f64) -> Vec<GridMark> {
     let (low, high) = (10.0_f64.powf(input.bounds.0), 10.0_f64.powf(input.bounds.1));
     // The upper end is the more crowded one.
-    let number = high - 10.0_f64.powf(input.bounds.1 - value_of(NUMBER_HEIGHT, &input));
+    let number = high - 10.0_f64.powf(input.bounds.1 - value_of(apart, input));
     let parts = ((high - low) / number).clamp(1.0, MOST_MARKS) as usize;
     let step = step_for(&(low..=high), parts);
     let marks = multiples(&(low..=high), step).into_iter();

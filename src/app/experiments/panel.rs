@@ -1,4 +1,4 @@
-use eframe::egui::{Button, ComboBox, DragValue, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Button, ComboBox, DragValue, TextEdit, Ui, vec2};
 
 use super::{AxisForm, AxisKind, ExperimentAction, Form, Running, Topic};
 use crate::{
@@ -7,8 +7,8 @@ use crate::{
         panels::fields::{count_ui, field_ui},
         state::State,
         theme::{
-            Theme, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui, space,
-            type_size,
+            dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
+            segmented_ui, space,
         },
     },
     dataset::FoldUnit,
@@ -35,7 +35,9 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         let is_idle = experiments.running.is_none();
         ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, state));
         match experiments.checked() {
-            Ok(trials) => dim_ui(ui, &how_much(&form, *trials)),
+            Ok(trials) => {
+                dim_ui(ui, &how_much(&form, *trials));
+            }
             Err(problem) => {
                 ui.add_space(space(1));
                 note_ui(ui, problem);
@@ -62,11 +64,6 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         ui.add_space(space(4));
     });
     actions
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
 fn what_it_does(topic: Topic) -> &'static str {
@@ -230,18 +227,9 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
 }
 
 fn progress_ui(ui: &mut Ui, running: &Running) {
-    let palette = Theme::of(ui).palette;
     ui.add_space(space(1));
     let share = running.done as f32 / running.trials.max(1) as f32;
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), space(1)), eframe::egui::Sense::hover());
-    let radius = 0.5 * space(1);
-    ui.painter().rect_filled(rect, radius, palette.line);
-    let done = rect.with_max_x(rect.left() + share * rect.width());
-    ui.painter().rect_filled(done, radius, palette.accent);
-    response.widget_info(|| {
-        let label = format!("Experiment progress {:.0} %", 100.0 * share);
-        eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::ProgressIndicator, true, label)
-    });
+    progress_bar_ui(ui, "Experiment", share);
     let left = match running.time_left {
         Some(time) => format!("about {} left", format_duration(time)),
         None => "time left not known yet".to_owned(),

@@ -15,10 +15,7 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
     },
     evaluation::{Errors, experiments::CellSummary},
-    export::{
-        experiment_points::{CellPoint, trial_points, z_points},
-        repeat_name,
-    },
+    export::experiment_points::{CellPoint, repeat_name, trial_points, z_points},
     network::HiddenSuggestions,
 };
 

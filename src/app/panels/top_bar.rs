@@ -15,12 +15,17 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         mark_ui(ui);
-        ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
+        // The title of the window says it too: where there is little room the buttons go first.
+        if ui.available_width() > space(250) {
+            ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
+        }
         ui.add_space(space(4));
         let views = [
             (View::Train, "Train"),
             (View::Experiments, "Experiments"),
             (View::Compare, "Compare"),
+            (View::Identifiability, "Identifiability"),
+            (View::TradeOff, "Trade-off"),
         ];
         if let Some(view) = segmented_ui(ui, "View", &views, state.view, false) {
             actions.push(Action::ShowView(view));
@@ -35,7 +40,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                     let snapshots = state.test().map_or(0, |test| test.set.snapshots());
                     actions.extend(snapshot_ui(ui, state.look.snapshot, snapshots).map(Action::ShowSnapshot));
                 }
-                View::Experiments => {}
+                View::Experiments | View::Identifiability | View::TradeOff => {}
                 View::Compare => {
                     let picked = snapshot_ui(ui, state.runs.snapshot, state.runs.snapshots());
                     actions.extend(picked.map(|snapshot| RunsAction::ShowSnapshot(snapshot).into()));
@@ -142,7 +147,9 @@ fn snapshot_ui(ui: &mut Ui, shown: usize, snapshots: usize) -> Option<usize> {
     {
         picked = Some(shown - 1);
     }
-    ui.label(RichText::new("Test snapshot").color(Theme::of(ui).palette.dim));
+    if ui.available_width() > space(26) {
+        ui.label(RichText::new("Test snapshot").color(Theme::of(ui).palette.dim));
+    }
     picked
 }
 

@@ -12,6 +12,7 @@ use super::camera::OrbitCamera;
 use super::nodes::{self, Dot};
 use crate::app::theme::{ColourMap, Theme, type_size};
 use crate::app::ticks::tick_text;
+use crate::export::format_number;
 use crate::surface::Grid;
 
 /// What the values mean, and with it their colours.
@@ -21,13 +22,17 @@ pub enum Colours {
     Height,
     /// Errors, diverging about zero.
     Error,
+    /// A deformation pattern without a scale of its own, diverging about zero.
+    Pattern,
+    /// How much readings change with each node, in viridis.
+    Sensitivity,
 }
 
 impl Colours {
     pub(super) fn map(self, theme: &Theme) -> &ColourMap {
         match self {
-            Self::Height => &theme.heights,
-            Self::Error => &theme.errors,
+            Self::Height | Self::Sensitivity => &theme.heights,
+            Self::Error | Self::Pattern => &theme.errors,
         }
     }
 
@@ -36,6 +41,8 @@ impl Colours {
         match self {
             Self::Height => "z (mm)",
             Self::Error => "error (mm)",
+            Self::Pattern => "pattern",
+            Self::Sensitivity => "1/mm",
         }
     }
 }
@@ -169,12 +176,16 @@ impl SurfaceView<'_> {
                 .map(|node| node.z)
                 .filter(|height| height.is_finite());
             let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-            let quantity = match self.colours {
-                Colours::Height => "z",
-                Colours::Error => "error",
-            };
+            let millimetres = |value: f64| tick_text(value, 0.01);
             node.set_value(if low <= high {
-                format!("{quantity} {} to {} mm", tick_text(low, 0.01), tick_text(high, 0.01))
+                match self.colours {
+                    Colours::Height => format!("z {} to {} mm", millimetres(low), millimetres(high)),
+                    Colours::Error => format!("error {} to {} mm", millimetres(low), millimetres(high)),
+                    Colours::Pattern => format!("pattern {} to {}", format_number(low), format_number(high)),
+                    Colours::Sensitivity => {
+                        format!("sensitivity {} to {} per mm", format_number(low), format_number(high))
+                    }
+                }
             } else {
                 "no values".to_owned()
             });

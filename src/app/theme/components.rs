@@ -2,7 +2,7 @@
 
 use eframe::egui::{
     self, Align, Button, Color32, CornerRadius, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea,
-    Stroke, Ui, UiBuilder, Vec2, Widget, WidgetText, vec2,
+    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
 };
 
 use super::Theme;
@@ -265,6 +265,27 @@ fn name_group(ui: &Ui, id: Id, label: &str) {
         node.set_role(egui::accesskit::Role::Group);
         node.set_label(label);
     });
+}
+
+/// Text of second rank, in the size of notes.
+pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(text).size(type_size().note).color(dim))
+}
+
+/// How much is done, as a bar over the available width; `name` is what is being done.
+pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32) -> Response {
+    let palette = &Theme::of(ui).palette;
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), space(1)), Sense::hover());
+    let radius = 0.5 * space(1);
+    ui.painter().rect_filled(rect, radius, palette.line);
+    let done = rect.with_max_x(rect.left() + share.clamp(0.0, 1.0) * rect.width());
+    ui.painter().rect_filled(done, radius, palette.accent);
+    response.widget_info(|| {
+        let label = format!("{name} progress {:.0} %", 100.0 * share);
+        WidgetInfo::labeled(Role::ProgressIndicator, true, label)
+    });
+    response
 }
 
 /// A sentence in the middle of an empty card: why there is nothing, and what to do.

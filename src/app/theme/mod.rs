@@ -10,8 +10,8 @@ mod tokens;
 
 pub use colour_map::ColourMap;
 pub use components::{
-    PrimaryButton, card_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button, scrolled_ui,
-    section_heading_ui, segmented_ui, slider_style, tabs_ui,
+    PrimaryButton, card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button,
+    progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, slider_style, tabs_ui,
 };
 pub use fonts::{font_definitions, semibold};
 pub use style::{apply, install};

@@ -22,6 +22,8 @@ pub enum Hue {
     Green,
     /// A third.
     Orange,
+    /// A fourth.
+    Violet,
     /// References and bounds.
     Grey,
 }
@@ -33,6 +35,7 @@ impl Hue {
             Self::Red => [0xc6, 0x2f, 0x2f],
             Self::Green => [0x1a, 0x7f, 0x4b],
             Self::Orange => [0xa8, 0x64, 0x00],
+            Self::Violet => [0x7a, 0x3e, 0xb1],
             Self::Grey => DIM,
         }
     }

@@ -1,0 +1,71 @@
+//! A point in words.
+
+use std::time::Duration;
+
+use crate::{
+    evaluation::{DecoderKind, Precision, TradePoint},
+    export::{format_duration, format_number, format_percent},
+};
+
+/// The way of decoding.
+pub fn decoder_name(kind: DecoderKind) -> &'static str {
+    match kind {
+        DecoderKind::Mean => "Training mean",
+        DecoderKind::Ridge => "Ridge",
+        DecoderKind::Network => "Network",
+        DecoderKind::RadialBasis => "Radial basis",
+        DecoderKind::Newton => "Newton",
+        DecoderKind::Polish => "Network + Newton",
+    }
+}
+
+/// `Network f32, best preset, 12 hidden`.
+pub fn point_name(point: &TradePoint) -> String {
+    let mut name = decoder_name(point.report.kind).to_owned();
+    if point.report.precision == Precision::Single {
+        name += " f32";
+    }
+    name += &format!(", {} preset", point.preset);
+    if let Some(hidden) = point.hidden() {
+        name += &format!(", {hidden} hidden");
+    }
+    name
+}
+
+/// `3.59 µs`, `1.94 ms`.
+pub fn frame_time(microseconds: f64) -> String {
+    match microseconds {
+        time if time < 1e3 => format!("{} µs", format_number(time)),
+        time if time < 1e6 => format!("{} ms", format_number(1e-3 * time)),
+        time => format!("{} s", format_number(1e-6 * time)),
+    }
+}
+
+/// A level of noise, as one would type it.
+pub fn noise_name(noise: f64) -> String {
+    if noise == 0.0 || noise >= 0.01 {
+        noise.to_string()
+    } else {
+        format!("{noise:e}")
+    }
+}
+
+/// A time of training.
+pub fn training_time(seconds: f64) -> String {
+    Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)
+}
+
+/// What a point gains and costs, line by line.
+pub fn point_facts(point: &TradePoint) -> Vec<String> {
+    let mut facts = vec![format!(
+        "Z error {}, {} mm",
+        format_percent(point.report.errors.z_percent),
+        format_number(point.report.errors.z_mm)
+    )];
+    if let Some(ratio) = point.to_reference() {
+        facts.push(format!("{} times the limit of physics", format_number(ratio)));
+    }
+    facts.push(format!("{} a frame", frame_time(point.report.frame_us)));
+    facts.push(format!("{} of training", training_time(point.training_seconds)));
+    facts
+}

@@ -1,0 +1,148 @@
+use std::time::{Duration, Instant};
+
+use super::{TradeForm, TradeFormError, TradePlan, worker::TradeNumber};
+use crate::evaluation::{RunSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
+
+/// Everything the Trade-off view reads.
+#[derive(Debug, Default)]
+pub struct TradeState {
+    /// What is to be measured.
+    pub form: TradeForm,
+    /// What runs.
+    pub running: Option<TradeRunning>,
+    /// What is measured.
+    pub outcome: Option<TradeOutcome>,
+    /// The level of noise on show.
+    pub level: usize,
+    /// The point marked in charts and table, by its place in the level on show.
+    pub marked: Option<usize>,
+    /// The limits of the two questions.
+    pub limits: TradeLimits,
+}
+
+/// The limits of "fastest under" and "most accurate under".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TradeLimits {
+    /// Z error in percent.
+    pub percent: f64,
+    /// Time of a frame in microseconds.
+    pub microseconds: f64,
+}
+
+/// A measurement under way.
+#[derive(Clone, Copy, Debug)]
+pub struct TradeRunning {
+    /// When it began.
+    pub begun: Instant,
+    /// By which its news are known.
+    pub(in crate::app) number: TradeNumber,
+}
+
+/// How a measurement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TradeEnding {
+    /// Every point is there.
+    Complete,
+    /// By the user, or by an accident that was told.
+    Cut,
+}
+
+/// What is measured.
+#[derive(Clone, Debug)]
+pub struct TradeOutcome {
+    /// What was asked for.
+    pub plan: TradePlan,
+    /// One for each level of noise.
+    pub levels: Vec<TradeLevel>,
+    /// How it ended, once it has.
+    pub ending: Option<TradeEnding>,
+    /// How long it took, once it has ended.
+    pub took: Option<Duration>,
+}
+
+impl TradeOutcome {
+    /// Points measured and points asked for.
+    pub fn points(&self) -> (usize, usize) {
+        let done = self.levels.iter().map(|level| level.points.len()).sum();
+        (done, self.plan.points())
+    }
+}
+
+impl Default for TradeLimits {
+    fn default() -> Self {
+        Self {
+            percent: 1.0,
+            microseconds: 10.0,
+        }
+    }
+}
+
+impl TradeState {
+    /// What would be measured in the scene of these settings, or why nothing can be.
+    ///
+    /// # Errors
+    /// What is wrong with the form.
+    pub fn plan(&self, base: &RunSettings) -> Result<TradePlan, TradeFormError> {
+        self.form.plan(base)
+    }
+
+    /// Makes room for the points of `plan`.
+    pub(in crate::app) fn begin(&mut self, plan: TradePlan, number: TradeNumber) {
+        let level = |&noise: &f64| TradeLevel {
+            noise,
+            points: Vec::new(),
+        };
+        self.level = self.level.min(plan.noises.len() - 1);
+        self.marked = None;
+        self.running = Some(TradeRunning {
+            begun: Instant::now(),
+            number,
+        });
+        self.outcome = Some(TradeOutcome {
+            levels: plan.noises.iter().map(level).collect(),
+            plan,
+            ending: None,
+            took: None,
+        });
+    }
+
+    /// Adds a point to a level.
+    pub fn record(&mut self, level: usize, point: TradePoint) {
+        let level = self.outcome.as_mut().and_then(|outcome| outcome.levels.get_mut(level));
+        if let Some(level) = level {
+            level.points.push(point);
+        }
+    }
+
+    /// The measurement has ended.
+    pub fn end(&mut self, at: Instant) {
+        let Some(running) = self.running.take() else { return };
+        if let Some(outcome) = &mut self.outcome {
+            let (done, all) = outcome.points();
+            outcome.took = Some(at - running.begun);
+            outcome.ending = Some(if done == all {
+                TradeEnding::Complete
+            } else {
+                TradeEnding::Cut
+            });
+        }
+    }
+
+    /// The level on show.
+    pub fn shown(&self) -> Option<&TradeLevel> {
+        self.outcome.as_ref().and_then(|outcome| outcome.levels.get(self.level))
+    }
+
+    /// The points that answer "fastest under" and "most accurate under", by their places in the level on show.
+    pub fn chosen(&self) -> [Option<usize>; 2] {
+        let Some(level) = self.shown() else { return [None; 2] };
+        let place = |chosen: Option<&TradePoint>| {
+            let chosen = chosen?;
+            level.points.iter().position(|point| std::ptr::eq(point, chosen))
+        };
+        [
+            place(fastest_under(&level.points, self.limits.percent)),
+            place(most_accurate_under(&level.points, self.limits.microseconds)),
+        ]
+    }
+}

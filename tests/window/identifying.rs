@@ -1,0 +1,151 @@
+//! What readings can tell at all: figures, warnings, and the way back to the Train view.
+
+use decoupler::{
+    app::{Analysis, Question, View},
+    export::format_number,
+    sensor::{Identifiability, SensorModel},
+};
+use eframe::egui::{Key, vec2};
+use glam::DVec3;
+
+use crate::driver::Driver;
+
+fn open() -> Driver {
+    let mut driver = Driver::open();
+    driver.click_button("Identifiability");
+    wait_for_the_answer(&mut driver);
+    driver
+}
+
+/// Waits for the answer to the question as it stands.
+fn wait_for_the_answer(driver: &mut Driver) {
+    driver.wait("the answer", |driver| {
+        let shown = &driver.state().identifiability;
+        !shown.is_pending && shown.analysis.is_some()
+    });
+}
+
+fn analysis(driver: &Driver) -> &Analysis {
+    driver.state().identifiability.analysis.as_ref().unwrap()
+}
+
+/// The row with the smallest singular value, all nodes pressed by `compression` of the height, found by the library alone.
+fn worst_row(sensor: &SensorModel, compression: f64) -> Identifiability {
+    let axes = decoupler::sensor::Axes::Z;
+    let pressed = vec![DVec3::Z * compression * sensor.geometry.height_mm; sensor.scale.nodes_per_row()];
+    let rows = (0..sensor.scale.rows()).map(|row| Identifiability::of_row(sensor, row, &pressed, axes).unwrap());
+    let smallest = |row: &Identifiability| *row.singular_values_per_mm.last().unwrap();
+    rows.min_by(|a, b| smallest(a).total_cmp(&smallest(b))).unwrap()
+}
+
+#[track_caller]
+fn shows_condition_of(driver: &Driver, sensor: &SensorModel) {
+    let worst = worst_row(sensor, 0.1);
+    let condition = format!("Condition number: {}", format_number(worst.condition()));
+    assert!(driver.has(&condition), "{condition} is not among {:#?}", driver.texts());
+    assert!(driver.has(&format!("Worst row: {}", worst.row + 1)));
+}
+
+#[test]
+fn the_figures_are_the_librarys_and_follow_the_geometry() {
+    let mut driver = open();
+    let mut sensor = driver.state().draft.sensor;
+    shows_condition_of(&driver, &sensor);
+    assert!(driver.says("Without noise every deformation can be told"));
+    driver.enter("Height", "8");
+    driver.enter("Column-wires", "40");
+    wait_for_the_answer(&mut driver);
+    sensor.geometry.height_mm = 8.0;
+    sensor.scale = "10×10_5×40".parse().unwrap();
+    shows_condition_of(&driver, &sensor);
+    driver.settle();
+
+    driver.click("Use this sensor in the Train view");
+    assert_eq!(
+        (driver.state().view, driver.state().draft.sensor),
+        (View::Train, sensor)
+    );
+    driver.click_button("Identifiability");
+    wait_for_the_answer(&mut driver);
+    assert!(!driver.is_enabled("Use this sensor in the Train view"), "it is there");
+    shows_condition_of(&driver, &sensor);
+}
+
+#[test]
+fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
+    let mut driver = open();
+    let before = driver.state().draft;
+    driver.get("Node pitch slider").focus();
+    driver.press(Key::ArrowRight);
+    wait_for_the_answer(&mut driver);
+    let pitch = analysis(&driver).question.sensor.geometry.node_pitch_mm;
+    assert!(pitch > before.sensor.geometry.node_pitch_mm, "{pitch}");
+    assert_eq!(driver.state().draft, before, "trying changes nothing there");
+    driver.click("Back to the Train view's");
+    wait_for_the_answer(&mut driver);
+    assert_eq!(analysis(&driver).question, Question::of(&before));
+}
+
+#[test]
+fn rows_that_mirror_each_other_are_told_until_the_row_is_known() {
+    let mut driver = Driver::open();
+    driver.click("10×6");
+    driver.click_button("Identifiability");
+    wait_for_the_answer(&mut driver);
+    assert!(!driver.says("cannot be told apart"));
+    // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
+    driver.enter("First column node at x", "7.5");
+    wait_for_the_answer(&mut driver);
+    assert!(driver.says("cannot be told apart"), "{:#?}", driver.texts());
+    driver.click_button("Row known");
+    wait_for_the_answer(&mut driver);
+    assert!(!driver.says("cannot be told apart"));
+    assert!(driver.has("Rows most alike: the row is known"));
+}
+
+#[test]
+fn noise_that_hides_everything_is_told_with_what_to_change() {
+    let mut driver = open();
+    driver.enter("Relative noise", "0.001");
+    wait_for_the_answer(&mut driver);
+    let seen = analysis(&driver).patterns_seen();
+    assert!((1..10).contains(&seen), "{seen}");
+    assert!(driver.has(&format!("Patterns out of the noise: {seen} of 10")));
+    assert!(driver.says(&format!("This noise hides {} of 10 patterns", 10 - seen)));
+    driver.enter("Relative noise", "1");
+    wait_for_the_answer(&mut driver);
+    assert!(driver.says("the readings hardly narrow the deformation"));
+    assert!(driver.says("reduce the height, widen the node pitch, or add column-wires"));
+}
+
+#[test]
+fn sideways_movement_has_a_picture_for_each_axis() {
+    let mut driver = open();
+    driver.click_button("In x, y and z");
+    wait_for_the_answer(&mut driver);
+    assert!(driver.has("Unknowns of a row: 30"));
+    driver.click_button("x");
+    assert_eq!(driver.state().identifiability.axis, 0);
+    driver.settle();
+    driver.enter("Column-wires", "12");
+    wait_for_the_answer(&mut driver);
+    assert!(driver.says("a row has 30 unknowns but only 12 readings") || driver.says("A row has 30 unknowns"));
+}
+
+#[test]
+fn everything_keeps_to_a_narrow_window() {
+    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
+    let buttons = ["Trade-off", "Next snapshot"].map(|label| driver.get(label).rect());
+    assert!(buttons[0].max.x < buttons[1].min.x, "{buttons:?}");
+    driver.click_button("Identifiability");
+    wait_for_the_answer(&mut driver);
+    driver.settle();
+    for label in ["Height slider", "Compression slider", "Row known"] {
+        let rect = driver.get(label).rect();
+        assert!(rect.max.x < 272.0, "{label}: {rect}");
+    }
+    for label in ["Worst-seen deformation of each row", "Colour scale of 1/mm"] {
+        let rect = driver.get(label).rect();
+        assert!(rect.max.x <= 1024.0 && rect.width() > 40.0, "{label}: {rect}");
+    }
+}

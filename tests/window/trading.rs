@@ -1,0 +1,253 @@
+//! Speed against accuracy: measured, asked, loaded, cancelled and taken away.
+
+use std::fs;
+
+use decoupler::{
+    app::{TradeEnding, TradePlan, View},
+    evaluation::{Preset, TradePoint, fastest_under, measure_trade, most_accurate_under},
+    export::format_percent,
+};
+use eframe::egui::vec2;
+
+use crate::driver::Driver;
+
+fn open() -> Driver {
+    let mut driver = Driver::open();
+    driver.click("10×6");
+    driver.click_button("Trade-off");
+    driver
+}
+
+/// Ridge, Newton and small networks of both presets at two levels of noise.
+fn tiny(driver: &mut Driver) -> TradePlan {
+    driver.type_into("Noise levels", "0, 1e-3");
+    driver.type_into("Hidden nodes", "3");
+    for decoder in ["Training mean", "Radial basis", "Network + Newton"] {
+        driver.click(decoder);
+    }
+    driver.enter("Samples at most", "100");
+    driver.enter("Epochs at most", "3");
+    driver.enter("Test samples", "20");
+    assert!(driver.has("16 points"), "{:#?}", driver.texts());
+    driver.state().trade.plan(&driver.state().draft).unwrap()
+}
+
+fn measure(driver: &mut Driver) {
+    driver.click("▶ Measure");
+    driver.wait("the end of the measurement", |driver| {
+        driver.state().trade.running.is_none()
+    });
+}
+
+/// What the library measures by itself.
+fn by_library(plan: &TradePlan, noise: f64) -> Vec<TradePoint> {
+    let mut points = Vec::new();
+    for &preset in &plan.presets {
+        let settings = plan.settings(preset, noise);
+        let on_point = |point| points.push(point);
+        measure_trade(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
+    }
+    points
+}
+
+#[test]
+fn every_point_is_the_librarys_and_both_questions_are_answered() {
+    let mut driver = open();
+    let plan = tiny(&mut driver);
+    measure(&mut driver);
+    let outcome = driver.state().trade.outcome.as_ref().unwrap();
+    assert_eq!(
+        (outcome.points(), outcome.ending),
+        ((16, 16), Some(TradeEnding::Complete))
+    );
+    for level in &outcome.levels {
+        for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise)) {
+            assert_eq!(
+                (shown.report.kind, shown.report.precision),
+                (own.report.kind, own.report.precision)
+            );
+            assert_eq!(shown.report.errors, own.report.errors, "times differ, errors do not");
+            assert_eq!(shown.settings, own.settings);
+        }
+    }
+    for name in [
+        "Ridge, paper preset",
+        "Newton, best preset",
+        "Network f32, best preset, 3 hidden",
+    ] {
+        for chart in ["Decoding", "Training"] {
+            assert!(
+                driver.has(&format!("{chart}: {name}")),
+                "{name} in {chart}: {:#?}",
+                driver.texts()
+            );
+        }
+    }
+    driver.click_button("1e-3");
+    assert_eq!(driver.state().trade.level, 1);
+    driver.settle();
+
+    driver.enter("Fastest under", "5");
+    driver.enter("Most accurate under", "1e9");
+    let level = driver.state().trade.shown().unwrap();
+    let fastest = *fastest_under(&level.points, 5.0).unwrap();
+    let best = *most_accurate_under(&level.points, 1e9).unwrap();
+    let is_best = format_percent(best.report.errors.z_percent);
+    let answer = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.starts_with("Most accurate: "))
+        .unwrap();
+    assert!(answer.contains(&is_best), "{answer}");
+    let answer = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.starts_with("Fastest: "))
+        .unwrap();
+    driver.click(&answer);
+    let marked = driver.state().trade.marked.unwrap();
+    assert_eq!(driver.state().trade.shown().unwrap().points[marked], fastest);
+    driver.enter("Fastest under", "1e-12");
+    assert!(driver.has("Nothing measured here is as accurate."));
+
+    driver.click("Load into Train view");
+    assert_eq!(
+        (driver.state().view, driver.state().draft),
+        (View::Train, fastest.settings)
+    );
+}
+
+#[test]
+fn a_click_on_a_point_loads_its_configuration() {
+    let mut driver = open();
+    let plan = tiny(&mut driver);
+    measure(&mut driver);
+    driver.click("Decoding: Ridge, best preset");
+    assert_eq!(driver.state().view, View::Train);
+    let ridge = plan.settings(Preset::Best, 0.0);
+    let draft = driver.state().draft;
+    assert_eq!(
+        (draft.scene, draft.inputs, draft.samples),
+        (ridge.scene, ridge.inputs, ridge.samples)
+    );
+    driver.click_button("Trade-off");
+    let (marked, level) = (
+        driver.state().trade.marked.unwrap(),
+        driver.state().trade.shown().unwrap(),
+    );
+    assert_eq!(level.points[marked].preset, Preset::Best);
+    let row = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.starts_with("Newton, paper preset: "))
+        .unwrap();
+    driver.click(&row);
+    assert_ne!(
+        driver.state().trade.marked,
+        Some(marked),
+        "a row of the table marks its point"
+    );
+    assert_eq!(driver.state().view, View::TradeOff);
+}
+
+#[test]
+fn what_is_measured_is_saved_as_table_and_figures() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open();
+    tiny(&mut driver);
+    assert!(driver.says("Press Measure"));
+    measure(&mut driver);
+    let saved = [
+        ("All points as CSV…", "points.csv", &b"noise,preset,decoder"[..]),
+        ("Decoding chart as SVG…", "decoding.svg", b"<svg"),
+        ("Training chart as PNG…", "training.png", b"\x89PNG"),
+    ];
+    for (button, name, expected) in saved {
+        let path = folder.path().join(name);
+        driver.click("Export");
+        driver.click(button);
+        driver.type_into("File", &path.display().to_string());
+        driver.click_button("Save");
+        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.click("Dismiss");
+        assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
+    }
+    let table = fs::read_to_string(folder.path().join("points.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 16);
+    let columns = |line: &str| line.split(',').count();
+    let heading = columns(table.lines().next().unwrap());
+    assert!(table.lines().all(|line| columns(line) == heading), "{table}");
+    let points = &driver.state().trade.outcome.as_ref().unwrap().levels[0].points;
+    let z = points[0].report.errors.z_percent.unwrap();
+    assert!(table.lines().nth(1).unwrap().contains(&format!(",{z:?},")), "{table}");
+    let svg = fs::read_to_string(folder.path().join("decoding.svg")).unwrap();
+    for text in ["newton, best preset", "time to decode a frame (µs)", "Z error (%)"] {
+        assert!(svg.contains(text), "{text}");
+    }
+}
+
+#[test]
+fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
+    let mut driver = open();
+    tiny(&mut driver);
+    let sizes: Vec<String> = (3..40).map(|hidden| hidden.to_string()).collect();
+    driver.type_into("Hidden nodes", &sizes.join(" "));
+    driver.enter("Samples at most", "2000");
+    driver.enter("Epochs at most", "200");
+    driver.click("▶ Measure");
+    driver.wait("the first points", |driver| {
+        let outcome = driver.state().trade.outcome.as_ref();
+        outcome.is_some_and(|outcome| outcome.points().0 >= 3)
+    });
+    assert!(driver.has("Decoding: Ridge, paper preset"));
+    assert!(!driver.is_enabled("▶ Measure"), "one measurement at a time");
+    driver.click("■ Cancel");
+    assert!(
+        driver.state().trade.running.is_none(),
+        "nobody waits for what is in hand"
+    );
+    let outcome = driver.state().trade.outcome.as_ref().unwrap();
+    let (done, all) = outcome.points();
+    assert!((3..all).contains(&done), "{done} of {all}");
+    assert_eq!(outcome.ending, Some(TradeEnding::Cut));
+    assert!(driver.says(&format!("Ended early: {done} of {all} points")));
+    // The next begins when the processor is free, and has points of its own only.
+    driver.type_into("Hidden nodes", "3");
+    driver.enter("Epochs at most", "3");
+    measure(&mut driver);
+    assert_eq!(driver.state().trade.outcome.as_ref().unwrap().points(), (16, 16));
+}
+
+#[test]
+fn what_cannot_be_measured_says_why() {
+    let mut driver = open();
+    driver.type_into("Noise levels", "0, much");
+    assert!(driver.says("'much' is not a number"), "{:#?}", driver.texts());
+    assert!(!driver.is_enabled("▶ Measure"));
+    driver.type_into("Noise levels", "0");
+    driver.type_into("Hidden nodes", "0");
+    assert!(driver.says("Hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
+    driver.type_into("Hidden nodes", "3");
+    assert!(driver.is_enabled("▶ Measure"));
+}
+
+#[test]
+fn charts_and_form_keep_to_a_narrow_window() {
+    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
+    driver.click("10×6");
+    driver.click_button("Trade-off");
+    tiny(&mut driver);
+    measure(&mut driver);
+    driver.settle();
+    assert!(driver.get("Export").rect().max.x < 1024.0);
+    for label in ["▶ Measure", "■ Cancel", "Samples at most"] {
+        for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
+            assert!(rect.max.x < 272.0, "{label}: {rect}");
+        }
+    }
+    for (text, rect) in driver.places() {
+        if text.starts_with("Decoding: ") || text.starts_with("Training: ") {
+            assert!(rect.max.x < 1024.0 && rect.min.x > 272.0, "{text}: {rect}");
+        }
+    }
+}
