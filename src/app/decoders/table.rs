@@ -1,4 +1,4 @@
-use eframe::egui::{CollapsingHeader, RichText, Ui};
+use eframe::egui::{CollapsingHeader, Ui};
 
 use super::DecoderResult;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
         action::Action,
         panels::{Column, Row, fields::capitalised, table_ui},
         state::{Phase, State},
-        theme::{Theme, note_ui, space, type_size},
+        theme::{Theme, dim_ui, note_ui, space},
     },
     evaluation::{DecoderKind, DecoderReport, Errors, Precision},
     export::format_number,
@@ -135,11 +135,6 @@ fn meaning(kind: DecoderKind) -> &'static str {
         }
         DecoderKind::Polish => "The network's answer, improved by at most three of Newton's steps",
     }
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
 #[cfg(test)]

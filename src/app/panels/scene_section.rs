@@ -1,11 +1,11 @@
-use eframe::egui::{DragValue, RichText, Ui};
+use eframe::egui::{DragValue, Ui};
 
 use super::{
     fields::{count_ui, field_ui, list_ui, options_ui, percent_ui, quantity_ui},
     noise_section::noise_ui,
 };
 use crate::{
-    app::theme::{Theme, note_ui, section_heading_ui, space, type_size},
+    app::theme::{dim_ui, note_ui, section_heading_ui, space},
     dataset::LARGEST_SAMPLES,
     evaluation::{Outlook, RunSettings},
     export::format_number,
@@ -265,9 +265,4 @@ fn sideways_in_words(outlook: &Outlook, noise: f64) -> String {
              %. Any noise above that hides it."
         )
     }
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
