@@ -300,7 +300,7 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
 fn files_written_before_there_were_scenes_still_open() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     let mut driver = Driver::open();
-    driver.click("Type the path of a checkpoint");
+    driver.open_form("Type the path of a checkpoint");
     let checkpoint = fixtures.join("checkpoint_version_1.json");
     driver.type_into("File", &checkpoint.display().to_string());
     driver.click_button("Open");
