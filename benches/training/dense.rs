@@ -7,6 +7,7 @@ use decoupler::{
 };
 use faer::{Mat, Side, prelude::Solve};
 use ndarray::Array2;
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use crate::timing::{median, time_ms};
 
@@ -86,15 +87,16 @@ pub(crate) fn print() {
         hidden: 12,
         outputs: 30,
     };
-    let wave = |row: usize, column: usize| {
-        (1.0 + 12.9898 * row as f64 + 78.233 * column as f64 + 0.71 * (row * column) as f64).sin()
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut numbers = |rows, columns, largest: f64| {
+        Array2::from_shape_simple_fn((rows, columns), || rng.random_range(-largest..=largest))
     };
-    let inputs = Array2::from_shape_fn((1000, shape.inputs), |(row, column)| wave(row, column));
-    let teacher = Mlp::from_weights(shape, (0..shape.weights()).map(|index| wave(index, 3)).collect());
+    let mut network =
+        |largest| Mlp::from_weights(shape, numbers(1, shape.weights(), largest).into_raw_vec_and_offset().0);
+    let (teacher, start) = (network(0.5), network(0.3));
+    let inputs = numbers(1000, shape.inputs, 1.0);
     // Not to be reached exactly: else the damping vanishes, and rounding decides the path of both.
-    let noise = Array2::from_shape_fn((1000, shape.outputs), |(row, output)| 0.1 * wave(row, 500 + output));
-    let targets = teacher.forward(inputs.view()) + noise;
-    let start = Mlp::from_weights(shape, (0..shape.weights()).map(|index| 0.3 * wave(index, 1)).collect());
+    let targets = teacher.forward(inputs.view()) + numbers(1000, shape.outputs, 0.5);
     let problem = Problem {
         training: Examples::new(inputs.view(), targets.view()),
         validation: None,
