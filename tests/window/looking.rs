@@ -88,19 +88,24 @@ fn the_buttons_that_run_the_training_stand_apart() {
     }
 }
 
+/// News from the workers may still make it draw for a moment; a window that draws for ever panics here.
+fn comes_to_rest(driver: &mut Driver) -> bool {
+    (0..200).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        driver.harness().run() <= 2
+    })
+}
+
 #[test]
 fn an_idle_window_draws_nothing() {
     let mut driver = Driver::open();
-    driver.settle();
-    assert!(driver.harness().run() <= 2, "before a training");
+    assert!(comes_to_rest(&mut driver), "before a training");
     driver.configure_small();
     driver.train();
-    driver.settle();
-    assert!(driver.harness().run() <= 2, "after a training");
+    assert!(comes_to_rest(&mut driver), "after a training");
     driver.click_button("Error");
     driver.click("Regression");
-    driver.settle();
-    assert!(driver.harness().run() <= 2, "with another picture");
+    assert!(comes_to_rest(&mut driver), "with another picture");
 }
 
 #[test]
