@@ -23,6 +23,7 @@ mod state;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
+mod threads;
 mod trade;
 mod window;
 mod worker;

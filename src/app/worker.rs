@@ -13,12 +13,12 @@ use std::{
 };
 
 use ndarray::Array2;
-use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 use super::{
     continuation::{continue_run, furthest_epoch},
     export_kind::ExportKind,
     test_view::{TestView, TestViewError},
+    threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
 };
 use crate::{
     evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
@@ -132,22 +132,15 @@ pub struct Worker {
     events: Receiver<Event>,
 }
 
-/// The worker has ended without being asked to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WorkerDied;
-
 impl Worker {
     /// Starts the thread. `wake` is called after each event.
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn start(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(wake: Wake) -> std::io::Result<Self> {
         let (requests, incoming) = channel();
         let (outgoing, events) = channel();
-        let report = Report {
-            outgoing,
-            wake: Box::new(wake),
-        };
+        let report = Report::new(outgoing, wake);
         thread::Builder::new().name("training".to_owned()).spawn(move || {
             yield_to_window();
             Labour::new(report).run(&incoming);
@@ -175,48 +168,13 @@ impl Worker {
     /// # Errors
     /// The worker died.
     pub fn next_event(&self) -> Result<Option<Event>, WorkerDied> {
-        match self.events.try_recv() {
-            Ok(event) => Ok(Some(event)),
-            Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(WorkerDied),
-        }
-    }
-}
-
-/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about fifteen times its
-/// share, and training is not starved by other programs.
-pub(super) fn yield_to_window() {
-    /// Of 0 to 99, where about 50 is normal.
-    const BELOW_NORMAL: u8 = 18;
-    if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {
-        // Where the system refuses, training merely competes with the window.
-        let _ = ThreadPriority::Crossplatform(priority).set_for_current();
-    }
-}
-
-/// Where events go. Dropping it wakes the window once more, so that it sees a worker that died.
-struct Report {
-    outgoing: Sender<Event>,
-    wake: Box<dyn Fn() + Send>,
-}
-
-impl Report {
-    fn send(&self, event: Event) {
-        // Without a window there is nobody to tell, and the next request ends the thread.
-        let _ = self.outgoing.send(event);
-        (self.wake)();
-    }
-}
-
-impl Drop for Report {
-    fn drop(&mut self) {
-        (self.wake)();
+        next_event(&self.events)
     }
 }
 
 /// The thread's own state.
 struct Labour {
-    report: Report,
+    report: Report<Event>,
     run: Option<Run>,
     is_paused: bool,
     /// Whether the window was told what is to be kept of the run.
@@ -230,7 +188,7 @@ struct Labour {
 }
 
 impl Labour {
-    fn new(report: Report) -> Self {
+    fn new(report: Report<Event>) -> Self {
         Self {
             report,
             run: None,

@@ -1,6 +1,6 @@
 //! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use decoupler::{
     app::{BottomTab, Phase, View, surface_view::ViewMode},
@@ -187,15 +187,6 @@ fn figures_of_the_paper_are_one_click() {
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
 }
 
-/// Types `path` into the form behind `button` and saves; waits for the answer.
-fn save(driver: &mut Driver, button: &str, path: &Path) {
-    driver.open_form(button);
-    driver.type_into("File", &path.display().to_string());
-    driver.click_button("Save");
-    driver.wait("the answer", |driver| driver.state().notice.is_some());
-    driver.settle();
-}
-
 #[test]
 fn pictures_in_view_are_saved_as_their_names_end() {
     const SURFACES: &str = "Type a path for the picture of the surfaces";
@@ -206,7 +197,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     driver.configure_small();
     driver.train();
     let at = |name: &str| folder.path().join(name);
-    save(&mut driver, SURFACES, &at("a.png"));
+    driver.save(SURFACES, &at("a.png"));
     assert!(driver.says("Saved "), "{:#?}", driver.texts());
     driver.click("Dismiss");
     let tabs = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
@@ -214,7 +205,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     for tab in tabs {
         driver.click(tab);
         let path = at(&format!("{tab}.svg"));
-        save(&mut driver, CHART, &path);
+        driver.save(CHART, &path);
         driver.click("Dismiss");
         let svg = fs::read_to_string(path).unwrap();
         assert!(svg.starts_with("<svg ") && !svg.contains("NaN"), "{tab}");
@@ -222,7 +213,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     }
     // The nodes: a square and a disc each, and one of both beside the plot.
     assert_eq!(pictures[4].matches("<circle").count(), 60 + 1);
-    save(&mut driver, CHART, &at("nodes.bmp"));
+    driver.save(CHART, &at("nodes.bmp"));
     assert!(driver.says("give a name that ends in .png or .svg"));
     let png = image::open(at("a.png")).unwrap();
     assert!(png.width() > 2000);

@@ -195,6 +195,16 @@ impl Driver {
         panic!("no form came; the window shows {:#?}", self.texts());
     }
 
+    /// Types `path` into the form behind the button and saves; waits for the answer.
+    #[track_caller]
+    pub(crate) fn save(&mut self, button: &str, path: &Path) {
+        self.open_form(button);
+        self.type_into("File", &path.display().to_string());
+        self.click_button("Save");
+        self.wait("the answer", |driver| driver.state().notice.is_some());
+        self.settle();
+    }
+
     /// Types `text` into the field labelled so, in place of what is there, and confirms with Enter.
     #[track_caller]
     pub(crate) fn enter(&mut self, label: &str, text: &str) {

@@ -226,10 +226,8 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     ] {
         let path = folder.path().join(name);
         driver.click("Export");
-        driver.click(button);
-        driver.type_into("File", &path.display().to_string());
-        driver.click_button("Save");
-        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.save(button, &path);
+        assert!(driver.says("Saved "));
         driver.click("Dismiss");
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with(expected), "{text}");
@@ -240,10 +238,8 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     ] {
         let path = folder.path().join(name);
         driver.click("Export");
-        driver.click(button);
-        driver.type_into("File", &path.display().to_string());
-        driver.click_button("Save");
-        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.save(button, &path);
+        assert!(driver.says("Saved "));
         driver.click("Dismiss");
         assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
     }

@@ -21,15 +21,6 @@ fn trained_driver() -> Driver {
     driver
 }
 
-/// Types `path` into the form behind `button` and saves; waits for the answer.
-fn save(driver: &mut Driver, button: &str, path: &Path) {
-    driver.open_form(button);
-    driver.type_into("File", &path.display().to_string());
-    driver.click_button("Save");
-    driver.wait("the answer", |driver| driver.state().notice.is_some());
-    driver.settle();
-}
-
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
@@ -44,7 +35,7 @@ fn a_saved_network_gives_the_same_outputs_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
     let mut driver = trained_driver();
-    save(&mut driver, NETWORK, &path);
+    driver.save(NETWORK, &path);
     assert!(
         driver.has(&format!("Saved {}", path.display())),
         "{:#?}",
@@ -66,9 +57,9 @@ fn saved_tables_hold_what_is_shown() {
     let folder = tempfile::tempdir().unwrap();
     let [errors, loss] = ["errors.csv", "loss.csv"].map(|name| folder.path().join(name));
     let mut driver = trained_driver();
-    save(&mut driver, ERRORS, &errors);
+    driver.save(ERRORS, &errors);
     driver.click("Dismiss");
-    save(&mut driver, LOSS, &loss);
+    driver.save(LOSS, &loss);
     assert_eq!(names(folder.path()), ["errors.csv", "loss.csv"]);
 
     let mut cells = Vec::new();
@@ -100,7 +91,7 @@ fn what_cannot_be_saved_is_explained_and_leaves_nothing() {
     let missing = folder.path().join("none").join("network.json");
     let mut driver = trained_driver();
     for button in [NETWORK, ERRORS, LOSS] {
-        save(&mut driver, button, &missing);
+        driver.save(button, &missing);
         let reason = format!(
             "cannot write '{}': the folder '{}' does not exist; make it first",
             missing.display(),
@@ -108,7 +99,7 @@ fn what_cannot_be_saved_is_explained_and_leaves_nothing() {
         );
         assert!(driver.has(&reason), "{:#?}", driver.texts());
         driver.click("Dismiss");
-        save(&mut driver, button, folder.path());
+        driver.save(button, folder.path());
         let reason = format!(
             "cannot write '{}': it is a folder; give the name of a file",
             folder.path().display()
@@ -117,7 +108,7 @@ fn what_cannot_be_saved_is_explained_and_leaves_nothing() {
         driver.click("Dismiss");
     }
     assert!(names(folder.path()).is_empty());
-    save(&mut driver, NETWORK, &folder.path().join("network.json"));
+    driver.save(NETWORK, &folder.path().join("network.json"));
     assert!(driver.says("Saved "), "after a failure the next one works");
 }
 

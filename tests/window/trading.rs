@@ -165,10 +165,8 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     for (button, name, expected) in saved {
         let path = folder.path().join(name);
         driver.click("Export");
-        driver.click(button);
-        driver.type_into("File", &path.display().to_string());
-        driver.click_button("Save");
-        driver.wait("the file", |driver| driver.says("Saved "));
+        driver.save(button, &path);
+        assert!(driver.says("Saved "));
         driver.click("Dismiss");
         assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
     }

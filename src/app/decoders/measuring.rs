@@ -5,14 +5,14 @@ use std::{
     fmt,
     sync::{
         Arc,
-        mpsc::{Receiver, TryRecvError, channel},
+        mpsc::{Receiver, channel},
     },
     thread,
 };
 
 use super::{DecoderResult, DecodersState};
 use crate::{
-    app::worker::yield_to_window,
+    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
     dataset::Dataset,
     evaluation::{DecoderReport, DecoderSet, RunSettings},
     network::Networks,
@@ -59,14 +59,12 @@ impl DecoderMeasuring {
         settings: RunSettings,
         networks: Networks,
         test: Arc<Dataset>,
-        wake: impl Fn() + Send + 'static,
+        wake: Wake,
     ) -> std::io::Result<()> {
-        let (outgoing, news) = channel();
+        let (outgoing, incoming) = channel();
+        let news = Report::new(outgoing, wake);
         let work = move || {
             yield_to_window();
-            // Wakes the window when the thread ends, also by a panic, after the channel is closed.
-            let _waker = Waker(&wake);
-            let outgoing = outgoing;
             let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
             for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
                 let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, &test) {
@@ -75,38 +73,28 @@ impl DecoderMeasuring {
                 };
                 let report = set.as_ref().map_err(String::clone).and_then(measure);
                 // Nobody waits any more.
-                if outgoing.send((place, report)).is_err() {
+                if !news.is_heard((place, report)) {
                     return;
                 }
-                wake();
             }
         };
         thread::Builder::new().name("decoders".to_owned()).spawn(work)?;
-        self.news = Some(news);
+        self.news = Some(incoming);
         Ok(())
     }
 
     /// Takes what the thread has to tell.
     pub fn take_news(&mut self, state: &mut DecodersState) {
         while let Some(news) = &self.news {
-            match news.try_recv() {
-                Ok((place, report)) => state.take(place, report),
-                Err(TryRecvError::Empty) => return,
-                Err(TryRecvError::Disconnected) => {
+            match next_event(news) {
+                Ok(Some((place, report))) => state.take(place, report),
+                Ok(None) => return,
+                Err(WorkerDied) => {
                     state.end("measuring ended unexpectedly: fold the table and unfold it again");
                     self.news = None;
                 }
             }
         }
-    }
-}
-
-/// Calls the window when dropped.
-struct Waker<'a, F: Fn()>(&'a F);
-
-impl<F: Fn()> Drop for Waker<'_, F> {
-    fn drop(&mut self) {
-        (self.0)();
     }
 }
 
@@ -139,7 +127,7 @@ mod tests {
         let impossible = RunSettings { samples: 0, ..settings };
         let wake = move || waking.send(()).unwrap_or(());
         measuring
-            .begin(impossible, run.network(), Arc::clone(run.test()), wake)
+            .begin(impossible, run.network(), Arc::clone(run.test()), Arc::new(wake))
             .unwrap();
         // Until the thread has ended.
         while woken.recv().is_ok() {}

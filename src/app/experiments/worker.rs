@@ -3,18 +3,18 @@
 
 use std::{
     fmt,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Receiver, channel},
     },
     thread,
 };
 
 use super::{ExperimentFile, Topic};
 use crate::{
-    app::worker::yield_to_window,
+    app::threads::{LastEvent, Report, Wake, yield_to_window},
     evaluation::experiments::{Experiment, ExperimentResults, Finished, run_experiments, worker_threads},
 };
 
@@ -35,35 +35,18 @@ pub enum ExperimentEvent {
 
 /// The window's end of the threads.
 pub struct ExperimentWorker {
-    report: Report,
+    report: Report<ExperimentEvent>,
     events: Receiver<ExperimentEvent>,
     is_cancelled: Arc<AtomicBool>,
     latest: RunNumber,
 }
 
-#[derive(Clone)]
-struct Report {
-    outgoing: Sender<ExperimentEvent>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl Report {
-    fn send(&self, event: ExperimentEvent) {
-        // Without a window there is nobody to tell.
-        let _ = self.outgoing.send(event);
-        (self.wake)();
-    }
-}
-
 impl ExperimentWorker {
     /// No thread yet. `wake` is called after each event.
-    pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+    pub fn new(wake: Wake) -> Self {
         let (outgoing, events) = channel();
         Self {
-            report: Report {
-                outgoing,
-                wake: Arc::new(wake),
-            },
+            report: Report::new(outgoing, wake),
             events,
             is_cancelled: Arc::default(),
             latest: RunNumber::default(),
@@ -79,11 +62,8 @@ impl ExperimentWorker {
         let number = RunNumber(self.latest.0 + 1);
         self.is_cancelled = Arc::default();
         let is_cancelled = Arc::clone(&self.is_cancelled);
-        let mut ending = EndingReport {
-            number,
-            report: self.report.clone(),
-            result: Err("The experiment ended unexpectedly; what is finished stays.".to_owned()),
-        };
+        let died = "The experiment ended unexpectedly; what is finished stays.".to_owned();
+        let mut ending = LastEvent::new(self.report.clone(), ExperimentEvent::Ended(number, Err(died)));
         thread::Builder::new().name("experiments".to_owned()).spawn(move || {
             yield_to_window();
             let result = run_experiments(
@@ -92,10 +72,13 @@ impl ExperimentWorker {
                 || is_cancelled.load(Ordering::Relaxed),
                 |finished| {
                     let news = ExperimentEvent::Finished(number, Box::new(finished));
-                    ending.report.send(news);
+                    ending.send(news);
                 },
             );
-            ending.replace(result.map_err(|error| error.to_string()));
+            ending.replace(ExperimentEvent::Ended(
+                number,
+                result.map_err(|error| error.to_string()),
+            ));
         })?;
         self.latest = number;
         Ok(number)
@@ -108,17 +91,9 @@ impl ExperimentWorker {
 
     /// Writes a file on a thread of its own.
     pub fn write(&self, topic: Topic, file: ExperimentFile, results: Arc<ExperimentResults>, path: PathBuf) {
-        let report = self.report.clone();
-        let write = move || {
-            let written = file.write(topic, &results, &path);
-            report.send(ExperimentEvent::Written(
-                written.map(|()| path).map_err(|error| error.to_string()),
-            ));
-        };
-        if let Err(error) = thread::Builder::new().name("experiment file".to_owned()).spawn(write) {
-            let reason = format!("No thread could be started to write the file: {error}");
-            self.report.send(ExperimentEvent::Written(Err(reason)));
-        }
+        let write = move |path: &Path| file.write(topic, &results, path);
+        self.report
+            .write("experiment file", path, write, ExperimentEvent::Written);
     }
 
     /// The next event, if one has come.
@@ -136,25 +111,5 @@ impl Drop for ExperimentWorker {
 impl fmt::Debug for ExperimentWorker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("ExperimentWorker").finish_non_exhaustive()
-    }
-}
-
-/// Tells the end when dropped, also by a panic.
-struct EndingReport {
-    number: RunNumber,
-    report: Report,
-    result: Result<(), String>,
-}
-
-impl EndingReport {
-    fn replace(&mut self, result: Result<(), String>) {
-        self.result = result;
-    }
-}
-
-impl Drop for EndingReport {
-    fn drop(&mut self) {
-        let result = std::mem::replace(&mut self.result, Ok(()));
-        self.report.send(ExperimentEvent::Ended(self.number, result));
     }
 }

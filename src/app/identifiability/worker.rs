@@ -6,14 +6,14 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
-        mpsc::{Receiver, Sender, TryRecvError, channel},
+        mpsc::{Receiver, Sender, channel},
     },
     thread,
     time::{Duration, Instant},
 };
 
 use super::{Analysis, AnalysisError, Question};
-use crate::app::worker::yield_to_window;
+use crate::app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window};
 
 /// An answer that takes less is finished though another question is asked, so that the picture follows a slider.
 const SHORT: Duration = Duration::from_millis(250);
@@ -31,7 +31,7 @@ type Numbered = (u64, Result<Box<Analysis>, AnalysisError>);
 
 /// The window's end of the thread.
 pub struct IdentifiabilityWorker {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     /// The number of the newest question.
     newest: Arc<AtomicU64>,
     link: Option<Link>,
@@ -44,9 +44,9 @@ struct Link {
 
 impl IdentifiabilityWorker {
     /// No thread yet. `wake` is called after each answer.
-    pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+    pub fn new(wake: Wake) -> Self {
         Self {
-            wake: Arc::new(wake),
+            wake,
             newest: Arc::default(),
             link: None,
         }
@@ -71,13 +71,13 @@ impl IdentifiabilityWorker {
     /// The next answer, if one has come.
     pub fn next_answer(&mut self) -> Option<Answer> {
         let newest = self.newest.load(Ordering::Relaxed);
-        match self.link.as_ref()?.answers.try_recv() {
-            Ok((number, analysis)) => Some(Answer {
+        match next_event(&self.link.as_ref()?.answers) {
+            Ok(Some((number, analysis))) => Some(Answer {
                 is_newest: number == newest,
                 analysis: analysis.map_err(|error| error.to_string()),
             }),
-            Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => {
+            Ok(None) => None,
+            Err(WorkerDied) => {
                 self.link = None;
                 let text = "The thread that computes this ended unexpectedly: change a value to try again.";
                 Some(Answer {
@@ -91,14 +91,11 @@ impl IdentifiabilityWorker {
     fn start(&self) -> io::Result<Link> {
         let (questions, incoming) = channel();
         let (outgoing, answers) = channel();
-        let end = Ending {
-            answers: Some(outgoing),
-            wake: Arc::clone(&self.wake),
-        };
+        let report = Report::new(outgoing, Arc::clone(&self.wake));
         let newest = Arc::clone(&self.newest);
         let work = move || {
             yield_to_window();
-            answer_all(&incoming, &newest, &end);
+            answer_all(&incoming, &newest, &report);
         };
         thread::Builder::new().name("identifiability".to_owned()).spawn(work)?;
         Ok(Link { questions, answers })
@@ -118,7 +115,7 @@ impl fmt::Debug for IdentifiabilityWorker {
     }
 }
 
-fn answer_all(incoming: &Receiver<(u64, Question)>, newest: &AtomicU64, end: &Ending) {
+fn answer_all(incoming: &Receiver<(u64, Question)>, newest: &AtomicU64, report: &Report<Numbered>) {
     let mut last: Option<Analysis> = None;
     while let Ok(mut asked) = incoming.recv() {
         while let Ok(newer) = incoming.try_recv() {
@@ -130,34 +127,11 @@ fn answer_all(incoming: &Receiver<(u64, Question)>, newest: &AtomicU64, end: &En
         match Analysis::new(&question, last.as_ref(), is_abandoned) {
             Ok(Some(analysis)) => {
                 last = Some(analysis.clone());
-                end.send((number, Ok(Box::new(analysis))));
+                report.send((number, Ok(Box::new(analysis))));
             }
             Ok(None) => {}
-            Err(error) => end.send((number, Err(error))),
+            Err(error) => report.send((number, Err(error))),
         }
-    }
-}
-
-/// The thread's end. Dropping it wakes the window once more, so that it sees a thread that died.
-struct Ending {
-    answers: Option<Sender<Numbered>>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl Ending {
-    fn send(&self, answer: Numbered) {
-        if let Some(answers) = &self.answers {
-            // Without a window there is nobody to tell.
-            let _ = answers.send(answer);
-        }
-        (self.wake)();
-    }
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.answers = None;
-        (self.wake)();
     }
 }
 
@@ -168,7 +142,7 @@ mod tests {
 
     #[test]
     fn the_last_answer_is_to_the_newest_question() {
-        let mut worker = IdentifiabilityWorker::new(|| ());
+        let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
         let mut question = Question::of(&RunSettings::default());
         for step in 1..=40 {
             question.sensor.geometry.height_mm = 0.1 * f64::from(step);
@@ -194,7 +168,7 @@ mod tests {
 
     #[test]
     fn an_impossible_question_is_answered_with_its_reason() {
-        let mut worker = IdentifiabilityWorker::new(|| ());
+        let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
         let mut question = Question::of(&RunSettings::default());
         question.sensor.geometry.row_pitch_mm = 0.0;
         worker.ask(question).unwrap();

@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc,
-        mpsc::{Receiver, Sender, TryRecvError, channel},
+        mpsc::{Receiver, Sender, channel},
     },
     thread::{self, JoinHandle},
 };
@@ -18,7 +18,7 @@ use crate::{
     app::{
         shown_figure::Undrawn,
         test_view::{Frame, TestView},
-        worker::{WorkerDied, yield_to_window},
+        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
     },
     export::{
         FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError,
@@ -62,17 +62,16 @@ impl RunsWorker {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn start(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(wake: Wake) -> std::io::Result<Self> {
         let (requests, incoming) = channel();
         let (outgoing, events) = channel();
+        let report = Report::new(outgoing, wake);
         let work = move || {
             yield_to_window();
             let mut labour = Labour::default();
             while let Some(request) = labour.next(&incoming) {
                 if let Some(event) = labour.answer(request) {
-                    // Without a window there is nobody to tell.
-                    let _ = outgoing.send(event);
-                    wake();
+                    report.send(event);
                 }
             }
         };
@@ -97,11 +96,7 @@ impl RunsWorker {
     /// # Errors
     /// The thread has ended.
     pub fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
-        match self.events.try_recv() {
-            Ok(event) => Ok(Some(event)),
-            Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(WorkerDied),
-        }
+        next_event(&self.events)
     }
 }
 

@@ -3,18 +3,18 @@
 
 use std::{
     fmt, io,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Receiver, channel},
     },
     thread::{self, JoinHandle},
 };
 
 use super::{TradeFile, TradePlan};
 use crate::{
-    app::worker::yield_to_window,
+    app::threads::{LastEvent, Report, Wake, yield_to_window},
     evaluation::{RunError, TradeLevel, TradePoint, measure_trade},
 };
 
@@ -35,36 +35,19 @@ pub enum TradeEvent {
 
 /// The window's end of the threads.
 pub struct TradeWorker {
-    report: Report,
+    report: Report<TradeEvent>,
     events: Receiver<TradeEvent>,
     is_cancelled: Arc<AtomicBool>,
     latest: TradeNumber,
     thread: Option<JoinHandle<()>>,
 }
 
-#[derive(Clone)]
-struct Report {
-    outgoing: Sender<TradeEvent>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl Report {
-    fn send(&self, event: TradeEvent) {
-        // Without a window there is nobody to tell.
-        let _ = self.outgoing.send(event);
-        (self.wake)();
-    }
-}
-
 impl TradeWorker {
     /// No thread yet. `wake` is called after each event.
-    pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+    pub fn new(wake: Wake) -> Self {
         let (outgoing, events) = channel();
         Self {
-            report: Report {
-                outgoing,
-                wake: Arc::new(wake),
-            },
+            report: Report::new(outgoing, wake),
             events,
             is_cancelled: Arc::default(),
             latest: TradeNumber::default(),
@@ -82,11 +65,8 @@ impl TradeWorker {
         self.is_cancelled = Arc::default();
         let is_cancelled = Arc::clone(&self.is_cancelled);
         let before = self.thread.take();
-        let mut ending = EndingReport {
-            number,
-            report: self.report.clone(),
-            result: Err("The measurement ended unexpectedly; what is measured stays.".to_owned()),
-        };
+        let died = "The measurement ended unexpectedly; what is measured stays.".to_owned();
+        let mut ending = LastEvent::new(self.report.clone(), TradeEvent::Ended(number, Err(died)));
         let work = move || {
             yield_to_window();
             if let Some(before) = before {
@@ -94,9 +74,9 @@ impl TradeWorker {
                 let _ = before.join();
             }
             let result = measure_all(&plan, &is_cancelled, |level, point| {
-                ending.report.send(TradeEvent::Measured(number, level, Box::new(point)));
+                ending.send(TradeEvent::Measured(number, level, Box::new(point)));
             });
-            ending.replace(result.map_err(|error| error.to_string()));
+            ending.replace(TradeEvent::Ended(number, result.map_err(|error| error.to_string())));
         };
         self.thread = Some(thread::Builder::new().name("trade".to_owned()).spawn(work)?);
         self.latest = number;
@@ -110,17 +90,8 @@ impl TradeWorker {
 
     /// Writes a file on a thread of its own.
     pub fn write(&self, file: TradeFile, levels: Vec<TradeLevel>, shown: usize, path: PathBuf) {
-        let report = self.report.clone();
-        let write = move || {
-            let written = file.write(&levels, shown, &path);
-            report.send(TradeEvent::Written(
-                written.map(|()| path).map_err(|error| error.to_string()),
-            ));
-        };
-        if let Err(error) = thread::Builder::new().name("trade file".to_owned()).spawn(write) {
-            let reason = format!("No thread could be started to write the file: {error}");
-            self.report.send(TradeEvent::Written(Err(reason)));
-        }
+        let write = move |path: &Path| file.write(&levels, shown, path);
+        self.report.write("trade file", path, write, TradeEvent::Written);
     }
 
     /// The next event, if one has come.
@@ -163,25 +134,5 @@ impl Drop for TradeWorker {
 impl fmt::Debug for TradeWorker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TradeWorker").finish_non_exhaustive()
-    }
-}
-
-/// Tells the end when dropped, also by a panic.
-struct EndingReport {
-    number: TradeNumber,
-    report: Report,
-    result: Result<(), String>,
-}
-
-impl EndingReport {
-    fn replace(&mut self, result: Result<(), String>) {
-        self.result = result;
-    }
-}
-
-impl Drop for EndingReport {
-    fn drop(&mut self) {
-        let result = std::mem::replace(&mut self.result, Ok(()));
-        self.report.send(TradeEvent::Ended(self.number, result));
     }
 }

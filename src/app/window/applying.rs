@@ -1,4 +1,4 @@
-use super::{DecouplerWindow, decoupler_window::start_worker};
+use super::{DecouplerWindow, decoupler_window::wake};
 use crate::{
     app::{
         action::Action,
@@ -8,7 +8,7 @@ use crate::{
         runs::{self, RunsAction, RunsRequest},
         state::{Notice, Phase, RightCard, RunView, Saving, View},
         theme, trade,
-        worker::Request,
+        worker::{Request, Worker},
     },
     evaluation::RunSettings,
     training::StopReason,
@@ -146,7 +146,7 @@ impl DecouplerWindow {
             }
             Action::CancelSave => state.saving = None,
             Action::DismissNotice => state.notice = None,
-            Action::RestartWorker => match start_worker(&self.ctx) {
+            Action::RestartWorker => match Worker::start(wake(&self.ctx)) {
                 Ok(worker) => {
                     self.worker = worker;
                     state.phase = state.phase_at_rest();

@@ -12,6 +12,7 @@ use crate::app::{
     shortcuts::pressed_shortcuts,
     state::{State, View},
     theme::{self, Theme, space},
+    threads::Wake,
     trade::{self, TradeWorker},
     worker::Worker,
 };
@@ -38,25 +39,14 @@ impl DecouplerWindow {
     pub fn new(ctx: &Context, dialogs: DialogKind) -> std::io::Result<Self> {
         let is_dark = ctx.system_theme() != Some(egui::Theme::Light);
         theme::install(ctx, is_dark);
+        let wake = wake(ctx);
         let window = Self {
             state: State::new(is_dark),
-            worker: start_worker(ctx)?,
-            experiments: {
-                let ctx = ctx.clone();
-                ExperimentWorker::new(move || ctx.request_repaint())
-            },
-            runs: {
-                let ctx = ctx.clone();
-                RunsWorker::start(move || ctx.request_repaint())?
-            },
-            identifiability: {
-                let ctx = ctx.clone();
-                IdentifiabilityWorker::new(move || ctx.request_repaint())
-            },
-            trade: {
-                let ctx = ctx.clone();
-                TradeWorker::new(move || ctx.request_repaint())
-            },
+            worker: Worker::start(Arc::clone(&wake))?,
+            experiments: ExperimentWorker::new(Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake))?,
+            identifiability: IdentifiabilityWorker::new(Arc::clone(&wake)),
+            trade: TradeWorker::new(wake),
             measuring: DecoderMeasuring::default(),
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
@@ -158,9 +148,10 @@ impl DecouplerWindow {
     }
 }
 
-pub(super) fn start_worker(ctx: &Context) -> std::io::Result<Worker> {
-    let ctx = Arc::new(ctx.clone());
-    Worker::start(move || ctx.request_repaint())
+/// Makes the window draw a frame.
+pub(super) fn wake(ctx: &Context) -> Wake {
+    let ctx = ctx.clone();
+    Arc::new(move || ctx.request_repaint())
 }
 
 impl eframe::App for DecouplerWindow {

@@ -3,6 +3,7 @@ use std::sync::Arc;
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set},
+    decoupler_window::wake,
 };
 use crate::{
     app::{
@@ -127,10 +128,8 @@ impl DecouplerWindow {
             }
             Event::Networks(number, networks) if self.measuring.awaits(number) => match (networks, &state.run) {
                 (Ok(networks), Some(run)) => {
-                    let (test, ctx) = (Arc::clone(&run.test.set), self.ctx.clone());
-                    let measured = self
-                        .measuring
-                        .begin(run.settings, *networks, test, move || ctx.request_repaint());
+                    let test = Arc::clone(&run.test.set);
+                    let measured = self.measuring.begin(run.settings, *networks, test, wake(&self.ctx));
                     if let Err(error) = measured {
                         state.decoders.end(&format!("no thread could be started: {error}"));
                     }
