@@ -81,7 +81,6 @@ impl Dense {
 
 /// Prints the ratio of the epochs' times and how far the two paths are apart after as many steps.
 pub(crate) fn print() {
-    faer::set_global_parallelism(faer::Par::Seq);
     let shape = Shape {
         inputs: 30,
         hidden: 12,

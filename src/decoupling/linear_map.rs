@@ -23,8 +23,6 @@ impl LinearMap {
     /// # Errors
     /// Values that cannot be scaled.
     pub fn fit(training: &Dataset) -> Result<Self, ScalingError> {
-        // How faer divides a decomposition depends on the number of threads, and with it the last bits.
-        faer::set_global_parallelism(faer::Par::Seq);
         let inputs = MinMax::fit(training.resistances_ohm.view())?;
         let outputs = MinMax::fit(training.coordinates_mm.view())?;
         let (n1, m) = (inputs.varying().len() + 1, outputs.varying().len());

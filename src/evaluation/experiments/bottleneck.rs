@@ -24,8 +24,6 @@ impl Bottleneck {
     /// # Errors
     /// Coordinates that cannot be scaled.
     pub fn fit(coordinates_mm: ArrayView2<'_, f64>, hidden: usize) -> Result<Self, ScalingError> {
-        // How faer divides a decomposition depends on the number of threads, and with it the last bits.
-        faer::set_global_parallelism(faer::Par::Seq);
         let outputs = MinMax::fit(coordinates_mm)?;
         let targets = outputs.scale(coordinates_mm);
         let (samples, channels) = targets.dim();
