@@ -76,21 +76,28 @@ fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Vec<Decou
 /// What decoding of a frame by networks cannot avoid, in the precision of the array.
 macro_rules! arithmetic {
     ($real:ty, $tanh:path, $divisions:expr, $tangents:expr, $products:expr) => {{
+        const LANES: usize = 64 / size_of::<$real>();
         let (mut quotients, mut tangents) = (vec![1.5 as $real; $divisions], vec![0.3 as $real; $tangents]);
         let weights = vec![0.01 as $real; $products];
         move || {
             pulp::Arch::new().dispatch(|| {
                 for value in &mut *quotients {
-                    *value = 2.0 / black_box(1.0 as $real) / *value;
+                    *value = 1.0 / *value;
                 }
-                let mut sums = [0.0 as $real; 32];
-                for block in weights.chunks_exact(32) {
-                    for (sum, weight) in sums.iter_mut().zip(block) {
-                        *sum += 0.7 * weight;
+            });
+            let sum = pulp::Arch::new().dispatch(|| {
+                // Several sums, so that additions need not wait for each other.
+                let mut sums = [[0.0 as $real; LANES]; 4];
+                for blocks in weights.as_chunks::<LANES>().0.as_chunks::<4>().0 {
+                    for (sums, block) in sums.iter_mut().zip(blocks) {
+                        for lane in 0..LANES {
+                            sums[lane] += 0.7 * block[lane];
+                        }
                     }
                 }
-                black_box(sums);
+                sums.as_flattened().iter().sum::<$real>()
             });
+            black_box(sum);
             $tanh(&mut tangents);
             black_box((&quotients, &tangents));
         }

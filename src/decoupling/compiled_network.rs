@@ -1,4 +1,5 @@
 use ndarray::{Axis, Slice};
+use pulp::{Simd, WithSimd};
 
 use super::{
     frame::{DecodeError, FrameDecoder},
@@ -7,7 +8,7 @@ use super::{
 use crate::network::{DecouplingNetwork, Quantity};
 
 /// Networks made ready to decode frames fast, in double or single precision, without allocating: the scalings are
-/// folded into the weights, layers are padded to whole vector registers, and each stage runs over all rows at once.
+/// folded into the weights, and layers are padded to whole vector registers.
 ///
 /// Inputs are taken relative to a resistance R₀ in the middle of each channel, subtracted in double precision:
 /// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. So single precision loses nothing where readings differ little.
@@ -21,8 +22,11 @@ pub struct CompiledNetworks<T> {
     coordinates_per_row: usize,
     /// One for all rows, or one for each.
     networks: Vec<Compiled<T>>,
+    /// Of one row.
     inputs: Vec<T>,
+    /// Of all rows, so that hyperbolic tangents fill the vector registers.
     hidden: Vec<T>,
+    /// Of one row.
     outputs: Vec<T>,
     /// Inputs and sums of one row in double precision.
     wide_inputs: Vec<f64>,
@@ -81,9 +85,9 @@ impl<T: Real> CompiledNetworks<T> {
             rows,
             channels,
             coordinates_per_row,
-            inputs: vec![T::ZERO; rows * channels],
+            inputs: vec![T::ZERO; channels],
             hidden: vec![T::ZERO; rows * hidden],
-            outputs: vec![T::ZERO; rows * outputs],
+            outputs: vec![T::ZERO; outputs],
             wide_inputs: vec![0.0; channels],
             wide_sums: vec![0.0; hidden],
             networks,
@@ -172,44 +176,75 @@ impl<T: Real> FrameDecoder for CompiledNetworks<T> {
     fn decode(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
         assert_eq!(readings_ohm.len(), self.rows * self.channels);
         assert_eq!(coordinates_mm.len(), self.rows * self.coordinates_per_row);
-        pulp::Arch::new().dispatch(|| self.decode_vectorised(readings_ohm, coordinates_mm))
+        pulp::Arch::new().dispatch(Decoding {
+            decoder: self,
+            readings_ohm,
+            coordinates_mm,
+        })
+    }
+}
+
+/// A type rather than a closure, which would be too long to be moved into the code for vector registers.
+struct Decoding<'a, T> {
+    decoder: &'a mut CompiledNetworks<T>,
+    readings_ohm: &'a [f64],
+    coordinates_mm: &'a mut [f64],
+}
+
+impl<T: Real> WithSimd for Decoding<'_, T> {
+    type Output = Result<(), DecodeError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        DecodeError::check(self.readings_ohm)?;
+        self.decoder.feed_hidden_nodes(self.readings_ohm);
+        T::tanh_in_place(&mut self.decoder.hidden);
+        self.decoder.move_nodes(self.coordinates_mm);
+        Ok(())
     }
 }
 
 impl<T: Real> CompiledNetworks<T> {
+    /// Sums of all hidden nodes.
     #[inline(always)]
-    fn decode_vectorised(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
-        DecodeError::check(readings_ohm)?;
+    fn feed_hidden_nodes(&mut self, readings_ohm: &[f64]) {
         let last = self.networks.len() - 1;
-        let (hidden_width, output_width) = (self.hidden.len() / self.rows, self.outputs.len() / self.rows);
-        for row in 0..self.rows {
+        let width = self.hidden.len() / self.rows;
+        let rows = readings_ohm
+            .chunks_exact(self.channels)
+            .zip(self.hidden.chunks_exact_mut(width));
+        for (row, (readings, hidden)) in rows.enumerate() {
             let network = &self.networks[row.min(last)];
-            let channels = row * self.channels..(row + 1) * self.channels;
-            let hidden = &mut self.hidden[row * hidden_width..row * hidden_width + network.padded_hidden];
+            let hidden = &mut hidden[..network.padded_hidden];
             if let Some(layer) = &network.wide_hidden_layer {
                 let sums = &mut self.wide_sums[..network.padded_hidden];
-                network.read(&readings_ohm[channels], &mut self.wide_inputs);
+                network.read(readings, &mut self.wide_inputs);
                 affine(&self.wide_inputs, layer, sums);
                 hidden.iter_mut().zip(sums).for_each(|(to, sum)| *to = T::of(*sum));
             } else {
-                let inputs = &mut self.inputs[channels.clone()];
-                network.read(&readings_ohm[channels], inputs);
-                affine(inputs, &network.hidden_layer, hidden);
+                network.read(readings, &mut self.inputs);
+                affine(&self.inputs, &network.hidden_layer, hidden);
             }
         }
-        T::tanh_in_place(&mut self.hidden);
-        for row in 0..self.rows {
+    }
+
+    /// Coordinates from the hidden nodes' outputs.
+    #[inline(always)]
+    fn move_nodes(&mut self, coordinates_mm: &mut [f64]) {
+        let last = self.networks.len() - 1;
+        let width = self.hidden.len() / self.rows;
+        let rows = coordinates_mm
+            .chunks_exact_mut(self.coordinates_per_row)
+            .zip(self.hidden.chunks_exact(width));
+        for (row, (coordinates, hidden)) in rows.enumerate() {
             let network = &self.networks[row.min(last)];
-            let hidden = &self.hidden[row * hidden_width..row * hidden_width + network.padded_hidden];
-            let outputs = &mut self.outputs[row * output_width..row * output_width + network.padded_outputs];
-            affine(hidden, &network.output_layer, outputs);
-            let coordinates = &mut coordinates_mm[row * self.coordinates_per_row..(row + 1) * self.coordinates_per_row];
+            let outputs = &mut self.outputs[..network.padded_outputs];
+            affine(&hidden[..network.padded_hidden], &network.output_layer, outputs);
             coordinates.copy_from_slice(&network.middles_mm);
             for (&coordinate, output) in network.varying.iter().zip(&*outputs) {
                 coordinates[coordinate] += output.to_f64();
             }
         }
-        Ok(())
     }
 }
 

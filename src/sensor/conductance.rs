@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::{Axes, SensorModel};
+use super::{Axes, SensorModel, reciprocal_distances::sum_reciprocal_distances};
 
 /// The sums `s_k = Σ_i Σ_j 1/d` of Eq. (2) for one row-wire, so that `R_k = g / s_k`, and their derivatives by what
 /// moves. Kept between evaluations so that none allocates.
@@ -45,63 +45,14 @@ impl RowConductance {
 
     /// Evaluates sums and derivatives of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them).
     ///
-    /// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, uz counting downwards,
-    /// ∂(1/d)/∂uz = z/d³.
-    ///
     /// # Panics
     /// If there are not M2 displacements.
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let axes = self.axes;
-        let columns = self.columns;
         let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
-        pulp::Arch::new().dispatch(|| {
-            sums.fill(0.0);
-            derivatives.fill(0.0);
-            let blocks = derivatives.chunks_exact_mut(columns * axes.count());
-            for ((node, &displacement), block) in displacements_mm.iter().enumerate().zip(blocks) {
-                let position = model.displaced_mm(row, node, displacement);
-                match axes {
-                    Axes::Z => add_node_z(model, position, sums, block),
-                    Axes::Xyz => add_node_xyz(model, position, sums, block),
-                }
-            }
-        });
-    }
-}
-
-#[inline(always)]
-fn add_node_z(model: &SensorModel, position: DVec3, sums: &mut [f64], by_z: &mut [f64]) {
-    let (y0, pitch) = (model.geometry.column_y0_mm, model.geometry.column_pitch_mm);
-    for j in 0..model.scale.nodes_per_column() {
-        let dx = position.x - model.geometry.column_node_mm(0, j).x;
-        let across2 = dx * dx + position.z * position.z;
-        for (column, (sum, by_z)) in sums.iter_mut().zip(by_z.iter_mut()).enumerate() {
-            let dy = position.y - (y0 + pitch * column as f64);
-            let inverse = 1.0 / (across2 + dy * dy).sqrt();
-            *sum += inverse;
-            *by_z += position.z * (inverse * inverse * inverse);
-        }
-    }
-}
-
-#[inline(always)]
-fn add_node_xyz(model: &SensorModel, position: DVec3, sums: &mut [f64], derivatives: &mut [f64]) {
-    let (y0, pitch) = (model.geometry.column_y0_mm, model.geometry.column_pitch_mm);
-    let (by_x, rest) = derivatives.split_at_mut(sums.len());
-    let (by_y, by_z) = rest.split_at_mut(sums.len());
-    for j in 0..model.scale.nodes_per_column() {
-        let dx = position.x - model.geometry.column_node_mm(0, j).x;
-        let across2 = dx * dx + position.z * position.z;
-        let of_axes = by_x.iter_mut().zip(by_y.iter_mut()).zip(by_z.iter_mut());
-        for (column, (sum, ((by_x, by_y), by_z))) in sums.iter_mut().zip(of_axes).enumerate() {
-            let dy = position.y - (y0 + pitch * column as f64);
-            let inverse = 1.0 / (across2 + dy * dy).sqrt();
-            let cubed = inverse * inverse * inverse;
-            *sum += inverse;
-            *by_x -= dx * cubed;
-            *by_y -= dy * cubed;
-            *by_z += position.z * cubed;
+        match self.axes {
+            Axes::Z => sum_reciprocal_distances::<1>(model, row, displacements_mm, sums, derivatives),
+            Axes::Xyz => sum_reciprocal_distances::<3>(model, row, displacements_mm, sums, derivatives),
         }
     }
 }

@@ -5,6 +5,7 @@ mod axes;
 mod conductance;
 mod geometry;
 mod identifiability;
+mod reciprocal_distances;
 mod resistance;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};

@@ -3,7 +3,7 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{ArrayScale, Geometry, GeometryError};
+use super::{ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances};
 
 /// Resistance per millimetre of rubber used where nothing else is said. The paper gives none: g scales every
 /// resistance alike, so no relative error depends on it.
@@ -102,24 +102,8 @@ impl SensorModel {
     ) -> Result<(), SensorError> {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
-        let (y0, pitch) = (self.geometry.column_y0_mm, self.geometry.column_pitch_mm);
-        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance. No fused operations,
-        // so every machine gives the same bits.
-        let sums = &mut *resistances_ohm;
-        pulp::Arch::new().dispatch(|| {
-            sums.fill(0.0);
-            for (node, &displacement) in displacements_mm.iter().enumerate() {
-                let position = self.displaced_mm(row, node, displacement);
-                for j in 0..self.scale.nodes_per_column() {
-                    let dx = position.x - self.geometry.column_node_mm(0, j).x;
-                    let across2 = dx * dx + position.z * position.z;
-                    for (column, sum) in sums.iter_mut().enumerate() {
-                        let dy = position.y - (y0 + pitch * column as f64);
-                        *sum += 1.0 / (across2 + dy * dy).sqrt();
-                    }
-                }
-            }
-        });
+        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
+        sum_reciprocal_distances::<0>(self, row, displacements_mm, resistances_ohm, &mut []);
         for (column, value) in resistances_ohm.iter_mut().enumerate() {
             *value = self.resistivity_ohm_per_mm / *value;
             if !(*value > 0.0 && value.is_finite()) {
