@@ -22,6 +22,7 @@ use decoupler::{
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
+use pulp::{Simd, WithSimd};
 
 /// A piece of work with its name.
 type Work<'a> = (String, Box<dyn FnMut() + 'a>);
@@ -73,31 +74,36 @@ fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Vec<Decou
     (0..training.rows()).map(network).collect()
 }
 
-/// What decoding of a frame by networks cannot avoid, in the precision of the array.
+/// What decoding of a frame by networks cannot avoid, in the precision of the array. The type rather than a closure, which
+/// would be too long to be moved into the code for vector registers.
 macro_rules! arithmetic {
     ($real:ty, $tanh:path, $divisions:expr, $tangents:expr, $products:expr) => {{
-        const LANES: usize = 64 / size_of::<$real>();
-        let (mut quotients, mut tangents) = (vec![1.5 as $real; $divisions], vec![0.3 as $real; $tangents]);
-        let weights = vec![0.01 as $real; $products];
-        move || {
-            pulp::Arch::new().dispatch(|| {
-                for value in &mut *quotients {
+        struct Arithmetic<'a>(&'a mut [$real], &'a [$real]);
+        impl WithSimd for Arithmetic<'_> {
+            type Output = $real;
+
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _: S) -> $real {
+                const LANES: usize = 8;
+                for value in self.0 {
                     *value = 1.0 / *value;
                 }
-            });
-            let sum = pulp::Arch::new().dispatch(|| {
                 // Several sums, so that additions need not wait for each other.
-                let mut sums = [[0.0 as $real; LANES]; 4];
-                for blocks in weights.as_chunks::<LANES>().0.as_chunks::<4>().0 {
+                let mut sums = [[0.0; LANES]; 4];
+                for blocks in self.1.as_chunks::<LANES>().0.as_chunks::<4>().0 {
                     for (sums, block) in sums.iter_mut().zip(blocks) {
                         for lane in 0..LANES {
                             sums[lane] += 0.7 * block[lane];
                         }
                     }
                 }
-                sums.as_flattened().iter().sum::<$real>()
-            });
-            black_box(sum);
+                sums.as_flattened().iter().sum()
+            }
+        }
+        let (mut quotients, mut tangents) = (vec![1.5 as $real; $divisions], vec![0.3 as $real; $tangents]);
+        let weights = vec![0.01 as $real; $products];
+        move || {
+            black_box(pulp::Arch::new().dispatch(Arithmetic(&mut quotients, &weights)));
             $tanh(&mut tangents);
             black_box((&quotients, &tangents));
         }

@@ -1,0 +1,69 @@
+//! What runs for every frame allocates nothing.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use decoupler::{
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{CompiledNetworks, FrameDecoder},
+    network::{DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, Shape, nguyen_widrow},
+    scene::Scene,
+    sensor::{Axes, RowConductance, SensorModel},
+};
+use glam::DVec3;
+
+fn allocations(work: impl FnOnce()) -> u64 {
+    allocation_counter::measure(work).count_total
+}
+
+#[test]
+fn allocations_are_counted() {
+    assert_eq!(allocations(|| drop(vec![0.0; 10])), 1);
+}
+
+#[test]
+fn a_frame_is_decoded_by_networks_without_allocating() {
+    let model = SensorModel::new("10x10_5x30".parse().unwrap());
+    let rows = model.scale.rows();
+    let set = Dataset::simulate(&model, &Scene::default(), 1000, &mut Seed(0).rng(Stream::Training)).unwrap();
+    let frame: Vec<f64> = set.resistances_ohm.iter().take(rows * 30).copied().collect();
+    let mut coordinates_mm = vec![0.0; rows * model.scale.coordinates_per_row()];
+    let mut rng = Seed(0).rng(Stream::Start);
+    for quantity in Quantity::ALL {
+        // Without noise, single precision has sums in double precision; with noise it has not.
+        for noise in [0.0, 1e-2] {
+            let scaling = ScalingChoice::Whitening;
+            let mut network = |row| {
+                let set = set.of_row(row);
+                let choice = InputChoice { quantity, scaling };
+                let inputs = Inputs::fit(choice, set.resistances_ohm.view(), noise).unwrap();
+                let outputs = MinMax::fit(set.coordinates_mm.view()).unwrap();
+                let shape = Shape {
+                    inputs: inputs.count(),
+                    hidden: 12,
+                    outputs: outputs.varying().len(),
+                };
+                DecouplingNetwork::new(inputs, nguyen_widrow(shape, &mut rng), outputs)
+            };
+            let networks: Vec<DecouplingNetwork> = (0..rows).map(&mut network).collect();
+            let mut double = CompiledNetworks::<f64>::each(&networks);
+            let mut single = CompiledNetworks::<f32>::each(&networks);
+            let decoders: [&mut dyn FrameDecoder; 2] = [&mut double, &mut single];
+            for decoder in decoders {
+                assert_eq!(allocations(|| decoder.decode(&frame, &mut coordinates_mm).unwrap()), 0);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_forward_model_and_its_jacobian_do_not_allocate() {
+    let model = SensorModel::new("10x10_5x30".parse().unwrap());
+    let pressed = vec![DVec3::new(0.0, 0.0, 0.4); model.scale.nodes_per_row()];
+    let mut resistances_ohm = vec![0.0; model.scale.columns()];
+    let forward = || model.row_resistances_into(3, &pressed, &mut resistances_ohm).unwrap();
+    assert_eq!(allocations(forward), 0);
+    for axes in [Axes::Z, Axes::Xyz] {
+        let mut conductance = RowConductance::new(&model, axes);
+        assert_eq!(allocations(|| conductance.evaluate(&model, 3, &pressed)), 0);
+    }
+}
