@@ -148,8 +148,8 @@ pub struct RunResult {
     pub starts_ended: usize,
     /// Time spent in training.
     pub elapsed: Duration,
-    /// Time to decouple one snapshot.
-    pub frame_time: Duration,
+    /// Time to decode one snapshot, where it was measured.
+    pub frame_time: Option<Duration>,
 }
 
 impl RunView {

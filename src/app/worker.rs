@@ -21,7 +21,7 @@ use super::{
     threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
 };
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord, network_frame_time},
     export::{CheckpointFile, NetworkFile},
     network::Networks,
     training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
@@ -119,8 +119,8 @@ pub struct Progress {
     pub starts_ended: usize,
     /// Time spent in training.
     pub elapsed: Duration,
-    /// Time to decouple one snapshot.
-    pub frame_time: Duration,
+    /// Time to decode one snapshot; measured when the training pauses or ends.
+    pub frame_time: Option<Duration>,
     /// Why the training has ended, if it has.
     pub stop_reason: Option<StopReason>,
 }
@@ -336,7 +336,6 @@ impl Labour {
             (leader, epochs) if leader == number => epochs,
             _ => 0,
         };
-        let snapshots = u32::try_from(run.test().snapshots()).unwrap_or(u32::MAX).max(1);
         self.report.send(Event::Progressed(Box::new(Progress {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -351,7 +350,7 @@ impl Labour {
                 .filter(|start| start.stop_reason().is_some())
                 .count(),
             elapsed: self.elapsed,
-            frame_time: cost / snapshots,
+            frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
             stop_reason: run.stop_reason(),
         })));
         self.reported = (number, trainer.history().len());

@@ -1,15 +1,17 @@
 use std::{fmt, str::FromStr, time::Instant};
 
-use ndarray::Axis;
 use thiserror::Error;
 
-use super::{Errors, Run, RunError, RunSettings, run::unseen_noise};
+use super::{
+    Errors, Run, RunError, RunSettings,
+    frame_time::{compiled, frame_us},
+    run::unseen_noise,
+};
 use crate::{
     dataset::{Dataset, Stream},
     decoupling::{
-        CompiledNetworks, FrameDecoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
-        RadialBasisNetwork, RadialBasisSettings, Real, RidgeMap, TrainingMean, decode_set, fit_rows,
-        resistance_residual,
+        FrameDecoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder, RadialBasisNetwork,
+        RadialBasisSettings, RidgeMap, TrainingMean, decode_set, fit_rows, resistance_residual,
     },
     network::Networks,
 };
@@ -242,48 +244,6 @@ impl DecoderSet {
             fit_seconds,
         }))
     }
-}
-
-fn compiled<T: Real + 'static>(networks: &Networks, rows: usize) -> Box<dyn FrameDecoder> {
-    Box::new(match networks.each() {
-        [only] => CompiledNetworks::<T>::shared(only, rows),
-        each => CompiledNetworks::<T>::each(each),
-    })
-}
-
-/// Microseconds to decode a frame of `test`: the median over blocks of frames, each long enough for the clock.
-fn frame_us(decoder: &mut dyn FrameDecoder, test: &Dataset) -> Result<f64, RunError> {
-    const FEWEST_BLOCKS: usize = 3;
-    const MOST_BLOCKS: usize = 101;
-    const BLOCK_SECONDS: f64 = 100e-6;
-    const MOST_SECONDS: f64 = 0.03;
-    let frames: Vec<_> = test.resistances_ohm.axis_chunks_iter(Axis(0), test.rows()).collect();
-    let mut answer_mm = vec![0.0; test.rows() * test.coordinates_mm.ncols()];
-    let mut at = 0;
-    let mut decode = |frames_in_block: usize| -> Result<f64, RunError> {
-        let begun = Instant::now();
-        for _ in 0..frames_in_block {
-            let frame = frames[at % frames.len()];
-            let readings = frame.to_slice().expect("rows of a standard array are contiguous");
-            decoder.decode(std::hint::black_box(readings), &mut answer_mm)?;
-            std::hint::black_box(&answer_mm);
-            at += 1;
-        }
-        Ok(begun.elapsed().as_secs_f64())
-    };
-    // The first fills the caches.
-    decode(1)?;
-    let once = decode(1)?.max(1e-9);
-    let frames_in_block = (BLOCK_SECONDS / once).ceil() as usize;
-    let mut blocks = Vec::new();
-    let mut spent = 0.0;
-    while blocks.len() < FEWEST_BLOCKS || (spent < MOST_SECONDS && blocks.len() < MOST_BLOCKS) {
-        let seconds = decode(frames_in_block)?;
-        spent += seconds;
-        blocks.push(1e6 * seconds / frames_in_block as f64);
-    }
-    blocks.sort_by(f64::total_cmp);
-    Ok(blocks[blocks.len() / 2])
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod frame_time;
 mod node_spread;
 mod outlook;
 mod preset;
@@ -21,6 +22,7 @@ mod trade_level;
 
 pub use decoder_set::{DecoderKind, DecoderKindError, DecoderReport, DecoderSet, Precision};
 pub use errors::{Errors, NodeAddress};
+pub use frame_time::network_frame_time;
 pub use node_spread::node_rms_mm;
 pub use outlook::{Outlook, OutlookError};
 pub use preset::{Preset, PresetError};

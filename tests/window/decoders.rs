@@ -14,13 +14,13 @@ use crate::{
 };
 
 const NAMES: [&str; 7] = [
-    "mean",
-    "ridge map",
-    "network f64",
-    "network f32",
-    "radial basis",
+    "Training mean",
+    "Ridge",
+    "Network",
+    "Network f32",
+    "Radial basis",
     "Newton",
-    "polished",
+    "Network + Newton",
 ];
 
 /// Waits until every decoder is measured.
@@ -76,6 +76,7 @@ fn the_decoders_figures_are_the_librarys() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    assert!(driver.has("Decoding a snapshot"));
     assert!(table(&driver).is_empty(), "folded away until asked for");
     driver.click("More decoders");
     wait_for_all(&mut driver);

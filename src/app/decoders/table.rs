@@ -1,14 +1,14 @@
 use eframe::egui::{CollapsingHeader, Ui};
 
-use super::DecoderResult;
+use super::{DecoderResult, decoder_name};
 use crate::{
     app::{
         action::Action,
-        panels::{Column, Row, fields::capitalised, table_ui},
+        panels::{Column, Row, table_ui},
         state::{Phase, State},
         theme::{Theme, dim_ui, note_ui, space},
     },
-    evaluation::{DecoderKind, DecoderReport, Errors, Precision},
+    evaluation::{DecoderKind, DecoderReport, Errors},
     export::format_number,
 };
 
@@ -67,7 +67,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
         .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
         .collect();
     let rows = measured.iter().map(|result| Row {
-        name: name(result),
+        name: decoder_name(result.kind, result.precision),
         meaning: meaning(result.kind),
         cells: match &result.report {
             None => vec!["…".to_owned(); columns.len()],
@@ -92,7 +92,8 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
         if let Some(Err(reason)) = &result.report {
-            note_ui(ui, &format!("{}: {reason}", capitalised(name(result))));
+            let name = decoder_name(result.kind, result.precision);
+            note_ui(ui, &format!("{name}: {reason}"));
         }
     }
 }
@@ -110,18 +111,6 @@ fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
         Some(Some(report.frame_us)),
     ]);
     figures.flatten().map(format_number).collect()
-}
-
-fn name(result: &DecoderResult) -> &'static str {
-    match (result.kind, result.precision) {
-        (DecoderKind::Mean, _) => "mean",
-        (DecoderKind::Ridge, _) => "ridge map",
-        (DecoderKind::Network, Precision::Double) => "network f64",
-        (DecoderKind::Network, Precision::Single) => "network f32",
-        (DecoderKind::RadialBasis, _) => "radial basis",
-        (DecoderKind::Newton, _) => "Newton",
-        (DecoderKind::Polish, _) => "polished",
-    }
 }
 
 fn meaning(kind: DecoderKind) -> &'static str {
@@ -150,8 +139,8 @@ mod tests {
         state.decoders.measured = Some(DecoderResult::pending());
         state.decoders.take(0, Err("no resistance at rest".to_owned()));
         let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
-        harness.get_by_label("Mean: no resistance at rest");
-        harness.get_by_label("mean, Z %: –");
+        harness.get_by_label("Training mean: no resistance at rest");
+        harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
     }
 }

@@ -254,8 +254,10 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     if epochs > 0 {
         rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
     }
-    rows.push(("Decoupling a snapshot", format_short_time(result.frame_time)));
     rows.push(("Best epoch", result.best_epoch.to_string()));
+    if let Some(time) = result.frame_time {
+        rows.push(("Decoding a snapshot", format_short_time(time)));
+    }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);

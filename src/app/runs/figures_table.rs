@@ -2,7 +2,10 @@ use std::time::Duration;
 
 use eframe::egui::Ui;
 
-use super::RunsState;
+use super::{
+    RunsState,
+    scene_words::{inputs_words, loading_words, movement_words, noise_words, rows_words},
+};
 use crate::{
     app::{
         panels::{Column, Row, table_ui},
@@ -25,7 +28,7 @@ const COLUMNS: [Column; 2] = [
 /// A figure of a run, in words.
 type FigureOf = fn(&KeptRun) -> String;
 
-const FIGURES: [(&str, FigureOf); 13] = [
+const FIGURES: [(&str, FigureOf); 18] = [
     ("Z error, %", |run| format_number(run.file.errors.z_percent)),
     ("X error, %", |run| format_number(run.file.errors.x_percent)),
     ("Y error, %", |run| format_number(run.file.errors.y_percent)),
@@ -41,6 +44,11 @@ const FIGURES: [(&str, FigureOf); 13] = [
         format_number(run.file.baselines.mean.z_percent)
     }),
     ("array", |run| run.file.settings.sensor.scale.to_string()),
+    ("rows", |run| rows_words(run.file.settings.scene.rows)),
+    ("axes", |run| movement_words(run.file.settings.scene.movement)),
+    ("loading", |run| loading_words(&run.file.settings.scene)),
+    ("noise", |run| noise_words(&run.file.settings.scene.noise)),
+    ("inputs", |run| inputs_words(run.file.settings.inputs)),
     ("hidden nodes", |run| run.file.settings.hidden.to_string()),
     ("method", |run| {
         run.file.settings.training.method.short_name().to_owned()

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
-use super::{PLACES, RunsAction};
+use super::{PLACES, RunsAction, scene_words::unlike_paper};
 use crate::{
     app::{
         Action,
@@ -118,18 +118,22 @@ fn name_ui(ui: &mut Ui, run: &KeptRun, actions: &mut Vec<RunsAction>) {
     }
 }
 
-/// What the run was made with, in a line.
+/// What the run was made with.
 fn conditions(settings: &RunSettings) -> String {
     let starts = match settings.starts {
         1 => String::new(),
         starts => format!(", {starts} starts"),
     };
-    format!(
+    let mut text = format!(
         "{}, {} hidden, {}, {} samples, seed {}{starts}",
         settings.sensor.scale,
         settings.hidden,
         settings.training.method.short_name(),
         settings.samples,
         settings.seed
-    )
+    );
+    for words in unlike_paper(settings) {
+        text += &format!(", {words}");
+    }
+    text
 }

@@ -7,6 +7,7 @@ mod curves;
 mod figures_table;
 mod list;
 mod news;
+mod scene_words;
 mod state;
 mod view;
 mod worker;

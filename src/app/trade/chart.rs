@@ -16,6 +16,7 @@ use crate::{
             Key, Mark,
             plot_style::{log_marks, log_marks_across, log_text, plot},
         },
+        decoders::decoder_name,
         state::State,
         theme::{Palette, Theme, dim_ui, semibold, type_size},
     },
@@ -43,7 +44,13 @@ pub fn keys(level: &TradeLevel, palette: &Palette) -> Vec<Key> {
     let key = |name, mark, colour| Key { name, mark, colour };
     let kinds = DecoderKind::ALL.into_iter().filter(is_there);
     let mut keys: Vec<Key> = kinds
-        .map(|kind| key(super::names::decoder_name(kind), Mark::Discs, colour(kind, palette)))
+        .map(|kind| {
+            key(
+                decoder_name(kind, Precision::Double),
+                Mark::Discs,
+                colour(kind, palette),
+            )
+        })
         .collect();
     keys.push(key("no other is better", Mark::Line, palette.dim));
     if limit(level).is_some() {

@@ -3,28 +3,14 @@
 use std::time::Duration;
 
 use crate::{
-    evaluation::{DecoderKind, Precision, TradePoint},
+    app::decoders::decoder_name,
+    evaluation::TradePoint,
     export::{format_duration, format_number, format_percent},
 };
 
-/// The way of decoding.
-pub fn decoder_name(kind: DecoderKind) -> &'static str {
-    match kind {
-        DecoderKind::Mean => "Training mean",
-        DecoderKind::Ridge => "Ridge",
-        DecoderKind::Network => "Network",
-        DecoderKind::RadialBasis => "Radial basis",
-        DecoderKind::Newton => "Newton",
-        DecoderKind::Polish => "Network + Newton",
-    }
-}
-
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradePoint) -> String {
-    let mut name = decoder_name(point.report.kind).to_owned();
-    if point.report.precision == Precision::Single {
-        name += " f32";
-    }
+    let mut name = decoder_name(point.report.kind, point.report.precision).to_owned();
     name += &format!(", {} preset", point.preset);
     if let Some(hidden) = point.hidden() {
         name += &format!(", {hidden} hidden");

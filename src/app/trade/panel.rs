@@ -2,12 +2,13 @@ use eframe::egui::{TextEdit, Ui, vec2};
 
 use super::{
     Thoroughness, TradeAction, TradeForm, WhichPresets,
-    names::{decoder_name, noise_name},
+    names::noise_name,
     news::{can_measure, is_quiet},
 };
 use crate::{
     app::{
         Action,
+        decoders::decoder_name,
         panels::fields::count_ui,
         state::State,
         theme::{
@@ -16,7 +17,7 @@ use crate::{
         },
     },
     dataset::LARGEST_SAMPLES,
-    evaluation::{DecoderKind, Preset},
+    evaluation::{DecoderKind, Precision, Preset},
     training::StoppingRules,
 };
 
@@ -67,7 +68,8 @@ fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
     form.presets = segmented_ui(ui, "Presets", &presets, form.presets, true).unwrap_or(form.presets);
     section_heading_ui(ui, "Decoders");
     for (kind, is_chosen) in DecoderKind::ALL.into_iter().zip(&mut form.decoders) {
-        ui.checkbox(is_chosen, decoder_name(kind)).on_hover_text(meaning(kind));
+        ui.checkbox(is_chosen, decoder_name(kind, Precision::Double))
+            .on_hover_text(meaning(kind));
     }
     section_heading_ui(ui, "Training");
     let options = [
