@@ -195,7 +195,7 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
     let time = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
     writeln!(
         out,
-        "Ended after {} epochs, {} ({} an epoch): {reason}",
+        "Ended after {} epochs, {} on one thread ({} an epoch): {reason}",
         epochs(training),
         time(training.seconds),
         time(epoch_seconds(training))

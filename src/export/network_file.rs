@@ -49,7 +49,7 @@ pub struct TrainingRecord {
     pub stop_reason: Option<StopReason>,
     /// The epoch of the best network.
     pub best_epoch: usize,
-    /// Seconds spent in training.
+    /// Seconds spent in training on one thread, the networks of all rows together.
     pub seconds: f64,
     /// Every epoch, the start first.
     pub history: Vec<EpochRecord>,

@@ -58,7 +58,7 @@ const FIGURES: [(&str, FigureOf); 18] = [
         let epochs = training.history.last().map_or(0, |epoch| epoch.epoch);
         format!("{} of {epochs}", training.best_epoch)
     }),
-    ("training time", |run| {
+    ("training time, one thread", |run| {
         let time = Duration::try_from_secs_f64(run.file.training.seconds);
         time.map_or_else(|_| format_number(None), format_duration)
     }),

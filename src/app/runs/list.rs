@@ -52,7 +52,7 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
     dim_ui(ui, &conditions(&run.file.settings));
     let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
     let text = format!(
-        "Z {}, {}",
+        "Z {}, {} on one thread",
         format_percent(run.file.errors.z_percent),
         format_duration(time)
     );
