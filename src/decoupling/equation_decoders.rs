@@ -1,6 +1,7 @@
 use super::{
     frame::{DecodeError, FrameDecoder},
-    newton::{Newton, NewtonError, NewtonRules},
+    newton::Newton,
+    newton_report::{NewtonError, NewtonRules},
     posterior::Posterior,
 };
 use crate::{

@@ -1,91 +1,9 @@
-use std::fmt;
-
-use faer::{Mat, linalg::solvers::SolveLstsq};
-use thiserror::Error;
-
-use super::row_problem::{Range, RowProblem, ranges, wide_ranges};
-use crate::{
-    scene::Scene,
-    sensor::{Axes, SensorModel},
+use super::{
+    gauss_newton::{Linearised, damped_step},
+    newton_report::{NewtonError, NewtonReport, NewtonRules, NewtonStop},
+    row_problem::{Range, RowProblem, ranges, wide_ranges},
 };
-
-/// When to end Newton's method.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NewtonRules {
-    /// Most steps. A step that was rejected and shortened counts as one.
-    pub steps: usize,
-    /// Length of a step, in millimetres, below which the deformation is known.
-    pub tolerance_mm: f64,
-}
-
-impl Default for NewtonRules {
-    /// A tenth of a picometre: where rounding of the readings begins to show in the worst-seen pattern of the paper's
-    /// largest array (singular value 1e-5 per mm).
-    fn default() -> Self {
-        Self {
-            steps: 50,
-            tolerance_mm: 1e-10,
-        }
-    }
-}
-
-/// Why Newton's method ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NewtonStop {
-    /// The last step was shorter than the tolerance.
-    Converged,
-    /// All steps were taken.
-    StepsTaken,
-    /// No damping gives a step that lowers the misfit.
-    NoStepHelps,
-}
-
-impl fmt::Display for NewtonStop {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Converged => "converged",
-            Self::StepsTaken => "all steps taken",
-            Self::NoStepHelps => {
-                "no step lowers the misfit: readings do not come from this sensor, or leave it undetermined"
-            }
-        })
-    }
-}
-
-/// How a row was solved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NewtonReport {
-    /// Why it ended.
-    pub stop: NewtonStop,
-    /// Steps taken.
-    pub steps: usize,
-    /// rms over readings of the relative misfit m/R − 1.
-    pub residual: f64,
-}
-
-/// Readings or sizes that cannot be solved.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum NewtonError {
-    /// A reading is not a resistance.
-    #[error("reading {column} is {value} ohm: give finite numbers above 0")]
-    Reading {
-        /// Column-wire, from 0.
-        column: usize,
-        /// The reading.
-        value: f64,
-    },
-}
-
-impl NewtonError {
-    /// Refuses readings that are not above 0 and finite.
-    pub(super) fn check(readings_ohm: &[f64]) -> Result<(), Self> {
-        let bad = |&(_, value): &(usize, &f64)| !(*value > 0.0 && value.is_finite());
-        match readings_ohm.iter().enumerate().find(bad) {
-            Some((column, &value)) => Err(Self::Reading { column, value }),
-            None => Ok(()),
-        }
-    }
-}
+use crate::{scene::Scene, sensor::SensorModel};
 
 /// Gauss-Newton with Levenberg's damping and bounds on Eq. (2) for one known row-wire. Unknown is only what the scene
 /// moves.
@@ -297,92 +215,12 @@ impl Newton {
     }
 }
 
-/// Equations for a step.
-struct Linearised {
-    /// Unknowns that may move: all, or those not held at a bound.
-    free: Vec<usize>,
-    /// Readings × free unknowns, 1/mm.
-    jacobian: Mat<f64>,
-    /// −ρ.
-    right: Vec<f64>,
-    /// Largest diagonal entry of JᵀJ.
-    scale: f64,
-}
-
-impl Linearised {
-    fn new(problem: &mut RowProblem, ranges: &[Range], unknowns: &[f64], hold: bool) -> Self {
-        problem.evaluate(unknowns);
-        let (problem, equations) = (&*problem, problem.equations());
-        let residuals = problem.residuals();
-        let is_free = |&unknown: &usize| {
-            let Range { lowest, highest } = ranges[unknown];
-            let slope: f64 = (0..equations)
-                .map(|k| problem.derivative(k, unknown) * residuals[k])
-                .sum();
-            !(unknowns[unknown] <= lowest && slope >= 0.0 || unknowns[unknown] >= highest && slope <= 0.0)
-        };
-        let free: Vec<usize> = (0..unknowns.len())
-            .filter(|unknown| !hold || is_free(unknown))
-            .collect();
-        let jacobian = Mat::from_fn(equations, free.len(), |k, column| problem.derivative(k, free[column]));
-        let scale = jacobian
-            .col_iter()
-            .map(|column| column.squared_norm_l2())
-            .fold(0.0, f64::max);
-        Self {
-            right: residuals.iter().map(|residual| -residual).collect(),
-            free,
-            jacobian,
-            scale,
-        }
-    }
-}
-
-/// `min ‖J δ − right‖² + damping ‖δ‖²` by QR of J with √damping · I below it.
-fn damped_step(jacobian: &Mat<f64>, right: &[f64], damping: f64) -> Vec<f64> {
-    let (equations, unknowns) = (jacobian.nrows(), jacobian.ncols());
-    let below = if damping > 0.0 || equations < unknowns {
-        unknowns
-    } else {
-        0
-    };
-    let root = damping.sqrt();
-    let stacked = Mat::from_fn(equations + below, unknowns, |k, u| {
-        if k < equations {
-            jacobian[(k, u)]
-        } else if k - equations == u {
-            root
-        } else {
-            0.0
-        }
-    });
-    let right = Mat::from_fn(equations + below, 1, |k, _| if k < equations { right[k] } else { 0.0 });
-    let solution = stacked.qr().solve_lstsq(&right);
-    (0..unknowns).map(|u| solution[(u, 0)]).collect()
-}
-
-/// How well an answer explains the readings of a row: rms over readings of m/R − 1, with R the model's resistances at
-/// the decoded coordinates. It needs no ground truth, so it tells how far to trust any decoder; 1 and above is no
-/// explanation at all. Infinite if the model has no resistance there.
-///
-/// # Panics
-/// If there are not M4 readings and 3·M2 coordinates.
-pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinates_mm: &[f64]) -> f64 {
-    assert_eq!(coordinates_mm.len(), model.scale.coordinates_per_row());
-    let mut problem = RowProblem::new(model, Axes::Xyz);
-    // Displacements are taken from the first row, wherever the nodes are.
-    problem.read(0, readings_ohm);
-    let mut unknowns = vec![0.0; problem.unknowns()];
-    problem.unknowns_of(coordinates_mm, &mut unknowns);
-    let residual = problem.evaluate(&unknowns);
-    if residual.is_finite() { residual } else { f64::INFINITY }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
+        decoupling::resistance_residual,
         scene::Movement,
         sensor::ArrayScale,
     };

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::{
     Errors, Run, RunError, RunSettings,
     frame_time::{compiled, frame_us},
-    run::unseen_noise,
+    task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, Stream},

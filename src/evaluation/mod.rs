@@ -17,6 +17,7 @@ mod spread;
 mod start_trainer;
 mod starts;
 mod table;
+mod task;
 mod trade;
 mod trade_level;
 

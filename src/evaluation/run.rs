@@ -4,16 +4,12 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, RunError, RunSettings, StartRecord, StartTrainer, reference_errors, starts::lowest};
+use super::{Errors, RunError, RunSettings, StartRecord, StartTrainer, reference_errors, starts::lowest, task::Task};
 use crate::{
     dataset::{Dataset, Split, Stream, hold_out},
     decoupling::{Decoupler, LinearMap, TrainingMean},
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, Shape, nguyen_widrow},
-    scene::NoisySets,
-    training::{
-        Examples, Method, Problem, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState,
-        TrainingError,
-    },
+    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError},
 };
 
 /// A run: the sets drawn, one training for each start, and what the best network is worth.
@@ -28,13 +24,6 @@ pub struct Run {
     scalings: Vec<(Inputs, MinMax)>,
     starts: Vec<StartTrainer>,
     baselines: Baselines,
-}
-
-/// What a network of the run is to learn: of one row-wire, or of all.
-struct Task {
-    problem: Problem,
-    shape: Shape,
-    scaling: (Inputs, MinMax),
 }
 
 /// What stands beside a network in every table.
@@ -334,47 +323,6 @@ impl Run {
         let decoupled_mm = network.decouple(self.test.resistances_ohm.view());
         let errors = Errors::measure(&self.test, &decoupled_mm, self.settings.stroke_mm());
         (decoupled_mm, errors)
-    }
-}
-
-impl Task {
-    fn new(
-        settings: &RunSettings,
-        training: &Dataset,
-        validation: Option<&Dataset>,
-        test: &Dataset,
-    ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(settings.inputs, training.resistances_ohm.view(), unseen_noise(settings))?;
-        let outputs = MinMax::fit(training.coordinates_mm.view())?;
-        let examples = |set: &Dataset| {
-            let scaled = inputs.of(set.resistances_ohm.view());
-            Examples::new(scaled.view(), outputs.scale(set.coordinates_mm.view()).view())
-        };
-        let problem = Problem {
-            training: examples(training),
-            validation: validation.map(examples),
-            test: Some(examples(test)),
-        };
-        let shape = Shape {
-            inputs: problem.training.inputs(),
-            hidden: settings.hidden,
-            outputs: problem.training.outputs(),
-        };
-        Ok(Self {
-            problem,
-            shape,
-            scaling: (inputs, outputs),
-        })
-    }
-}
-
-/// The relative noise that readings have and the training set lacks, with which whitening reckons.
-pub(super) fn unseen_noise(settings: &RunSettings) -> f64 {
-    let noise = settings.scene.noise;
-    if noise.sets == NoisySets::Test {
-        noise.relative
-    } else {
-        0.0
     }
 }
 

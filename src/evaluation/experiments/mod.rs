@@ -7,6 +7,7 @@ mod axis;
 mod bottleneck;
 mod experiment;
 mod growth;
+mod measured;
 mod results;
 mod runner;
 mod summary;

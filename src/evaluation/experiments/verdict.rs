@@ -2,8 +2,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{Axis, CellResults, ExperimentResults, Growth, GrowthLaw, Trial};
-use crate::evaluation::Spread;
+use super::{
+    Axis, CellResults, ExperimentResults, Growth, GrowthLaw,
+    measured::{Measured, number, sorted_by},
+};
 
 /// What an experiment says about a claim.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -69,76 +71,6 @@ pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
     }
     verdicts.push(linear_map_is_beaten(&measured));
     verdicts
-}
-
-/// A cell with results.
-#[derive(Clone, Debug)]
-struct Measured {
-    label: String,
-    column: usize,
-    z: Spread,
-    published: Option<f64>,
-    linear: Option<f64>,
-    bound: Option<f64>,
-    /// Z errors by seed and repeat.
-    trials: Vec<((u64, usize), f64)>,
-}
-
-impl Measured {
-    fn all(results: &ExperimentResults) -> Vec<Self> {
-        let z_of = |trial: &Trial| Some(((trial.seed.0, trial.repeat), trial.errors.z_percent?));
-        let measure = |cell: &CellResults| {
-            let place = cell.cell;
-            let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
-            Some(Self {
-                label: results.cell_labels(cell).join("/"),
-                column: place.column,
-                z: cell.z_percent()?,
-                published: place.published.map(|published| published.z_percent),
-                linear: median(cell.spread(|trial| trial.baselines.linear.z_percent)),
-                trials: cell.trials.iter().filter_map(z_of).collect(),
-                bound: median(cell.spread(|trial| trial.bottleneck.z_percent)),
-            })
-        };
-        results.cells.iter().filter_map(measure).collect()
-    }
-
-    /// The Z errors of trials that both cells have.
-    fn beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let partner = |key| other.trials.iter().find(move |trial| trial.0 == key);
-        self.trials
-            .iter()
-            .filter_map(move |(key, z)| Some((*z, partner(*key)?.1)))
-    }
-
-    fn figures(&self) -> String {
-        format!("{}: {}", self.label, spread(&self.z))
-    }
-}
-
-fn sorted_by<K: Ord>(mut measured: Vec<Measured>, key: impl FnMut(&Measured) -> K) -> Vec<Measured> {
-    measured.sort_by_key(key);
-    measured
-}
-
-/// Three significant digits.
-fn number(value: f64) -> String {
-    match value.abs() {
-        1e2.. => format!("{value:.0}"),
-        1e1.. => format!("{value:.1}"),
-        1.0.. => format!("{value:.2}"),
-        0.001.. => format!("{value:.3}"),
-        0.0 => "0".to_owned(),
-        _ => format!("{value:.1e}"),
-    }
-}
-
-fn spread(spread: &Spread) -> String {
-    if spread.smallest == spread.largest {
-        return format!("{} %", number(spread.median));
-    }
-    let [median, smallest, largest] = [spread.median, spread.smallest, spread.largest].map(number);
-    format!("{median} % ({smallest} to {largest})")
 }
 
 fn missing(claim: &'static str) -> Verdict {
@@ -341,7 +273,7 @@ fn linear_map_is_beaten(measured: &[Measured]) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::experiments::{PaperTable, results::tests::trial};
+    use crate::evaluation::experiments::{PaperTable, Trial, results::tests::trial};
 
     /// Z errors of the trials of each cell.
     fn judged(table: PaperTable, cells: &[&[f64]], change: impl Fn(usize, &mut Trial)) -> Vec<Verdict> {

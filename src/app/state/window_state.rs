@@ -1,22 +1,20 @@
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::path::PathBuf;
 
-use ndarray::Array2;
-
-use super::{
-    decoders::DecodersState,
-    experiments::ExperimentsState,
-    export_kind::{ExportKind, file_name},
-    file_task::FileTask,
-    identifiability::IdentifiabilityState,
-    runs::RunsState,
-    surface_view::{OrbitCamera, ViewMode},
-    test_view::{Frame, TestView},
-    trade::TradeState,
-    worker::{Began, Progress},
-};
+use super::{BottomTab, Frames, Look, RightCard, RunResult, RunView, error_frame};
 use crate::{
-    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord, node_rms_mm},
-    training::{EpochRecord, Stage, StopReason},
+    app::{
+        decoders::DecodersState,
+        experiments::ExperimentsState,
+        export_kind::{ExportKind, file_name},
+        file_task::FileTask,
+        identifiability::IdentifiabilityState,
+        runs::RunsState,
+        surface_view::{OrbitCamera, ViewMode},
+        test_view::TestView,
+        trade::TradeState,
+    },
+    evaluation::{Baselines, RunSettings, node_rms_mm},
+    training::StopReason,
 };
 
 /// Everything the panels read.
@@ -103,177 +101,6 @@ pub struct Preview {
     pub test: TestView,
     /// What will stand beside the network, once it is measured.
     pub baselines: Option<Baselines>,
-}
-
-/// A training as far as the window knows it.
-#[derive(Debug)]
-pub struct RunView {
-    /// What it is trained with.
-    pub settings: RunSettings,
-    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
-    /// for from where it stood.
-    pub asked: RunSettings,
-    /// Weights and biases of the network.
-    pub weights: usize,
-    /// Its test set.
-    pub test: TestView,
-    /// What stands beside the network.
-    pub baselines: Baselines,
-    /// What the paper reports for this configuration.
-    pub published: Option<PublishedErrors>,
-    /// Every epoch of the leader so far.
-    pub history: Vec<EpochRecord>,
-    /// The methods that the leader went through.
-    pub stages: Vec<Stage>,
-    /// How each start stood when last looked at; empty where there is one only.
-    pub starts: Vec<StartRecord>,
-    /// What the best network makes of the test set, and what that is worth.
-    pub result: Option<RunResult>,
-    /// Why it ended, if it has.
-    pub stop_reason: Option<StopReason>,
-}
-
-/// What the best network so far makes of the test set.
-#[derive(Clone, Debug)]
-pub struct RunResult {
-    /// Coordinates: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
-    /// Their errors.
-    pub errors: Errors,
-    /// The epoch of the network.
-    pub best_epoch: usize,
-    /// Epochs run by the start that is furthest.
-    pub epochs_run: usize,
-    /// How many starts have ended.
-    pub starts_ended: usize,
-    /// Time spent in training.
-    pub elapsed: Duration,
-    /// Time to decode one snapshot, where it was measured.
-    pub frame_time: Option<Duration>,
-}
-
-impl RunView {
-    /// A training that has just begun.
-    pub fn new(began: Began) -> Self {
-        let Began {
-            settings,
-            weights,
-            test,
-            baselines,
-        } = began;
-        Self {
-            published: settings.published(),
-            settings,
-            asked: settings,
-            weights,
-            test,
-            baselines,
-            history: Vec::new(),
-            stages: Vec::new(),
-            starts: Vec::new(),
-            result: None,
-            stop_reason: None,
-        }
-    }
-
-    /// Takes the worker's news.
-    pub fn progress(&mut self, progress: Progress) {
-        let Progress {
-            epochs,
-            stages,
-            starts,
-            decoupled_mm,
-            errors,
-            best_epoch,
-            epochs_run,
-            starts_ended,
-            elapsed,
-            frame_time,
-            stop_reason,
-        } = progress;
-        self.stop_reason = stop_reason;
-        // Another start may lead now; then all its epochs come.
-        if let Some(first) = epochs.first() {
-            self.history.truncate(first.epoch);
-        }
-        self.history.extend(epochs);
-        self.stages = stages;
-        if let Some(starts) = starts {
-            self.starts = starts;
-        }
-        self.result = Some(RunResult {
-            decoupled_mm,
-            errors,
-            best_epoch,
-            epochs_run,
-            starts_ended,
-            elapsed,
-            frame_time,
-        });
-    }
-
-    /// The latest epoch.
-    pub fn latest(&self) -> Option<&EpochRecord> {
-        self.history.last()
-    }
-}
-
-/// How the results are looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// Snapshot of the test set.
-    pub snapshot: usize,
-    /// Shared by both surfaces.
-    pub camera: OrbitCamera,
-    /// In space or from above.
-    pub mode: ViewMode,
-    /// What the right-hand card shows.
-    pub right: RightCard,
-    /// The chart below.
-    pub tab: BottomTab,
-    /// The node under the pointer.
-    pub node: Option<usize>,
-    /// Whether each decoupled node has a bar that tells how far it is off in general.
-    pub has_error_bars: bool,
-    /// Dark or light.
-    pub is_dark: bool,
-}
-
-/// What stands beside the actual surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RightCard {
-    /// The surface that the network found.
-    #[default]
-    Decoupled,
-    /// Its difference from the actual one.
-    Error,
-}
-
-/// The charts below the surfaces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BottomTab {
-    /// Error against epoch.
-    #[default]
-    Loss,
-    /// Gradient, damping or rate, and validation failures against epoch.
-    TrainingState,
-    /// How the errors of z are distributed.
-    ErrorHistogram,
-    /// Decoupled against actual z.
-    Regression,
-    /// The nodes of the snapshot: the paper's Fig. 6.
-    Nodes,
-}
-
-/// The snapshot being drawn, made anew only when it changes.
-#[derive(Debug, Default)]
-pub struct Frames {
-    /// As it is.
-    pub actual: Frame,
-    /// As the network finds it, and the difference (decoupled − actual).
-    pub decoupled: Option<(Frame, Frame)>,
-    /// How far each node is off in general, where that is asked for: [`node_rms_mm`].
-    pub spread_mm: Option<Vec<f64>>,
 }
 
 /// Something to tell the user, once.
@@ -402,17 +229,5 @@ impl State {
             FileTask::OpenCheckpoint => ExportKind::Checkpoint.file_name(settings),
         };
         std::env::current_dir().unwrap_or_default().join(name)
-    }
-}
-
-/// Decoupled − actual: z of the nodes and of the grid.
-pub(super) fn error_frame(actual: &Frame, decoupled: &Frame) -> Frame {
-    let nodes = actual.nodes_mm.iter().zip(&decoupled.nodes_mm);
-    let grid = actual.grid_mm.iter().zip(&decoupled.grid_mm);
-    Frame {
-        nodes_mm: nodes
-            .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
-            .collect(),
-        grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
     }
 }

@@ -1,30 +1,23 @@
-//! The worker: one named thread that draws sets, trains and writes files. Requests go in, events come out, and each
-//! event wakes the window.
-
 use std::{
     collections::VecDeque,
-    path::{Path, PathBuf},
+    path::Path,
     sync::{
         Arc,
-        mpsc::{Receiver, Sender, TryRecvError, channel},
+        mpsc::{Receiver, TryRecvError},
     },
-    thread,
     time::{Duration, Instant},
 };
 
-use ndarray::Array2;
-
-use super::{
-    continuation::{continue_run, furthest_epoch},
-    export_kind::ExportKind,
-    test_view::{TestView, TestViewError},
-    threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
-};
+use super::{Began, Event, Progress, Request};
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord, network_frame_time},
+    app::{
+        continuation::{continue_run, furthest_epoch},
+        test_view::{TestView, TestViewError},
+        threads::Report,
+    },
+    evaluation::{Baselines, Run, RunSettings, network_frame_time},
     export::{CheckpointFile, NetworkFile},
-    network::Networks,
-    training::{EpochRecord, GradientDescentSettings, Method, Stage, StopReason, TrainerState, TrainingSettings},
+    training::{GradientDescentSettings, Method, TrainingSettings},
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
@@ -34,146 +27,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 /// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// What the window asks of the worker.
-#[derive(Debug)]
-pub enum Request {
-    /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
-    Preview(Box<RunSettings>),
-    /// Measure what will stand beside the network of these settings. Only the newest one counts.
-    Baselines(Box<RunSettings>),
-    /// Begin a training; one in progress is dropped.
-    Train(Box<RunSettings>),
-    /// Take up the training saved in this file and hold it; one in progress is dropped.
-    Open(PathBuf),
-    /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
-    TakeUp(Box<RunSettings>, Vec<TrainerState>),
-    /// Go on from the present weights with this method and this many epochs more.
-    Continue(TrainingSettings),
-    /// Step no further until told to resume.
-    Pause,
-    /// Go on.
-    Resume,
-    /// End the training; its network stays.
-    Stop,
-    /// Hand over the best networks so far; the answer bears this number.
-    Networks(u64),
-    /// Write a file about the present training.
-    Export(ExportKind, PathBuf),
-}
-
-/// What the worker tells the window.
-#[derive(Debug)]
-pub enum Event {
-    /// The test set of these settings.
-    Previewed(Box<RunSettings>, Result<TestView, TestViewError>),
-    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
-    /// training would explain.
-    Compared(Box<RunSettings>, Option<Baselines>),
-    /// A training has begun, or why it cannot.
-    Began(Result<Box<Began>, TestViewError>),
-    /// A saved training stands where it was saved, or why it cannot.
-    Opened(Result<Box<Began>, String>),
-    /// The training goes on with these settings, or why it cannot.
-    Continued(Result<Box<RunSettings>, String>),
-    /// News of the training.
-    Progressed(Box<Progress>),
-    /// The training on show has ended: what is to be kept of it, or why nothing can be.
-    Finished(Result<Box<NetworkFile>, String>),
-    /// The best networks so far, or why there are none; with the number of the request.
-    Networks(u64, Result<Box<Networks>, String>),
-    /// A file was written, or why not.
-    Exported(Result<PathBuf, String>),
-}
-
-/// What is known when a training begins.
-#[derive(Debug)]
-pub struct Began {
-    /// What was asked for.
-    pub settings: RunSettings,
-    /// Weights and biases of the network.
-    pub weights: usize,
-    /// The test set.
-    pub test: TestView,
-    /// What stands beside the network.
-    pub baselines: Baselines,
-}
-
-/// How a training stands.
-#[derive(Debug)]
-pub struct Progress {
-    /// Epochs of the leader since the last report, or all where another start has taken the lead.
-    pub epochs: Vec<EpochRecord>,
-    /// The methods that the leader went through.
-    pub stages: Vec<Stage>,
-    /// How each start stands, where there are several; now and then only.
-    pub starts: Option<Vec<StartRecord>>,
-    /// What the best network so far makes of the test set: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
-    /// Its errors.
-    pub errors: Errors,
-    /// The epoch of the best network.
-    pub best_epoch: usize,
-    /// Epochs run by the start that is furthest.
-    pub epochs_run: usize,
-    /// How many starts have ended.
-    pub starts_ended: usize,
-    /// Time spent in training.
-    pub elapsed: Duration,
-    /// Time to decode one snapshot; measured when the training pauses or ends.
-    pub frame_time: Option<Duration>,
-    /// Why the training has ended, if it has.
-    pub stop_reason: Option<StopReason>,
-}
-
-/// The window's end of the worker.
-#[derive(Debug)]
-pub struct Worker {
-    requests: Sender<Request>,
-    events: Receiver<Event>,
-}
-
-impl Worker {
-    /// Starts the thread. `wake` is called after each event.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn start(wake: Wake) -> std::io::Result<Self> {
-        let (requests, incoming) = channel();
-        let (outgoing, events) = channel();
-        let report = Report::new(outgoing, wake);
-        thread::Builder::new().name("training".to_owned()).spawn(move || {
-            yield_to_window();
-            Labour::new(report).run(&incoming);
-        })?;
-        Ok(Self { requests, events })
-    }
-
-    /// A worker that has died.
-    #[cfg(test)]
-    pub fn dead() -> Self {
-        Self {
-            requests: channel().0,
-            events: channel().1,
-        }
-    }
-
-    /// Asks for something. A worker that died is told by [`Self::next_event`].
-    pub fn ask(&self, request: Request) {
-        // The other end is gone only if the worker died, which the next look at the events shows.
-        let _ = self.requests.send(request);
-    }
-
-    /// The next event, if one has come.
-    ///
-    /// # Errors
-    /// The worker died.
-    pub fn next_event(&self) -> Result<Option<Event>, WorkerDied> {
-        next_event(&self.events)
-    }
-}
-
 /// The thread's own state.
-struct Labour {
+pub(super) struct Labour {
     report: Report<Event>,
     run: Option<Run>,
     is_paused: bool,
@@ -188,7 +43,7 @@ struct Labour {
 }
 
 impl Labour {
-    fn new(report: Report<Event>) -> Self {
+    pub(super) fn new(report: Report<Event>) -> Self {
         Self {
             report,
             run: None,
@@ -201,7 +56,8 @@ impl Labour {
         }
     }
 
-    fn run(&mut self, requests: &Receiver<Request>) {
+    /// Answers requests and trains until there is no window.
+    pub(super) fn run(&mut self, requests: &Receiver<Request>) {
         let mut queue = VecDeque::new();
         loop {
             if queue.is_empty() && !self.is_training() {

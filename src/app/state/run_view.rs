@@ -1,0 +1,125 @@
+use std::{sync::Arc, time::Duration};
+
+use ndarray::Array2;
+
+use crate::{
+    app::{
+        test_view::TestView,
+        worker::{Began, Progress},
+    },
+    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord},
+    training::{EpochRecord, Stage, StopReason},
+};
+
+/// A training as far as the window knows it.
+#[derive(Debug)]
+pub struct RunView {
+    /// What it is trained with.
+    pub settings: RunSettings,
+    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
+    /// for from where it stood.
+    pub asked: RunSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
+    /// Its test set.
+    pub test: TestView,
+    /// What stands beside the network.
+    pub baselines: Baselines,
+    /// What the paper reports for this configuration.
+    pub published: Option<PublishedErrors>,
+    /// Every epoch of the leader so far.
+    pub history: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stood when last looked at; empty where there is one only.
+    pub starts: Vec<StartRecord>,
+    /// What the best network makes of the test set, and what that is worth.
+    pub result: Option<RunResult>,
+    /// Why it ended, if it has.
+    pub stop_reason: Option<StopReason>,
+}
+
+/// What the best network so far makes of the test set.
+#[derive(Clone, Debug)]
+pub struct RunResult {
+    /// Coordinates: samples × 3·M2.
+    pub decoupled_mm: Arc<Array2<f64>>,
+    /// Their errors.
+    pub errors: Errors,
+    /// The epoch of the network.
+    pub best_epoch: usize,
+    /// Epochs run by the start that is furthest.
+    pub epochs_run: usize,
+    /// How many starts have ended.
+    pub starts_ended: usize,
+    /// Time spent in training.
+    pub elapsed: Duration,
+    /// Time to decode one snapshot, where it was measured.
+    pub frame_time: Option<Duration>,
+}
+
+impl RunView {
+    /// A training that has just begun.
+    pub fn new(began: Began) -> Self {
+        let Began {
+            settings,
+            weights,
+            test,
+            baselines,
+        } = began;
+        Self {
+            published: settings.published(),
+            settings,
+            asked: settings,
+            weights,
+            test,
+            baselines,
+            history: Vec::new(),
+            stages: Vec::new(),
+            starts: Vec::new(),
+            result: None,
+            stop_reason: None,
+        }
+    }
+
+    /// Takes the worker's news.
+    pub fn progress(&mut self, progress: Progress) {
+        let Progress {
+            epochs,
+            stages,
+            starts,
+            decoupled_mm,
+            errors,
+            best_epoch,
+            epochs_run,
+            starts_ended,
+            elapsed,
+            frame_time,
+            stop_reason,
+        } = progress;
+        self.stop_reason = stop_reason;
+        // Another start may lead now; then all its epochs come.
+        if let Some(first) = epochs.first() {
+            self.history.truncate(first.epoch);
+        }
+        self.history.extend(epochs);
+        self.stages = stages;
+        if let Some(starts) = starts {
+            self.starts = starts;
+        }
+        self.result = Some(RunResult {
+            decoupled_mm,
+            errors,
+            best_epoch,
+            epochs_run,
+            starts_ended,
+            elapsed,
+            frame_time,
+        });
+    }
+
+    /// The latest epoch.
+    pub fn latest(&self) -> Option<&EpochRecord> {
+        self.history.last()
+    }
+}
