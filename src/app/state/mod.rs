@@ -6,5 +6,7 @@ mod window_state;
 
 pub(super) use look::error_frame;
 pub use look::{BottomTab, Frames, Look, RightCard};
-pub use run_view::{RunResult, RunView};
+pub use run_view::RunView;
 pub use window_state::{Notice, Phase, Preview, Saving, State, View};
+
+pub use super::worker::RunResult;

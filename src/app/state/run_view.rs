@@ -1,13 +1,9 @@
-use std::{sync::Arc, time::Duration};
-
-use ndarray::Array2;
-
 use crate::{
     app::{
         test_view::TestView,
-        worker::{Began, Progress},
+        worker::{Began, Progress, RunResult},
     },
-    evaluation::{Baselines, Errors, PublishedErrors, RunSettings, StartRecord},
+    evaluation::{Baselines, PublishedErrors, RunSettings, StartRecord},
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -37,25 +33,6 @@ pub struct RunView {
     pub result: Option<RunResult>,
     /// Why it ended, if it has.
     pub stop_reason: Option<StopReason>,
-}
-
-/// What the best network so far makes of the test set.
-#[derive(Clone, Debug)]
-pub struct RunResult {
-    /// Coordinates: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
-    /// Their errors.
-    pub errors: Errors,
-    /// The epoch of the network.
-    pub best_epoch: usize,
-    /// Epochs run by the start that is furthest.
-    pub epochs_run: usize,
-    /// How many starts have ended.
-    pub starts_ended: usize,
-    /// Time spent in training.
-    pub elapsed: Duration,
-    /// Time to decode one snapshot, where it was measured.
-    pub frame_time: Option<Duration>,
 }
 
 impl RunView {
@@ -88,13 +65,7 @@ impl RunView {
             epochs,
             stages,
             starts,
-            decoupled_mm,
-            errors,
-            best_epoch,
-            epochs_run,
-            starts_ended,
-            elapsed,
-            frame_time,
+            result,
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
@@ -107,15 +78,7 @@ impl RunView {
         if let Some(starts) = starts {
             self.starts = starts;
         }
-        self.result = Some(RunResult {
-            decoupled_mm,
-            errors,
-            best_epoch,
-            epochs_run,
-            starts_ended,
-            elapsed,
-            frame_time,
-        });
+        self.result = Some(result);
     }
 
     /// The latest epoch.

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Began, Event, Progress, Request};
+use super::{Began, Event, Progress, Request, RunResult};
 use crate::{
     app::{
         continuation::{continue_run, furthest_epoch},
@@ -196,17 +196,19 @@ impl Labour {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
             starts,
-            decoupled_mm: Arc::new(decoupled_mm),
-            errors,
-            best_epoch: trainer.best_epoch(),
-            epochs_run: furthest_epoch(run),
-            starts_ended: run
-                .trainers()
-                .iter()
-                .filter(|start| start.stop_reason().is_some())
-                .count(),
-            elapsed: self.elapsed,
-            frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+            result: RunResult {
+                decoupled_mm: Arc::new(decoupled_mm),
+                errors,
+                best_epoch: trainer.best_epoch(),
+                epochs_run: furthest_epoch(run),
+                starts_ended: run
+                    .trainers()
+                    .iter()
+                    .filter(|start| start.stop_reason().is_some())
+                    .count(),
+                elapsed: self.elapsed,
+                frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+            },
             stop_reason: run.stop_reason(),
         })));
         self.reported = (number, trainer.history().len());

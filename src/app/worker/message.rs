@@ -86,11 +86,20 @@ pub struct Progress {
     pub stages: Vec<Stage>,
     /// How each start stands, where there are several; now and then only.
     pub starts: Option<Vec<StartRecord>>,
-    /// What the best network so far makes of the test set: samples × 3·M2.
+    /// What the training has come to.
+    pub result: RunResult,
+    /// Why the training has ended, if it has.
+    pub stop_reason: Option<StopReason>,
+}
+
+/// What the best network so far makes of the test set, and what it cost.
+#[derive(Clone, Debug)]
+pub struct RunResult {
+    /// Coordinates: samples × 3·M2.
     pub decoupled_mm: Arc<Array2<f64>>,
-    /// Its errors.
+    /// Their errors.
     pub errors: Errors,
-    /// The epoch of the best network.
+    /// The epoch of the network.
     pub best_epoch: usize,
     /// Epochs run by the start that is furthest.
     pub epochs_run: usize,
@@ -100,6 +109,4 @@ pub struct Progress {
     pub elapsed: Duration,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
-    /// Why the training has ended, if it has.
-    pub stop_reason: Option<StopReason>,
 }

@@ -6,4 +6,4 @@ mod labour;
 mod message;
 
 pub use handle::Worker;
-pub use message::{Began, Event, Progress, Request};
+pub use message::{Began, Event, Progress, Request, RunResult};
