@@ -56,11 +56,11 @@ impl<E> Report<E> {
 
     /// Tells the window. Without one there is nobody to tell.
     pub(super) fn send(&self, event: E) {
-        self.is_heard(event);
+        self.try_send(event);
     }
 
     /// As [`Self::send`]; whether the window still listens.
-    pub(super) fn is_heard(&self, event: E) -> bool {
+    pub(super) fn try_send(&self, event: E) -> bool {
         let is_heard = self
             .outgoing
             .as_ref()

@@ -73,7 +73,7 @@ impl DecoderMeasuring {
                 };
                 let report = set.as_ref().map_err(String::clone).and_then(measure);
                 // Nobody waits any more.
-                if !news.is_heard((place, report)) {
+                if !news.try_send((place, report)) {
                     return;
                 }
             }
