@@ -57,7 +57,7 @@ pub struct Frames {
     pub actual: Frame,
     /// As the network finds it, and the difference (decoupled − actual).
     pub decoupled: Option<(Frame, Frame)>,
-    /// How far each node is off in general, where that is asked for: [`node_rms_mm`].
+    /// How far each node is off in general, where that is asked for: [`crate::evaluation::node_rms_mm`].
     pub spread_mm: Option<Vec<f64>>,
 }
 
