@@ -183,7 +183,7 @@ fn heat_maps_say_each_value_in_its_cell() {
         columns: vec!["6".to_owned(), "8".to_owned()],
         rows: vec!["a < b & c".to_owned(), "d".to_owned()],
         values,
-        value_name: "Z error (%)".to_owned(),
+        value_axis: PlotAxis::linear("Z error (%)"),
     };
     let picture = map.draw();
     for text in [
@@ -205,6 +205,34 @@ fn heat_maps_say_each_value_in_its_cell() {
         ..map
     };
     empty.draw().png().unwrap();
+}
+
+#[test]
+fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
+    let map = |values: [f64; 3], value_axis| HeatMap {
+        x_name: String::new(),
+        y_name: String::new(),
+        columns: vec![String::new(); 3],
+        rows: vec![String::new()],
+        values: Array2::from_shape_vec((1, 3), values.to_vec()).unwrap(),
+        value_axis,
+    };
+    let cells = |map: HeatMap| -> Vec<String> {
+        let svg = map.draw().svg().to_owned();
+        let fills = svg.split("<rect").skip(1).filter(|rect| rect.contains("fill=\"#"));
+        let fill = |rect: &str| rect.split("fill=\"").nth(1).unwrap()[..7].to_owned();
+        fills
+            .map(fill)
+            .skip_while(|colour| colour == "#ffffff")
+            .take(3)
+            .collect()
+    };
+    let even = cells(map([1.0, 2.0, 3.0], PlotAxis::linear("")));
+    let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
+    assert_eq!(even, decades);
+    assert_ne!(even, cells(map([0.001, 0.1, 10.0], PlotAxis::linear(""))));
+    // A zero has no logarithm, but is the least there is.
+    assert_eq!(cells(map([0.0, 1.0, 10.0], PlotAxis::logarithmic("")))[0], decades[0]);
 }
 
 #[test]

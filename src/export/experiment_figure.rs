@@ -45,7 +45,7 @@ fn heat_map(results: &ExperimentResults) -> HeatMap {
         columns: labels(columns),
         rows: labels(rows),
         values,
-        value_name: "median Z error (%)".to_owned(),
+        value_axis: PlotAxis::logarithmic("median Z error (%)"),
     }
 }
 

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use super::{
     canvas::{Anchor, Area, Canvas, Stroke},
     colours::{DIM, INK, viridis},
+    plot_axis::PlotAxis,
 };
-use crate::export::ticks::{multiples, step_for, tick_text};
 
 const STEPS: usize = 64;
 const WIDTH: f64 = 9.0;
@@ -14,19 +14,19 @@ const WIDTH: f64 = 9.0;
 /// What the bar takes with its numbers and name, in points.
 pub(super) const COLOUR_BAR_WIDTH: f64 = 54.0;
 
-/// Where a value stands in its range, from 0 to 1.
-pub(super) fn share(value: f64, range: &RangeInclusive<f64>) -> f64 {
-    (value - range.start()) / (range.end() - range.start())
+/// Where a place stands in its range, from 0 to 1.
+pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
+    (place - range.start()) / (range.end() - range.start())
 }
 
-/// Draws the bar from `top` down, `height` high.
+/// Draws the bar of the places in `range` on `axis` from `top` down, `height` high.
 pub(super) fn draw_colour_bar(
     canvas: &mut Canvas,
     left: f64,
     top: f64,
     height: f64,
+    axis: &PlotAxis,
     range: &RangeInclusive<f64>,
-    name: &str,
 ) {
     let bar = Area {
         left,
@@ -45,11 +45,10 @@ pub(super) fn draw_colour_bar(
     }
     let edge = Stroke::new(DIM, 0.5);
     canvas.outline(bar, edge);
-    let step = step_for(range, 6);
-    for value in multiples(range, step) {
-        let y = bar.bottom() - height * share(value, range);
+    for (place, text) in axis.ticks(range, 6) {
+        let y = bar.bottom() - height * share(place, range);
         canvas.line([bar.right(), y], [bar.right() + 2.5, y], edge);
-        canvas.text([bar.right() + 5.0, y], Anchor::Start, INK, &tick_text(value, step));
+        canvas.text([bar.right() + 5.0, y], Anchor::Start, INK, &text);
     }
-    canvas.upright_text([left + COLOUR_BAR_WIDTH - 14.0, bar.centre()[1]], INK, name);
+    canvas.upright_text([left + COLOUR_BAR_WIDTH - 14.0, bar.centre()[1]], INK, &axis.name);
 }

@@ -5,6 +5,7 @@ use super::{
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar, share},
     colours::{INK, MISSING, contrast, viridis},
     picture::Picture,
+    plot_axis::PlotAxis,
 };
 use crate::export::format_number;
 
@@ -21,8 +22,8 @@ pub struct HeatMap {
     pub rows: Vec<String>,
     /// Rows × columns; NaN where there is none.
     pub values: Array2<f64>,
-    /// What the values are, with the unit.
-    pub value_name: String,
+    /// What the values are, and how colours are spread over them.
+    pub value_axis: PlotAxis,
 }
 
 impl HeatMap {
@@ -56,10 +57,11 @@ impl HeatMap {
                 width: column,
                 height: height / rows as f64,
             };
-            let colour = if value.is_finite() {
-                viridis(share(value, &range))
-            } else {
-                MISSING
+            let colour = match self.value_axis.place(value) {
+                Some(place) => viridis(share(place, &range)),
+                // A zero where colours go by the logarithm.
+                None if value.is_finite() => viridis(0.0),
+                None => MISSING,
             };
             canvas.block(cell, colour);
             let text = format_number(value);
@@ -92,16 +94,17 @@ impl HeatMap {
             area.right() + 12.0,
             area.top,
             area.height,
+            &self.value_axis,
             &range,
-            &self.value_name,
         );
         canvas.finish()
     }
 
+    /// The range of places.
     fn range(&self) -> std::ops::RangeInclusive<f64> {
-        let finite = self.values.iter().copied().filter(|value| value.is_finite());
-        let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), value| {
-            (low.min(value), high.max(value))
+        let places = self.values.iter().filter_map(|&value| self.value_axis.place(value));
+        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), place| {
+            (low.min(place), high.max(place))
         });
         match low < high {
             true => low..=high,

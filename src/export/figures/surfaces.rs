@@ -80,7 +80,8 @@ impl SurfaceFigure {
             }
         }
         let left = Plot::WIDE_PT - COLOUR_BAR_WIDTH;
-        draw_colour_bar(&mut canvas, left, 28.0, Self::HEIGHT - 64.0, &self.range_mm, "z (mm)");
+        let axis = PlotAxis::linear("z (mm)");
+        draw_colour_bar(&mut canvas, left, 28.0, Self::HEIGHT - 64.0, &axis, &self.range_mm);
         canvas.finish()
     }
 
