@@ -77,10 +77,12 @@ fn outlook(state: &State) -> Option<&Outlook> {
 /// The paper's figures of single networks, one click each.
 fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     section_heading_ui(ui, "The paper's figures");
-    let gap = ui.spacing().item_spacing.x;
+    // So small that the names fit in the narrowest window.
+    let gap = space(1);
     let count = PaperFigure::ALL.len() as f32;
-    let width = ((ui.available_width() - gap * (count - 1.0)) / count).floor();
+    let width = (ui.available_width() - gap * (count - 1.0)) / count;
     ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = gap;
         for figure in PaperFigure::ALL {
             let button = ghost_button(figure.name()).min_size([width, space(7)].into());
             if ui.add(button).on_hover_text(figure.description()).clicked() {
