@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use super::{
     canvas::{Anchor, Area, Canvas, Stroke},
     colours::{DIM, INK, viridis},
-    plot_axis::PlotAxis,
+    plot_axis::{PlotAxis, share},
 };
 
 const STEPS: usize = 64;
@@ -13,11 +13,6 @@ const WIDTH: f64 = 9.0;
 
 /// What the bar takes with its numbers and name, in points.
 pub(super) const COLOUR_BAR_WIDTH: f64 = 54.0;
-
-/// Where a place stands in its range, from 0 to 1.
-pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
-    (place - range.start()) / (range.end() - range.start())
-}
 
 /// Draws the bar of the places in `range` on `axis` from `top` down, `height` high.
 pub(super) fn draw_colour_bar(

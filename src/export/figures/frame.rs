@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
     colours::{DIM, GRID, INK},
-    plot_axis::PlotAxis,
+    plot_axis::{PlotAxis, share},
 };
 
 /// Where the values of both axes stand on the canvas.
@@ -13,10 +13,6 @@ pub(super) struct Frame<'a> {
     pub area: Area,
     pub x: (&'a PlotAxis, RangeInclusive<f64>),
     pub y: (&'a PlotAxis, RangeInclusive<f64>),
-}
-
-fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
-    (place - range.start()) / (range.end() - range.start())
 }
 
 impl Frame<'_> {

@@ -2,10 +2,10 @@ use ndarray::Array2;
 
 use super::{
     canvas::{Anchor, Area, CHARACTER, Canvas, TEXT},
-    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar, share},
+    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
     colours::{INK, MISSING, contrast, viridis},
     picture::Picture,
-    plot_axis::PlotAxis,
+    plot_axis::{PlotAxis, share},
 };
 use crate::export::format_number;
 

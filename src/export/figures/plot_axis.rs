@@ -80,6 +80,11 @@ impl PlotAxis {
     }
 }
 
+/// Where a place stands in its range, from 0 to 1.
+pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
+    (place - range.start()) / (range.end() - range.start())
+}
+
 fn numbers(range: &RangeInclusive<f64>, most: usize) -> Vec<(f64, String)> {
     let step = step_for(range, most);
     let marks = multiples(range, step).into_iter();

@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 
 use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke},
-    colour_bar::share,
     colours::{DIM, GRID, INK, lit, viridis},
+    plot_axis::share,
     surfaces::SurfacePanel,
 };
 use crate::{

@@ -4,12 +4,12 @@ use glam::DVec3;
 
 use super::{
     canvas::{Area, Canvas, Stroke},
-    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar, share},
+    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
     colours::{INK, MISSING, viridis},
     frame::Frame,
     picture::Picture,
     plot::Plot,
-    plot_axis::PlotAxis,
+    plot_axis::{PlotAxis, share},
     relief::Relief,
 };
 use crate::surface::Grid;
