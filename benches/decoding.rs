@@ -62,8 +62,8 @@ fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Vec<Decou
     let mut rng = Seed(0).rng(Stream::Start);
     let network = |row: usize| {
         let set = training.of_row(row);
-        let inputs = Inputs::fit(choice, set.resistances_ohm.view(), 0.0).unwrap();
-        let outputs = MinMax::fit(set.coordinates_mm.view()).unwrap();
+        let inputs = Inputs::fit(choice, set.readings(), 0.0).unwrap();
+        let outputs = MinMax::fit(set.targets()).unwrap();
         let shape = Shape {
             inputs: inputs.count(),
             hidden,

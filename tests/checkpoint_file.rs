@@ -6,15 +6,15 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     export::{CheckpointFile, CheckpointFileError, NetworkFile},
     sensor::SensorModel,
     training::{EpochRecord, Method, StopReason},
 };
 use tempfile::TempDir;
 
-fn settings(method: Method) -> RunSettings {
-    let mut settings = RunSettings {
+fn settings(method: Method) -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
         sensor: SensorModel::new("2x2_2x6".parse().unwrap()),
         samples: 20,
         validation_samples: 8,
@@ -22,14 +22,14 @@ fn settings(method: Method) -> RunSettings {
         hidden: 2,
         starts: 2,
         seed: Seed(u64::MAX),
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
     settings.training.method = method;
     settings.training.stopping.epochs = 9;
     settings
 }
 
-fn stepped(settings: RunSettings, epochs: usize) -> Run {
+fn stepped(settings: SimulatedSettings, epochs: usize) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     for _ in 0..epochs {
         run.step();
@@ -225,7 +225,7 @@ fn impossible_contents_are_refused() {
         (|file| file.settings.hidden = 3, "another number of hidden nodes"),
         (|file| file.settings.seed = Seed(1), "on these samples it is"),
         (
-            |file| file.settings.sensor.scale = "2x3_2x9".parse().unwrap(),
+            |file| file.settings.source.sensor.scale = "2x3_2x9".parse().unwrap(),
             "the samples have",
         ),
         (

@@ -115,7 +115,7 @@ fn what_was_simulated_is_decoded_row_by_row() {
     assert_eq!(lines("turned_out.csv"), expected);
     fs::write(path.join("part.csv"), without[..6].join("\n")).unwrap();
     let message = failure("decode --network net.json --input part.csv --output x.csv", path, 1);
-    assert!(message.contains("no whole snapshots of 3 rows"), "{message}");
+    assert!(message.contains("lines are not a multiple of 3 rows"), "{message}");
     success(
         "simulate --array 3x4_2x12 --rows 2 --samples 4 --noise 1e-3 --out row.csv",
         path,

@@ -35,8 +35,8 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
             let mut network = |row| {
                 let set = set.of_row(row);
                 let choice = InputChoice { quantity, scaling };
-                let inputs = Inputs::fit(choice, set.resistances_ohm.view(), noise).unwrap();
-                let outputs = MinMax::fit(set.coordinates_mm.view()).unwrap();
+                let inputs = Inputs::fit(choice, set.readings(), noise).unwrap();
+                let outputs = MinMax::fit(set.targets()).unwrap();
                 let shape = Shape {
                     inputs: inputs.count(),
                     hidden: 12,

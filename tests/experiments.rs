@@ -13,7 +13,7 @@ use std::{
 use decoupler::{
     dataset::{FoldUnit, Seed},
     evaluation::{
-        Run, RunSettings,
+        Run, SimulatedSettings,
         experiments::{Axis, Bottleneck, CrossValidation, Experiment, ExperimentResults, Trial, run_experiments},
     },
     sensor::{ArrayScale, SensorModel},
@@ -23,14 +23,14 @@ use serde_json::Value;
 
 /// Of a second at most: a small array, few samples, few epochs.
 fn small(axis: Axis) -> Experiment {
-    let mut base = RunSettings {
+    let mut base = SimulatedSettings {
         sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
         samples: 40,
         validation_samples: 12,
         test_samples: 20,
         hidden: 3,
         starts: 2,
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
     base.training.stopping.epochs = 8;
     Experiment {
@@ -109,19 +109,19 @@ fn a_trial_is_the_run_that_its_settings_describe() {
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
         for (trial, seed) in cell.trials.iter().zip(0..3) {
-            let settings = RunSettings {
+            let settings = SimulatedSettings {
                 seed: Seed(seed),
                 ..cell.cell.settings
             };
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
-            assert_eq!(trial.errors, alone.decouple_test().1);
+            assert_eq!(trial.errors, alone.node_scores().unwrap().network);
             assert_eq!(trial.baselines, *alone.baselines());
             let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
-            z_percent.push(alone.decouple_test().1.z_percent.unwrap());
+            z_percent.push(alone.node_scores().unwrap().network.z_percent.unwrap());
         }
         z_percent.sort_by(f64::total_cmp);
         let summary = cell.summary();
@@ -212,7 +212,7 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
 #[test]
 fn a_cell_that_cannot_be_trained_says_why_and_the_others_go_on() {
     let mut experiment = small(Axis::Hidden(vec![2, 512]));
-    experiment.base.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
+    experiment.base.source.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
     experiment.base.starts = 1;
     let by_name = |method: &Method| method.to_string().contains("Bayesian");
     experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
@@ -233,14 +233,12 @@ fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
             let mut settings = small(Axis::Hidden(vec![hidden])).base;
             settings.hidden = hidden;
             settings.seed = Seed(seed);
-            settings.sensor = SensorModel::new("3x3_2x9".parse().unwrap());
-            settings.samples = 12;
-            settings.validation_samples = 0;
+            settings.source.sensor = SensorModel::new("3x3_2x9".parse().unwrap());
+            settings.source.samples = 12;
+            settings.source.validation_samples = 0;
             settings.training.stopping.epochs = 200;
-            let (split, _) = Run::draw(&settings).unwrap();
-            let least = Bottleneck::fit(split.training.coordinates_mm.view(), hidden)
-                .unwrap()
-                .least_mse();
+            let (split, _) = settings.draw().unwrap();
+            let least = Bottleneck::fit(split.training.targets(), hidden).unwrap().least_mse();
             let mut run = Run::prepare(settings).unwrap();
             while run.step().is_none() {}
             let reached = run.leader().best_mse();

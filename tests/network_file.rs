@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     export::{NetworkFile, NetworkFileError},
     sensor::SensorModel,
 };
@@ -15,14 +15,14 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
 
 fn trained() -> NetworkFile {
-    let mut settings = RunSettings {
+    let mut settings = SimulatedSettings {
         sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
         samples: 100,
         validation_samples: 20,
         test_samples: 20,
         hidden: 5,
         seed: Seed(u64::MAX),
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
     settings.training.stopping.epochs = 8;
     let mut run = Run::prepare(settings).unwrap();
@@ -53,7 +53,7 @@ fn what_is_read_is_what_was_written_bit_by_bit() {
 #[test]
 fn a_training_in_progress_can_be_saved() {
     let (_folder, path) = place();
-    let mut run = Run::prepare(RunSettings::default()).unwrap();
+    let mut run = Run::prepare(SimulatedSettings::default()).unwrap();
     for epochs in 0..2 {
         let file = NetworkFile::from_run(&run);
         assert_eq!(
@@ -177,12 +177,12 @@ fn damage_is_named_and_said_where() {
         (
             "an impossible geometry",
             replaced("\"height_mm\":5.0", "\"height_mm\":-5.0"),
-            "settings.sensor: the height is -5 mm",
+            "settings.source.sensor: the height is -5 mm",
         ),
         (
             "an impossible scene",
             replaced("\"largest_compression\":0.2", "\"largest_compression\":2.0"),
-            "settings.scene",
+            "settings.source.scene",
         ),
         (
             "an impossible setting",

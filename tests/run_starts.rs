@@ -4,13 +4,13 @@
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{MOST_STARTS, Run, RunError, RunSettings, StartTrainer, best_start},
+    evaluation::{MOST_STARTS, Run, RunError, SimulatedSettings, StartTrainer, best_start},
     sensor::SensorModel,
     training::{Method, StopReason, StoppingRules, Trainer},
 };
 
-fn settings(starts: usize) -> RunSettings {
-    let mut settings = RunSettings {
+fn settings(starts: usize) -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
         sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
         samples: 100,
         validation_samples: 40,
@@ -18,13 +18,13 @@ fn settings(starts: usize) -> RunSettings {
         hidden: 4,
         starts,
         seed: Seed(3),
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
     settings.training.stopping.epochs = 12;
     settings
 }
 
-fn trained(settings: RunSettings) -> Run {
+fn trained(settings: SimulatedSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -64,7 +64,7 @@ fn the_first_start_is_the_run_of_one_start_and_the_others_differ() {
 #[test]
 fn the_start_of_lowest_validation_error_leads() {
     for validation_samples in [40, 0] {
-        let run = trained(RunSettings {
+        let run = trained(SimulatedSettings {
             validation_samples,
             ..settings(4)
         });
@@ -81,7 +81,7 @@ fn the_start_of_lowest_validation_error_leads() {
                 .map(|network| network.mlp())
                 .eq(run.trainers()[number].best())
         );
-        assert_eq!(run.decouple_test().1.z_percent, starts[number].z_percent);
+        assert_eq!(run.node_scores().unwrap().network.z_percent, starts[number].z_percent);
         assert_eq!(run.stop_reason(), run.leader().stop_reason());
     }
 }
@@ -179,7 +179,7 @@ fn too_many_starts_are_refused() {
             "{message}"
         );
     }
-    let wide = RunSettings {
+    let wide = SimulatedSettings {
         hidden: 300,
         starts: 100,
         ..settings(1)

@@ -7,7 +7,7 @@ use std::path::Path;
 use decoupler::{
     dataset::Seed,
     evaluation::{
-        DecoderKind, DecoderSet, Outlook, Precision, Preset, Run, RunSettings, TradePoint, fastest_under,
+        DecoderKind, DecoderSet, Outlook, Precision, Preset, Run, SimulatedSettings, TradePoint, fastest_under,
         measure_trade, most_accurate_under,
     },
     export::{CheckpointFile, NetworkFile},
@@ -16,8 +16,8 @@ use decoupler::{
 };
 
 /// Known rows of a small array, quick to train.
-fn small() -> RunSettings {
-    let mut settings = RunSettings {
+fn small() -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
         sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
         samples: 900,
         validation_samples: 90,
@@ -29,7 +29,7 @@ fn small() -> RunSettings {
     settings
 }
 
-fn trained(settings: RunSettings) -> Run {
+fn trained(settings: SimulatedSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -38,7 +38,7 @@ fn trained(settings: RunSettings) -> Run {
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
     let set = DecoderSet::of_run(run).unwrap();
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
-    assert!(report.frame_us > 0.0, "{kind}");
+    assert!(report.cost.frame_us > 0.0, "{kind}");
     report.errors.z_percent.unwrap()
 }
 
@@ -46,7 +46,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
     let run = trained(small());
     assert_eq!(run.network().each().len(), 3);
-    let errors = run.decouple_test().1;
+    let errors = run.node_scores().unwrap().network;
     assert!(errors.z_percent.unwrap() < 0.05, "{errors:?}");
     assert_eq!(errors.x_percent, Some(0.0), "what does not vary is known");
     let z = |kind, precision| z_percent(&run, kind, precision);
@@ -72,14 +72,14 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
 #[test]
 fn rows_that_are_not_known_are_found_out() {
     let mut settings = small();
-    settings.scene.rows = Rows::All;
+    settings.source.scene.rows = Rows::All;
     settings.training.stopping.epochs = 20;
     let run = trained(settings);
     assert_eq!(run.network().each().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
-    settings.scene.noise = Noise::relative(1e-5);
+    settings.source.scene.noise = Noise::relative(1e-5);
     let set = DecoderSet::new(&settings, None).unwrap();
-    let test = Run::test_set(&settings).unwrap();
+    let test = settings.draw_test().unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)
         .unwrap()
@@ -94,26 +94,26 @@ fn rows_that_are_not_known_are_found_out() {
 #[test]
 fn one_row_is_all_that_is_drawn_and_modelled() {
     let mut settings = small();
-    settings.scene.rows = Rows::One(2);
-    settings.samples = 300;
+    settings.source.scene.rows = Rows::One(2);
+    settings.source.samples = 300;
     let run = trained(settings);
     assert_eq!(run.test().rows(), 1);
     assert_eq!(run.test().samples(), 60);
     assert!(run.test().coordinates_mm.iter().step_by(3).all(|&x| x == 10.0));
-    let size = settings.model_size().unwrap();
+    let size = settings.source.model_size().unwrap();
     assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
     assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
     let known = small().model_size().unwrap();
     assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
-    settings.scene.movement = Movement::SIDEWAYS;
-    assert_eq!(settings.model_size().unwrap().unknowns, 12);
-    settings.scene.rows = Rows::One(3);
+    settings.source.scene.movement = Movement::SIDEWAYS;
+    assert_eq!(settings.source.model_size().unwrap().unknowns, 12);
+    settings.source.scene.rows = Rows::One(3);
     assert!(Run::prepare(settings).is_err(), "there is no fourth row");
 }
 
 #[test]
 fn known_rows_go_on_from_saved_states_with_the_same_bits() {
-    let mut settings = RunSettings { starts: 2, ..small() };
+    let mut settings = SimulatedSettings { starts: 2, ..small() };
     settings.training.stopping.epochs = 12;
     settings.training.stopping.max_fail = 1;
     let whole = trained(settings);
@@ -147,7 +147,7 @@ fn known_rows_go_on_from_saved_states_with_the_same_bits() {
 fn files_of_older_programs_still_load() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     let file = NetworkFile::load(&folder.join("network_version_1.json")).unwrap();
-    assert_eq!(file.settings.scene, Scene::default());
+    assert_eq!(file.settings.source.scene, Scene::default());
     assert_eq!(file.baselines.reference, None);
     // The samples follow from the settings, and nothing about them has changed since.
     let run = CheckpointFile::load(&folder.join("checkpoint_version_1.json"))
@@ -156,14 +156,14 @@ fn files_of_older_programs_still_load() {
         .unwrap();
     assert_eq!(run.settings(), &file.settings);
     assert_eq!(run.network(), file.network);
-    assert_eq!(run.decouple_test().1, file.errors);
+    assert_eq!(run.node_scores().unwrap().network, file.errors);
 }
 
 /// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it.
 #[test]
 fn with_noise_newton_comes_close_to_the_reference() {
     let mut settings = small();
-    settings.test_samples = 300;
+    settings.source.test_samples = 300;
     for (noise, loading) in [
         (1e-3, Loading::RandomNodes),
         (
@@ -173,8 +173,8 @@ fn with_noise_newton_comes_close_to_the_reference() {
             },
         ),
     ] {
-        settings.scene.noise = Noise::relative(noise);
-        settings.scene.loading = loading;
+        settings.source.scene.noise = Noise::relative(noise);
+        settings.source.scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
         let limit = run.baselines().reference.unwrap().z_percent.unwrap();
@@ -189,17 +189,17 @@ fn with_noise_newton_comes_close_to_the_reference() {
 #[test]
 fn sideways_movement_is_said_to_be_badly_conditioned() {
     let mut settings = Preset::Best.settings();
-    let upright = Outlook::of(&settings).unwrap();
+    let upright = Outlook::of(&settings.source).unwrap();
     assert!(upright.warnings.is_empty());
-    settings.scene.movement = Movement::SIDEWAYS;
-    let sideways = Outlook::of(&settings).unwrap();
+    settings.source.scene.movement = Movement::SIDEWAYS;
+    let sideways = Outlook::of(&settings.source).unwrap();
     assert!(sideways.worst_row.condition() > 1e3 * upright.worst_row.condition());
     assert!(!sideways.warnings.is_empty());
 }
 
 #[test]
 fn a_trade_has_a_point_for_every_choice() {
-    let mut settings = RunSettings {
+    let mut settings = SimulatedSettings {
         samples: 90,
         seed: Seed(3),
         ..small()
@@ -218,7 +218,7 @@ fn a_trade_has_a_point_for_every_choice() {
     assert!(
         points
             .iter()
-            .all(|point| fastest.report.frame_us <= point.report.frame_us)
+            .all(|point| fastest.report.cost.frame_us <= point.report.cost.frame_us)
     );
     let mut none = 0;
     let count = |_| none += 1;

@@ -4,19 +4,19 @@
 use std::{fs, path::Path, sync::Arc};
 
 use decoupler::{
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     export::{KeptRun, NetworkFile, Workspace},
 };
 
 fn kept(id: u64, name: &str, hidden: usize) -> KeptRun {
-    let mut settings = RunSettings {
+    let mut settings = SimulatedSettings {
         hidden,
         samples: 40,
         validation_samples: 8,
         test_samples: 8,
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
-    settings.sensor.scale = "4x3_2x9".parse().unwrap();
+    settings.source.sensor.scale = "4x3_2x9".parse().unwrap();
     settings.training.stopping.epochs = 4;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use decoupler::{
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     training::{StoppingRules, TrainingSettings},
 };
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
@@ -18,13 +18,13 @@ pub(crate) fn print() {
         epochs: StoppingRules::MOST_EPOCHS,
         ..StoppingRules::default()
     };
-    let settings = RunSettings {
+    let settings = SimulatedSettings {
         validation_samples: 0,
         training: TrainingSettings {
             stopping,
             ..TrainingSettings::default()
         },
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
     let mut run = Run::prepare(settings).expect("the paper's experiment is possible");
     let (slopes, inputs) = (Mat::from_fn(1000, 78, wave), Mat::from_fn(1000, 496, wave));

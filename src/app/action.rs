@@ -13,7 +13,7 @@ use super::{
     trade::TradeAction,
 };
 use crate::{
-    evaluation::{NodeAddress, RunSettings},
+    evaluation::{NodeAddress, SimulatedSettings},
     training::TrainerState,
 };
 
@@ -21,9 +21,9 @@ use crate::{
 #[derive(Clone, Debug)]
 pub enum Action {
     /// Change the settings of the next training.
-    Configure(Box<RunSettings>),
+    Configure(Box<SimulatedSettings>),
     /// Show the training that has these settings and whose starts stand so.
-    TakeUp(Box<RunSettings>, Vec<TrainerState>),
+    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
     /// Begin training.
     Train,
     /// Hold the training.

@@ -1,5 +1,5 @@
 use crate::{
-    evaluation::{Run, RunError, RunSettings},
+    evaluation::{Run, RunError},
     training::{StoppingRules, TrainingError, TrainingSettings},
 };
 
@@ -9,7 +9,7 @@ use crate::{
 ///
 /// # Errors
 /// A setting out of range, or networks too wide for the method; then nothing has changed.
-pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<RunSettings, RunError> {
+pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<(), RunError> {
     training.check().map_err(TrainingError::from)?;
     let stopping = StoppingRules {
         epochs: (furthest_epoch(run) + training.stopping.epochs).min(StoppingRules::MOST_EPOCHS),
@@ -23,7 +23,7 @@ pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<RunSett
     if !is_other && run.stop_reason().is_some() {
         run.continue_with(training.method)?;
     }
-    Ok(*run.settings())
+    Ok(())
 }
 
 /// The epoch of the start that is furthest.

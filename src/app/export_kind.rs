@@ -3,7 +3,7 @@ use std::path::Path;
 use thiserror::Error;
 
 use crate::{
-    evaluation::{Run, RunSettings, error_rows},
+    evaluation::{Run, SimulatedSettings, error_rows},
     export::{
         CheckpointFile, CheckpointFileError, NetworkFile, NetworkFileError, WriteError, atomic_write, write_errors,
         write_loss_curves,
@@ -86,7 +86,7 @@ impl ExportKind {
     }
 
     /// A name that tells the files of different runs apart.
-    pub fn file_name(self, settings: &RunSettings) -> String {
+    pub fn file_name(self, settings: &SimulatedSettings) -> String {
         let what = match self {
             Self::Network => "network",
             Self::Errors => "errors",
@@ -102,24 +102,27 @@ impl ExportKind {
     /// The file cannot be written; nothing is left half-written.
     pub fn write(self, run: &Run, path: &Path) -> Result<(), ExportError> {
         match self {
-            Self::Network => NetworkFile::from_run(run).save(path)?,
+            Self::Network => NetworkFile::from_run(run)?.save(path)?,
             Self::Errors => {
-                let settings = run.settings();
-                let (_, errors) = run.decouple_test();
-                let published = settings.published();
-                let rows = error_rows(&errors, run.baselines(), published.as_ref());
+                let NetworkFile {
+                    settings,
+                    errors,
+                    baselines,
+                    ..
+                } = NetworkFile::from_run(run)?;
+                let rows = error_rows(&errors, &baselines, settings.published().as_ref());
                 atomic_write(path, |writer| write_errors(&rows, writer))?;
             }
             Self::LossCurves => atomic_write(path, |writer| write_loss_curves(run.leader().history(), writer))?,
-            Self::Checkpoint => CheckpointFile::from_run(run).save(path)?,
+            Self::Checkpoint => CheckpointFile::from_run(run)?.save(path)?,
         }
         Ok(())
     }
 }
 
 /// A name that tells the files of different runs apart: what the file holds, and of which run.
-pub fn file_name(what: &str, extension: &str, settings: &RunSettings) -> String {
-    let array = settings.sensor.scale.to_string().replace('×', "x");
+pub fn file_name(what: &str, extension: &str, settings: &SimulatedSettings) -> String {
+    let array = settings.source.sensor.scale.to_string().replace('×', "x");
     let (hidden, method) = (settings.hidden, settings.training.method.short_name());
     let starts = match settings.starts {
         1 => String::new(),

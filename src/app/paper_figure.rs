@@ -1,5 +1,5 @@
 use super::{state::BottomTab, surface_view::ViewMode};
-use crate::{evaluation::RunSettings, sensor::SensorModel};
+use crate::{evaluation::SimulatedSettings, sensor::SensorModel};
 
 /// A figure of the paper that the window can show: its configuration, trained and looked at in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,16 +41,15 @@ impl PaperFigure {
     }
 
     /// What is trained for it.
-    pub fn settings(self) -> RunSettings {
+    pub fn settings(self) -> SimulatedSettings {
         let scale = match self {
             Self::Four => "10×10_5×30",
             Self::Six | Self::Seven | Self::Eight => "10×6_3×18",
         };
         let scale = scale.parse().expect("the paper's arrays are possible");
-        RunSettings {
-            sensor: SensorModel::new(scale),
-            ..RunSettings::default()
-        }
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor = SensorModel::new(scale);
+        settings
     }
 
     /// From where its surfaces are seen; `None` where it shows none.

@@ -11,7 +11,7 @@ pub fn pressed_shortcuts(ctx: &Context, state: &State) -> Vec<Action> {
     if state.saving.is_some() {
         return Vec::new();
     }
-    let snapshots = state.test().map_or(0, |test| test.set.snapshots());
+    let snapshots = state.test().map_or(0, |test| test.snapshots.len());
     let shown = state.look.snapshot;
     let pressed =
         |modifiers, key| ctx.input_mut(|input| input.consume_shortcut(&KeyboardShortcut::new(modifiers, key)));

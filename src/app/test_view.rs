@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use ndarray::Array2;
+use ndarray::ArrayView2;
 use thiserror::Error;
 
 use crate::{
     dataset::Dataset,
-    evaluation::{Outlook, Run, RunError, RunSettings},
+    evaluation::{NodeAddress, Outlook, RunError, SimulatedSettings},
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
@@ -16,6 +16,8 @@ use crate::{
 pub struct TestView {
     /// The samples.
     pub set: Arc<Dataset>,
+    /// The samples of each snapshot, rows from first to last.
+    pub snapshots: Arc<Vec<Vec<usize>>>,
     /// Heights of nodes to heights of the drawn grid.
     pub surface: Arc<SurfaceMap>,
     /// The sensor they were drawn for.
@@ -33,30 +35,31 @@ impl TestView {
     ///
     /// # Errors
     /// An impossible sensor, scene, or number of samples.
-    pub fn draw(settings: &RunSettings) -> Result<Self, TestViewError> {
-        Ok(Self::of(settings, Arc::new(Run::test_set(settings)?))?)
+    pub fn draw(settings: &SimulatedSettings) -> Result<Self, TestViewError> {
+        Ok(Self::of(settings, Arc::new(settings.draw_test()?))?)
     }
 
     /// Prepares the surface for a test set already drawn.
     ///
     /// # Errors
     /// Nodes through which no surface can be laid.
-    pub fn of(settings: &RunSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
-        let sensor = settings.sensor;
+    pub fn of(settings: &SimulatedSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
+        let sensor = settings.source.sensor;
         let row_count = sensor.scale.rows();
         // Of a row that does not exist there is no set either.
-        let rows = settings.scene.rows.read(row_count).unwrap_or_default();
+        let rows = settings.source.scene.rows.read(row_count).unwrap_or_default();
         let x_mm: Vec<f64> = rows.iter().map(|&row| sensor.geometry.row_x_mm(row)).collect();
         let nodes = 0..sensor.scale.nodes_per_row();
         let y_mm: Vec<f64> = nodes
             .map(|node| sensor.geometry.node_y_mm(sensor.scale, node))
             .collect();
         Ok(Self {
+            snapshots: Arc::new(set.snapshots()),
             set,
             surface: Arc::new(SurfaceMap::new(&x_mm, &y_mm)?),
             sensor,
             rows,
-            stroke_mm: settings.stroke_mm(),
+            stroke_mm: settings.source.stroke_mm(),
             outlook: outlook(settings),
         })
     }
@@ -67,9 +70,23 @@ impl TestView {
         height_mm - self.stroke_mm..=height_mm
     }
 
+    /// The number of a node among those drawn, row by row.
+    pub fn node(&self, address: NodeAddress) -> Option<usize> {
+        let row_index = self.rows.iter().position(|row_wire| *row_wire == address.row)?;
+        Some(row_index * self.sensor.scale.nodes_per_row() + address.node)
+    }
+
+    /// The nearest snapshot there is.
+    pub fn nearest_snapshot(&self, snapshot: usize) -> usize {
+        snapshot.min(self.snapshots.len().saturating_sub(1))
+    }
+
     /// Nodes of one snapshot and the surface through them, from coordinates of the shape of the set's.
-    pub fn frame(&self, coordinates_mm: &Array2<f64>, snapshot: usize) -> Frame {
-        let nodes_mm = self.set.snapshot_nodes_mm(coordinates_mm, snapshot);
+    pub fn frame(&self, coordinates_mm: ArrayView2<'_, f64>, snapshot: usize) -> Frame {
+        let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
+        let coordinates = samples.iter().flat_map(|&sample| coordinates_mm.row(sample).to_vec());
+        let coordinates: Vec<f64> = coordinates.collect();
+        let nodes_mm: Vec<DVec3> = coordinates.chunks_exact(3).map(DVec3::from_slice).collect();
         let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
         let grid_mm = self.surface.evaluate(&z_mm);
         Frame { nodes_mm, grid_mm }
@@ -77,17 +94,17 @@ impl TestView {
 }
 
 /// The outlook of arrays for which it takes a moment; those of the paper take a millisecond.
-fn outlook(settings: &RunSettings) -> Option<Outlook> {
+fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
     /// About a third of a second.
     const MOST_PRODUCTS: usize = 500_000_000;
-    let scale = settings.sensor.scale;
-    let unknowns = settings.scene.unknowns_per_row(scale);
+    let scale = settings.source.sensor.scale;
+    let unknowns = settings.source.scene.unknowns_per_row(scale);
     let matrix = unknowns.saturating_mul(scale.columns().max(unknowns));
     let products = matrix.saturating_mul(unknowns).saturating_mul(scale.rows());
     if products > MOST_PRODUCTS {
         return None;
     }
-    Outlook::of(settings).ok()
+    Outlook::of(&settings.source).ok()
 }
 
 /// Why there is nothing to draw.
@@ -96,6 +113,9 @@ pub enum TestViewError {
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A run on measured samples.
+    #[error("measured samples have no surface to show")]
+    Measured,
     /// No surface can be laid through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

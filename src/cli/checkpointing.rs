@@ -84,6 +84,6 @@ impl Checkpointing {
     }
 
     pub(super) fn save(&self, run: &Run) -> Result<(), CheckpointFileError> {
-        CheckpointFile::from_run(run).save(&self.path)
+        CheckpointFile::from_run(run)?.save(&self.path)
     }
 }

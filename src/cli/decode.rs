@@ -5,8 +5,9 @@ use ndarray::{Array2, Axis, Slice};
 
 use super::failure::Failure;
 use crate::{
-    dataset::{DatasetError, ReadError, Reading, ResistanceReader},
+    dataset::{ReadError, Reading, ResistanceReader, SimulationError},
     export::{AtomicFile, NetworkFile, WriteError, write_coordinates_header, write_numbers},
+    scene::RowModel,
 };
 
 /// Rows decoded and written together, so that memory does not grow with the file.
@@ -34,7 +35,7 @@ pub(super) struct Decode {
 impl Decode {
     pub(super) fn run(self) -> Result<(), Failure> {
         let NetworkFile { settings, network, .. } = NetworkFile::load(&self.network)?;
-        let scale = settings.sensor.scale;
+        let scale = settings.source.sensor.scale;
         let input = File::open(&self.input).map_err(|source| Failure::Open {
             path: self.input.clone(),
             source,
@@ -44,15 +45,15 @@ impl Decode {
             source,
         };
         let reader = ResistanceReader::new(BufReader::new(input), scale.columns()).map_err(unreadable)?;
-        let rows = settings.scene.rows;
-        let read = rows.read(scale.rows()).map_err(DatasetError::from)?;
-        let mut reader = if rows.are_known() {
-            reader.with_row_wires(scale.rows())
-        } else {
-            reader
+        let rows = settings.source.scene.rows;
+        let read = rows.read(scale.rows()).map_err(SimulationError::from)?;
+        let mut reader = match rows.model() {
+            RowModel::Shared => reader,
+            RowModel::Each => reader.with_row_wires(scale.rows()),
         };
-        let mut next_place = 0;
-        let mut has_row_wires = false;
+        // The turn of each line's row-wire, where the file does not say it.
+        let mut turns = (0..read.len()).cycle();
+        let mut lines_in_turn = 0;
         let mut output = AtomicFile::create(&self.output)?;
         let refused = |source| WriteError::io(&self.output, source);
         write_coordinates_header(scale.nodes_per_row(), &mut output).map_err(refused)?;
@@ -64,37 +65,33 @@ impl Decode {
                 lines,
                 row_wires,
             } = reading;
-            let row_wires_given = row_wires.is_some();
-            let coordinates_mm = match network.each() {
-                [only] => {
-                    let others = |row: &usize| rows.are_known() && !read.contains(row);
-                    let place = row_wires
-                        .as_ref()
-                        .and_then(|row_wires| row_wires.iter().position(others));
-                    if let Some(place) = place {
-                        let row = row_wires.map_or(0, |row_wires| row_wires[place]) + 1;
-                        let (path, line) = (self.input.clone(), lines[place]);
-                        return Err(Failure::OtherRow { path, line, row, rows });
-                    }
-                    only.decouple(resistances_ohm.view())
+            let other = |row_wires: &Vec<usize>| row_wires.iter().position(|row_wire| !read.contains(row_wire));
+            if let Some((row_wires, line)) = row_wires.as_ref().and_then(|all| Some((all, other(all)?))) {
+                return Err(Failure::OtherRow {
+                    path: self.input.clone(),
+                    line: lines[line],
+                    row: row_wires[line] + 1,
+                    rows,
+                });
+            }
+            let coordinates_mm = if let Some(only) = network.only() {
+                only.decouple(resistances_ohm.view())
+            } else {
+                let mut all_mm = Array2::zeros((lines.len(), scale.coordinates_per_row()));
+                if row_wires.is_none() {
+                    lines_in_turn += lines.len();
                 }
-                each => {
-                    let mut all_mm = Array2::zeros((lines.len(), scale.coordinates_per_row()));
-                    for sample in 0..lines.len() {
-                        let place = match &row_wires {
-                            Some(row_wires) => row_wires[sample],
-                            None => next_place,
-                        };
-                        next_place = (place + 1) % each.len();
-                        let resistances_ohm = resistances_ohm.slice_axis(Axis(0), Slice::from(sample..=sample));
-                        all_mm
-                            .row_mut(sample)
-                            .assign(&each[place].decouple(resistances_ohm).row(0));
-                    }
-                    all_mm
+                for (line, mut row_mm) in all_mm.rows_mut().into_iter().enumerate() {
+                    let row_index = match &row_wires {
+                        Some(row_wires) => read.iter().position(|row_wire| *row_wire == row_wires[line]),
+                        None => turns.next(),
+                    };
+                    let resistances_ohm = resistances_ohm.slice_axis(Axis(0), Slice::from(line..=line));
+                    let network = network.at(row_index.unwrap_or(0));
+                    row_mm.assign(&network.decouple(resistances_ohm).row(0));
                 }
+                all_mm
             };
-            has_row_wires |= row_wires_given;
             for (coordinates_mm, line) in coordinates_mm.rows().into_iter().zip(lines) {
                 if coordinates_mm.iter().any(|coordinate| !coordinate.is_finite()) {
                     let path = self.input.clone();
@@ -106,9 +103,12 @@ impl Decode {
         if is_empty {
             return Err(unreadable(ReadError::Empty));
         }
-        if !has_row_wires && next_place != 0 {
-            let (path, rows) = (self.input.clone(), read.len());
-            return Err(Failure::PartOfSnapshot { path, rows });
+        if !lines_in_turn.is_multiple_of(read.len()) {
+            return Err(Failure::PartOfSnapshot {
+                path: self.input.clone(),
+                lines: lines_in_turn,
+                rows: read.len(),
+            });
         }
         Ok(output.commit()?)
     }

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::interruption;
 use crate::{
-    dataset::{DatasetError, ReadError},
+    dataset::{ReadError, SimulationError},
     evaluation::{RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
     scene::Rows,
@@ -28,7 +28,7 @@ pub(super) enum Failure {
     #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
-    Dataset(#[from] DatasetError),
+    Simulation(#[from] SimulationError),
     #[error(transparent)]
     Network(#[from] NetworkFileError),
     #[error(transparent)]
@@ -62,8 +62,8 @@ pub(super) enum Failure {
         row: usize,
         rows: Rows,
     },
-    #[error("'{}': the lines are no whole snapshots of {rows} rows: add the rest, or a column named row with the number of each line's row-wire", .path.display())]
-    PartOfSnapshot { path: PathBuf, rows: usize },
+    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
+    PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
     #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
 }

@@ -7,7 +7,10 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use crate::{
-    evaluation::experiments::{CellSummary, CrossValidation, ExperimentResults, PaperTable, Verdict},
+    evaluation::{
+        CrossValidation,
+        experiments::{CellSummary, ExperimentResults, PaperTable, Verdict},
+    },
     export::{ExperimentTable, describe_conditions, describe_failures, format_duration},
     sensor::Geometry,
 };

@@ -2,7 +2,8 @@ use clap::Args;
 
 use super::{arguments::count, failure::Failure, training_arguments::number};
 use crate::{
-    evaluation::{DecoderKind, Preset, RunSettings},
+    decoupling::DecoderKind,
+    evaluation::{Preset, SimulatedSettings},
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, Rows},
 };
@@ -61,12 +62,16 @@ fn noisy_sets(text: &str) -> Result<NoisySets, String> {
 
 impl SceneArguments {
     /// The settings of the preset with the scene and inputs given, at the first noise given.
-    pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
+    pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.settings_at(self.preset.unwrap_or_default(), self.noise.first().copied())
     }
 
     /// The settings of this preset with the scene and inputs given, at this relative noise.
-    pub(super) fn settings_at(&self, preset: Preset, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
+    pub(super) fn settings_at(
+        &self,
+        preset: Preset,
+        relative_noise: Option<f64>,
+    ) -> Result<SimulatedSettings, Failure> {
         let noise = self.noise(Noise::default(), relative_noise);
         self.applied(preset.settings_in(noise), relative_noise)
     }
@@ -93,8 +98,12 @@ impl SceneArguments {
     }
 
     /// `settings` with the scene and inputs given.
-    fn applied(&self, mut settings: RunSettings, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
-        let scene = &mut settings.scene;
+    fn applied(
+        &self,
+        mut settings: SimulatedSettings,
+        relative_noise: Option<f64>,
+    ) -> Result<SimulatedSettings, Failure> {
+        let scene = &mut settings.source.scene;
         scene.rows = self.rows.unwrap_or(scene.rows);
         scene.movement = self.axes.unwrap_or(scene.movement);
         scene.loading = self.loading.unwrap_or(scene.loading);
@@ -108,19 +117,19 @@ impl SceneArguments {
     }
 
     /// What of the scene is given and is not as in `saved`.
-    pub(super) fn difference(&self, saved: &RunSettings) -> Result<Option<&'static str>, Failure> {
+    pub(super) fn difference(&self, saved: &SimulatedSettings) -> Result<Option<&'static str>, Failure> {
         let mut asked = *saved;
         if let Some(preset) = self.preset {
             let of_preset = preset.settings();
-            asked.scene.rows = of_preset.scene.rows;
+            asked.source.scene.rows = of_preset.source.scene.rows;
             asked.inputs = of_preset.inputs;
         }
         let asked = self.applied(asked, self.noise.first().copied())?;
         let differs = [
-            (asked.scene.rows != saved.scene.rows, "rows"),
-            (asked.scene.movement != saved.scene.movement, "axes"),
-            (asked.scene.loading != saved.scene.loading, "loading"),
-            (asked.scene.noise != saved.scene.noise, "noise"),
+            (asked.source.scene.rows != saved.source.scene.rows, "rows"),
+            (asked.source.scene.movement != saved.source.scene.movement, "axes"),
+            (asked.source.scene.loading != saved.source.scene.loading, "loading"),
+            (asked.source.scene.noise != saved.source.scene.noise, "noise"),
             (asked.inputs.quantity != saved.inputs.quantity, "inputs"),
             (asked.inputs.scaling != saved.inputs.scaling, "scaling"),
         ];

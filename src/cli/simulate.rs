@@ -11,9 +11,9 @@ use super::{
     scene_arguments::SceneArguments,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, LARGEST_SAMPLES, Seed, Stream},
-    decoupling::{FrameDecoder, decode_set},
-    evaluation::{DecoderSet, Precision, Run, RunError, RunSettings},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
+    decoupling::{Decoder, Precision, decode_set},
+    evaluation::{DecoderSet, Run, RunError, SimulatedSettings, Simulation},
     export::{AtomicFile, WriteError, write_samples, write_samples_header},
     sensor::{ArrayScale, SensorModel},
 };
@@ -63,15 +63,11 @@ impl Simulate {
     }
 
     fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
-        let settings = RunSettings {
-            sensor: SensorModel::new(self.array),
-            seed: Seed(self.seed),
-            ..self.scene.settings()?
-        };
-        let RunSettings {
-            sensor, scene, seed, ..
-        } = &settings;
-        let rows = scene.rows.read(self.array.rows()).map_err(DatasetError::from)?;
+        let mut settings = self.scene.settings()?;
+        settings.source.sensor = SensorModel::new(self.array);
+        settings.seed = Seed(self.seed);
+        let (Simulation { sensor, scene, .. }, seed) = (&settings.source, settings.seed);
+        let rows = scene.rows.read(self.array.rows()).map_err(SimulationError::from)?;
         let mut decoder = self.decoder(&settings)?;
         let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
         let snapshots = self.samples.div_ceil(rows.len());
@@ -85,13 +81,13 @@ impl Simulate {
                 Some(decoder) => Some(decode_set(&mut **decoder, &set).map_err(RunError::from)?),
                 None => None,
             };
-            write_samples(&set, &rows, decoded_mm.as_ref(), first + 1, writer).map_err(&refused)?;
+            write_samples(&set, decoded_mm.as_ref(), first + 1, writer).map_err(&refused)?;
         }
         Ok(())
     }
 
     /// The decoder asked for, trained if need be.
-    fn decoder(&self, settings: &RunSettings) -> Result<Option<Box<dyn FrameDecoder>>, Failure> {
+    fn decoder(&self, settings: &SimulatedSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
         self.scene.check_one_noise()?;
         let kind = match self.scene.decoder[..] {
             [] => return Ok(None),

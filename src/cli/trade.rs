@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Preset, RunSettings, TradeLevel, measure_trade},
+    evaluation::{Preset, SimulatedSettings, TradeLevel, measure_trade},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::StoppingRules,
@@ -104,11 +104,11 @@ impl Trade {
         Err(Failure::InterruptedTrade { done })
     }
 
-    fn settings(&self, preset: Preset, noise: f64) -> Result<RunSettings, Failure> {
+    fn settings(&self, preset: Preset, noise: f64) -> Result<SimulatedSettings, Failure> {
         let mut settings = self.scene.settings_at(preset, Some(noise))?;
-        settings.sensor = SensorModel::new(self.array);
-        settings.samples = self.samples.unwrap_or(settings.samples);
-        settings.test_samples = self.test_samples;
+        settings.source.sensor = SensorModel::new(self.array);
+        settings.source.samples = self.samples.unwrap_or(settings.source.samples);
+        settings.source.test_samples = self.test_samples;
         settings.seed = Seed(self.seed);
         let stopping = &mut settings.training.stopping;
         stopping.epochs = self.epochs.unwrap_or(stopping.epochs);

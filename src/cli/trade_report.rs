@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use crate::{
-    evaluation::{RunSettings, TradeCost, TradeLevel, TradePoint, fastest_under, most_accurate_under},
+    decoupling::Precision,
+    evaluation::{SimulatedSettings, TradeCost, TradeLevel, TradePoint, fastest_under, most_accurate_under},
     export::{format_duration, format_number},
     sensor::ArrayScale,
 };
@@ -29,34 +30,34 @@ fn fronts(level: &TradeLevel) -> Vec<(bool, bool)> {
 fn command(point: &TradePoint) -> String {
     let settings = &point.settings;
     // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
-    let of_preset = RunSettings {
-        scene: point.preset.settings().scene,
-        ..point.preset.settings_in(settings.scene.noise)
-    };
-    let array = settings.sensor.scale.to_string().replace('×', "x");
+    let mut of_preset = point.preset.settings_in(settings.source.scene.noise);
+    of_preset.source.scene = point.preset.settings().source.scene;
+    let array = settings.source.sensor.scale.to_string().replace('×', "x");
     let mut command = format!("decoupler train --preset {} --array {array}", point.preset);
-    let mut add = |name: &str, value: &dyn Fn(&RunSettings) -> String| {
+    let mut add = |name: &str, value: &dyn Fn(&SimulatedSettings) -> String| {
         if value(settings) != value(&of_preset) {
             command += &format!(" --{name} {}", value(settings));
         }
     };
-    add("rows", &|settings| settings.scene.rows.to_string());
-    add("axes", &|settings| settings.scene.movement.to_string());
-    add("loading", &|settings| settings.scene.loading.to_string());
+    add("rows", &|settings| settings.source.scene.rows.to_string());
+    add("axes", &|settings| settings.source.scene.movement.to_string());
+    add("loading", &|settings| settings.source.scene.loading.to_string());
     add("inputs", &|settings| settings.inputs.quantity.to_string());
     add("scaling", &|settings| settings.inputs.scaling.to_string());
-    add("noise", &|settings| format!("{:e}", settings.scene.noise.relative));
-    add("noise-ohm", &|settings| {
-        format!("{:e}", settings.scene.noise.additive_ohm)
+    add("noise", &|settings| {
+        format!("{:e}", settings.source.scene.noise.relative)
     });
-    add("drift", &|settings| format!("{:e}", settings.scene.noise.drift));
+    add("noise-ohm", &|settings| {
+        format!("{:e}", settings.source.scene.noise.additive_ohm)
+    });
+    add("drift", &|settings| format!("{:e}", settings.source.scene.noise.drift));
     add("adc-bits", &|settings| {
-        settings.scene.noise.converter_bits.unwrap_or(0).to_string()
+        settings.source.scene.noise.converter_bits.unwrap_or(0).to_string()
     });
     add("noise-in", &|settings| {
-        format!("{:?}", settings.scene.noise.sets).to_lowercase()
+        format!("{:?}", settings.source.scene.noise.sets).to_lowercase()
     });
-    add("samples", &|settings| settings.samples.to_string());
+    add("samples", &|settings| settings.source.samples.to_string());
     add("epochs", &|settings| settings.training.stopping.epochs.to_string());
     add("seed", &|settings| settings.seed.to_string());
     if let Some(hidden) = point.hidden() {
@@ -131,13 +132,13 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
         preset: point.preset.to_string(),
         decoder: point.report.kind.to_string(),
         precision: match point.report.precision {
-            crate::evaluation::Precision::Double => "f64",
-            crate::evaluation::Precision::Single => "f32",
+            Precision::Double => "f64",
+            Precision::Single => "f32",
         },
         hidden: point.hidden(),
         z_percent: point.report.errors.z_percent,
         z_mm: point.report.errors.z_mm,
-        frame_us: point.report.frame_us,
+        frame_us: point.report.cost.frame_us,
         training_s: point.training_seconds,
         residual: Some(point.report.residual).filter(|residual| residual.is_finite()),
         reference_z_percent: point.reference.z_percent,
@@ -210,7 +211,7 @@ fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::
             format_number(point.report.errors.z_percent),
             format_number(point.report.errors.z_mm),
             format_number(point.to_reference()),
-            format_number(point.report.frame_us),
+            format_number(point.report.cost.frame_us),
             format_duration(training),
             if on_decoding_front { "*" } else { " " },
             if on_training_front { "+" } else { "" },

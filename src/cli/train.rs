@@ -15,7 +15,7 @@ use super::{
     training_arguments::TrainingArguments,
 };
 use crate::{
-    evaluation::{DecoderKind, DecoderReport, DecoderSet, Precision, Run},
+    evaluation::{DecoderReport, DecoderSet, Run},
     export::{CheckpointFile, NetworkFile, check_writable, format_number},
 };
 
@@ -63,12 +63,12 @@ impl Train {
             _ => Run::prepare(self.training.settings()?)?,
         };
         let end = self.train(&mut run, checkpointing);
-        let file = NetworkFile::from_run(&run);
+        let file = NetworkFile::from_run(&run)?;
         if let Some(path) = &self.out {
             file.save(path)?;
         }
         let decoders = if end.is_ok() {
-            self.measure_decoders(&run)?
+            self.measure_decoders(&file, &run)?
         } else {
             Vec::new()
         };
@@ -80,12 +80,11 @@ impl Train {
         end
     }
 
-    fn measure_decoders(&self, run: &Run) -> Result<Vec<DecoderReport>, Failure> {
-        let set = DecoderSet::of_run(run)?;
+    fn measure_decoders(&self, file: &NetworkFile, run: &Run) -> Result<Vec<DecoderReport>, Failure> {
+        let set = DecoderSet::new(&file.settings, Some(file.network.clone()))?;
         let mut reports = Vec::new();
         for kind in self.training.scene.decoders() {
-            let single = (kind == DecoderKind::Network).then_some(Precision::Single);
-            for precision in std::iter::once(Precision::Double).chain(single) {
+            for &precision in kind.precisions() {
                 reports.extend(set.measure(kind, precision, run.test())?);
             }
         }

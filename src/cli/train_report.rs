@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
-        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, RunSettings, StartRecord, best_start, error_rows,
+        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, SimulatedSettings, StartRecord, best_start,
+        error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -87,17 +88,17 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Result<(), Failure> {
     let (settings, training) = (&file.settings, &file.training);
     let best = training.history.get(training.best_epoch);
-    let size = settings.model_size().map_err(RunError::from)?;
-    let outlook = Outlook::of(settings).ok();
+    let size = settings.source.model_size().map_err(RunError::from)?;
+    let outlook = Outlook::of(&settings.source).ok();
     let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
     let report = Report {
-        array: settings.sensor.scale,
+        array: settings.source.sensor.scale,
         hidden: settings.hidden,
         method: settings.training.method.short_name(),
         seed: settings.seed.0,
-        samples: settings.samples,
-        validation_samples: settings.validation_samples,
-        test_samples: settings.test_samples,
+        samples: settings.source.samples,
+        validation_samples: settings.source.validation_samples,
+        test_samples: settings.source.test_samples,
         starts: &training.starts,
         stages: &training.stages,
         epochs: epochs(training),
@@ -119,7 +120,7 @@ pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
             x_percent: row.x_percent,
             y_percent: row.y_percent,
         }),
-        scene: &settings.scene,
+        scene: &settings.source.scene,
         inputs: &settings.inputs,
         unknowns: size.unknowns,
         equations: size.equations,
@@ -144,9 +145,9 @@ fn decoder(report: &DecoderReport) -> Decoder {
     Decoder {
         z_percent: report.errors.z_percent,
         z_mm: report.errors.z_mm,
-        frame_us: report.frame_us,
+        frame_us: report.cost.frame_us,
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
-        fit_seconds: report.fit_seconds,
+        fit_seconds: report.cost.fit_seconds,
     }
 }
 
@@ -168,7 +169,7 @@ pub(super) fn print_text(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
 
 fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Write) -> io::Result<()> {
     let (settings, training) = (&file.settings, &file.training);
-    let scale = settings.sensor.scale;
+    let scale = settings.source.sensor.scale;
     let first = training.stages.first();
     let method = first.map_or(settings.training.method, |stage| stage.method);
     writeln!(
@@ -180,14 +181,14 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
         writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
     }
     write_scene(file, out)?;
-    let rows = settings.model_size().map_or(1, |size| size.rows);
+    let rows = settings.source.model_size().map_or(1, |size| size.rows);
     let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,
         "{} samples for training, {} for validation, {} for test",
-        whole(settings.samples),
-        whole(settings.validation_samples),
-        whole(settings.test_samples)
+        whole(settings.source.samples),
+        whole(settings.source.validation_samples),
+        whole(settings.source.test_samples)
     )?;
     let reason = training
         .stop_reason
@@ -220,7 +221,8 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
 
 /// What the scene is, what it came to, and what stands in the way.
 fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
-    let RunSettings { scene, inputs, .. } = &file.settings;
+    let SimulatedSettings { source, inputs, .. } = &file.settings;
+    let scene = &source.scene;
     let Noise {
         relative,
         additive_ohm,
@@ -245,7 +247,7 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
         write!(out, ", {noise}")?;
     }
     writeln!(out)?;
-    if let Ok(size) = file.settings.model_size() {
+    if let Ok(size) = file.settings.source.model_size() {
         let networks = if size.networks == 1 { "network" } else { "networks" };
         write!(
             out,
@@ -256,7 +258,7 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
             file.network.weights()
         )?;
     }
-    let outlook = Outlook::of(&file.settings).ok();
+    let outlook = Outlook::of(source).ok();
     match condition(outlook.as_ref()) {
         Some(condition) => writeln!(out, "; condition of the worst row {condition:.1e}")?,
         None => writeln!(out)?,
@@ -288,7 +290,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
             Some(report.errors.z_mm),
             ratio,
             Some(report.residual).filter(|residual| residual.is_finite()),
-            Some(report.frame_us),
+            Some(report.cost.frame_us),
         ];
         for value in values {
             write!(out, "{:>12}", format_number(value))?;

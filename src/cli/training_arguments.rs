@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MOST_STARTS, RunSettings},
+    evaluation::{MOST_STARTS, SimulatedSettings, Simulation},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
@@ -63,14 +63,18 @@ pub(super) struct TrainingArguments {
 
 impl TrainingArguments {
     /// The settings of a new run.
-    pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
+    pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.scene.check_one_noise()?;
         let default = self.scene.settings()?;
-        Ok(RunSettings {
-            sensor: self.sensor().unwrap_or(default.sensor),
-            samples: self.samples.unwrap_or(default.samples),
-            validation_samples: self.validation_samples.unwrap_or(default.validation_samples),
-            test_samples: self.test_samples.unwrap_or(default.test_samples),
+        let source = default.source;
+        Ok(SimulatedSettings {
+            source: Simulation {
+                sensor: self.sensor().unwrap_or(source.sensor),
+                samples: self.samples.unwrap_or(source.samples),
+                validation_samples: self.validation_samples.unwrap_or(source.validation_samples),
+                test_samples: self.test_samples.unwrap_or(source.test_samples),
+                ..source
+            },
             hidden: self.hidden.unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
             training: self.training(default.training)?,
@@ -85,7 +89,7 @@ impl TrainingArguments {
     }
 
     /// How a run of the settings `saved` is to go on.
-    pub(super) fn training_from(&self, saved: &RunSettings) -> Result<TrainingSettings, Failure> {
+    pub(super) fn training_from(&self, saved: &SimulatedSettings) -> Result<TrainingSettings, Failure> {
         let same = |argument: &str, given: Option<String>, saved: String| match given {
             Some(given) if given != saved => Err(Failure::Arguments(format!(
                 "--{argument} {given}: the checkpoint has {saved}; leave it out to go on, or begin anew with another \
@@ -102,13 +106,17 @@ impl TrainingArguments {
                  --checkpoint"
             )));
         }
-        let scale = saved.sensor.scale;
+        let scale = saved.source.sensor.scale;
         same("array", self.array.map(|scale| scale.to_string()), scale.to_string())?;
         count("hidden", self.hidden, saved.hidden)?;
         count("starts", self.starts, saved.starts)?;
-        count("samples", self.samples, saved.samples)?;
-        count("test-samples", self.test_samples, saved.test_samples)?;
-        count("validation-samples", self.validation_samples, saved.validation_samples)?;
+        count("samples", self.samples, saved.source.samples)?;
+        count("test-samples", self.test_samples, saved.source.test_samples)?;
+        count(
+            "validation-samples",
+            self.validation_samples,
+            saved.source.validation_samples,
+        )?;
         same("seed", self.seed.map(|seed| seed.to_string()), saved.seed.to_string())?;
         self.training(saved.training)
     }
@@ -198,10 +206,10 @@ mod tests {
 
     #[test]
     fn the_defaults_in_the_help_are_those_of_the_library() {
-        assert_eq!(parsed("train").settings().unwrap(), RunSettings::default());
+        assert_eq!(parsed("train").settings().unwrap(), SimulatedSettings::default());
         let told = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
                     --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 --goal 0 --max-fail 6 \
                     --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples 200 --seed 0";
-        assert_eq!(parsed(told).settings().unwrap(), RunSettings::default());
+        assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
     }
 }

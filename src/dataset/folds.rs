@@ -52,23 +52,21 @@ impl Folds {
     /// # Errors
     /// Fewer than two folds, or more than there are units.
     pub fn deal(set: &Dataset, folds: usize, unit: FoldUnit, rng: &mut impl Rng) -> Result<Self, FoldsError> {
-        let samples_per_unit = match unit {
-            FoldUnit::Sample => 1,
-            FoldUnit::Snapshot => set.rows(),
+        let units: Vec<Vec<usize>> = match unit {
+            FoldUnit::Sample => (0..set.samples()).map(|sample| vec![sample]).collect(),
+            FoldUnit::Snapshot => set.snapshots(),
         };
-        let units = set.samples() / samples_per_unit;
-        if !(2..=units).contains(&folds) {
+        if !(2..=units.len()).contains(&folds) {
+            let units = units.len();
             return Err(FoldsError { folds, units, unit });
         }
-        let mut order: Vec<usize> = (0..units).collect();
+        let mut order: Vec<usize> = (0..units.len()).collect();
         order.shuffle(rng);
         let deal = |fold: usize| {
-            let mut dealt: Vec<usize> = order.iter().copied().skip(fold).step_by(folds).collect();
-            dealt.sort_unstable();
-            let samples = dealt
-                .iter()
-                .flat_map(|unit| unit * samples_per_unit..(unit + 1) * samples_per_unit);
-            samples.collect()
+            let dealt = order.iter().skip(fold).step_by(folds);
+            let mut samples: Vec<usize> = dealt.flat_map(|&unit| &units[unit]).copied().collect();
+            samples.sort_unstable();
+            samples
         };
         Ok(Self {
             folds: (0..folds).map(deal).collect(),

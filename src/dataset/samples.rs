@@ -1,249 +1,350 @@
-use glam::DVec3;
-use ndarray::{Array2, Axis};
-use rand::Rng;
-use thiserror::Error;
+use std::{collections::HashMap, sync::Arc};
 
-use crate::{
-    scene::{Noise, Scene, SceneError},
-    sensor::{SensorError, SensorModel},
-};
+use ndarray::{Array2, ArrayView2, Axis};
+use thiserror::Error;
 
 /// The most samples of one set: what fits in memory with room to work.
 pub const LARGEST_SAMPLES: usize = 1_000_000;
 
-/// Samples of one array, in the order drawn: snapshot by snapshot, and in each the rows from first to last.
+/// Samples to learn from or to be judged by, simulated or measured. Each is one row-wire at one moment (or all that a
+/// sensor without row-wires reads at one moment), and knows which row-wire that is and which snapshot it belongs to.
+///
+/// Of a simulated array the readings are resistances in ohm (M4 of them), the targets the absolute coordinates of the
+/// row's nodes in millimetres (3·M2: each node's x, y, z together). Measured samples have whatever was measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
-    /// Row-column resistances in ohm: samples × M4.
-    pub resistances_ohm: Array2<f64>,
-    /// Absolute node coordinates in millimetres: samples × 3·M2, each node's x, y, z together.
-    pub coordinates_mm: Array2<f64>,
-    /// Row-wires read, hence samples of each snapshot.
-    rows: usize,
+    /// Samples × channels, in standard (row-major) layout.
+    readings: Array2<f64>,
+    /// Samples × outputs, in standard layout.
+    targets: Array2<f64>,
+    /// `None` where there are no row-wires, or nobody knows which one a sample is of.
+    rows: Option<SampleRows>,
+    /// The snapshot each sample belongs to: equal numbers, equal moments.
+    groups: Vec<usize>,
 }
 
-/// Why samples cannot be drawn.
-#[derive(Clone, Debug, PartialEq, Error)]
+/// The row-wires of samples.
+#[derive(Clone, Debug, PartialEq)]
+struct SampleRows {
+    /// The row-wires read, in ascending order. A selection keeps them all, also those it has no sample of.
+    read: Arc<[usize]>,
+    /// The index in `read` of each sample's row-wire.
+    indices: Vec<usize>,
+}
+
+/// Parts that do not make a set.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DatasetError {
-    /// The number of samples is out of range.
-    #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]
-    Count(usize),
-    /// The array has no such row-wire.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The model gives no resistance for a drawn deformation.
-    #[error("snapshot {snapshot}: {source}")]
-    Sensor {
-        /// Snapshot, from 0.
-        snapshot: usize,
-        /// What the model said.
-        source: SensorError,
+    /// No samples, channels or targets.
+    #[error("the {what} are {samples} × {columns}: give at least one sample and one column")]
+    Empty {
+        /// Readings or targets.
+        what: &'static str,
+        /// Samples found.
+        samples: usize,
+        /// Columns found.
+        columns: usize,
+    },
+    /// As many parts as there are samples are needed.
+    #[error("there are {found} {what} for {samples} samples: give one for each")]
+    Length {
+        /// Targets, row-wires or groups.
+        what: &'static str,
+        /// How many were found.
+        found: usize,
+        /// Samples of the readings.
+        samples: usize,
+    },
+    /// A sample is of a row-wire that is not read.
+    #[error("sample {}: row-wire {} is not among the rows read; name every row-wire once, in ascending order", .sample + 1, .row_wire + 1)]
+    RowWire {
+        /// Sample, from 0.
+        sample: usize,
+        /// Row-wire, from 0.
+        row_wire: usize,
     },
 }
 
 impl Dataset {
-    /// Draws at least `samples` samples of the row-wires that the scene reads, as whole snapshots: 101 samples of 10
-    /// rows become 110.
+    /// Builds a set from its parts: `readings` (samples × channels), `targets` (samples × outputs), each sample's
+    /// row-wire (from 0) where it is known, and each sample's group, the snapshot it belongs to. Samples of one group
+    /// are never divided between training and test where folds are dealt by snapshots.
     ///
     /// # Errors
-    /// A number of samples out of range, a row that the array does not have, or a deformation for which the model has
-    /// no resistance.
-    pub fn simulate(
-        model: &SensorModel,
-        scene: &Scene,
-        samples: usize,
-        rng: &mut impl Rng,
+    /// Nothing in it, or parts of different lengths.
+    pub fn new(
+        readings: Array2<f64>,
+        targets: Array2<f64>,
+        row_wires: Option<&[usize]>,
+        groups: Vec<usize>,
     ) -> Result<Self, DatasetError> {
-        if !(1..=LARGEST_SAMPLES).contains(&samples) {
-            return Err(DatasetError::Count(samples));
-        }
-        let read = scene.rows.read(model.scale.rows())?;
-        let rows = read.len();
-        let snapshots = samples.div_ceil(rows);
-        let mut resistances_ohm = Array2::zeros((snapshots * rows, model.scale.columns()));
-        let mut coordinates_mm = Array2::zeros((snapshots * rows, model.scale.coordinates_per_row()));
-        let sampler = scene.sampler(model);
-        let readings = resistances_ohm.axis_chunks_iter_mut(Axis(0), rows);
-        let positions = coordinates_mm.axis_chunks_iter_mut(Axis(0), rows);
-        for (snapshot, (mut readings, mut positions)) in readings.zip(positions).enumerate() {
-            let deformation = sampler.draw(rng);
-            for (place, &row) in read.iter().enumerate() {
-                let mut reading = readings.row_mut(place);
-                let reading = reading.as_slice_mut().expect("a row of a standard array is contiguous");
-                model
-                    .row_resistances_into(row, deformation.row_mm(row), reading)
-                    .map_err(|source| DatasetError::Sensor { snapshot, source })?;
-                let coordinates = deformation
-                    .row_positions_mm(model, row)
-                    .flat_map(|position| position.to_array());
-                for (target, value) in positions.row_mut(place).iter_mut().zip(coordinates) {
-                    *target = value;
-                }
+        for (what, values) in [("readings", &readings), ("targets", &targets)] {
+            let (samples, columns) = values.dim();
+            if samples == 0 || columns == 0 {
+                return Err(DatasetError::Empty { what, samples, columns });
             }
         }
+        let samples = readings.nrows();
+        let lengths = [
+            ("targets", targets.nrows()),
+            ("row-wires", row_wires.map_or(samples, <[usize]>::len)),
+            ("groups", groups.len()),
+        ];
+        if let Some((what, found)) = lengths.into_iter().find(|(_, length)| *length != samples) {
+            return Err(DatasetError::Length { what, found, samples });
+        }
+        let set = Self {
+            readings: readings.as_standard_layout().into_owned(),
+            targets: targets.as_standard_layout().into_owned(),
+            rows: None,
+            groups,
+        };
+        let Some(row_wires) = row_wires else { return Ok(set) };
+        let mut read = row_wires.to_vec();
+        read.sort_unstable();
+        read.dedup();
+        set.with_row_wires(&read, row_wires)
+    }
+
+    /// The same samples as part of a sensor whose row-wires `read` are read: for a set that has no sample of some of
+    /// them. Sets that train and test one network must agree on them.
+    ///
+    /// # Errors
+    /// A sample of another row-wire, or row-wires out of order.
+    pub fn among_rows(self, read: &[usize]) -> Result<Self, DatasetError> {
+        let row_wires: Option<Vec<usize>> = (0..self.samples()).map(|sample| self.row_wire(sample)).collect();
+        match row_wires {
+            Some(row_wires) => self.with_row_wires(read, &row_wires),
+            None => Ok(self),
+        }
+    }
+
+    fn with_row_wires(self, read: &[usize], row_wires: &[usize]) -> Result<Self, DatasetError> {
+        let is_in_order = read.windows(2).all(|pair| pair[0] < pair[1]);
+        let index = |(sample, &row_wire): (usize, &usize)| {
+            let found = read.binary_search(&row_wire).ok().filter(|_| is_in_order);
+            found.ok_or(DatasetError::RowWire { sample, row_wire })
+        };
+        let indices = row_wires.iter().enumerate().map(index).collect::<Result<_, _>>()?;
         Ok(Self {
-            resistances_ohm,
-            coordinates_mm,
-            rows,
+            rows: Some(SampleRows {
+                read: read.into(),
+                indices,
+            }),
+            ..self
         })
     }
 
-    /// Disturbs the readings, snapshot by snapshot. Deformations stay as they are, so sets with different noise compare.
-    ///
-    /// # Errors
-    /// A model without resistances at rest.
-    pub fn disturb(&mut self, model: &SensorModel, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
-        if noise.is_none() {
-            return Ok(());
-        }
-        let source = noise.source(model)?;
-        for mut snapshot in self.resistances_ohm.axis_chunks_iter_mut(Axis(0), self.rows) {
-            let readings = snapshot
-                .as_slice_mut()
-                .expect("rows of a standard array are contiguous");
-            source.disturb(readings, rng);
-        }
-        Ok(())
+    /// Readings: samples × channels.
+    pub fn readings(&self) -> ArrayView2<'_, f64> {
+        self.readings.view()
     }
 
-    /// The samples of the row-wire in place `row` of those read, of whole snapshots, in their order.
-    ///
-    /// # Panics
-    /// If there is no such place.
-    pub fn of_row(&self, row: usize) -> Self {
-        assert!(row < self.rows);
-        let samples: Vec<usize> = (row..self.samples()).step_by(self.rows).collect();
-        Self {
-            rows: 1,
-            ..self.select(&samples)
-        }
+    /// Targets: samples × outputs.
+    pub fn targets(&self) -> ArrayView2<'_, f64> {
+        self.targets.view()
     }
 
-    /// The same samples as if each were a snapshot of one row-wire: what a decoder sees that is not told the row.
-    #[must_use]
-    pub fn as_one_row(&self) -> Self {
-        Self {
-            rows: 1,
-            ..self.clone()
-        }
+    /// Readings of one sample.
+    pub fn sample_readings(&self, sample: usize) -> &[f64] {
+        contiguous(&self.readings, sample)
+    }
+
+    /// Targets of one sample.
+    pub fn sample_targets(&self, sample: usize) -> &[f64] {
+        contiguous(&self.targets, sample)
+    }
+
+    /// Readings of all samples one after another, to be changed.
+    pub(super) fn readings_mut(&mut self) -> &mut [f64] {
+        self.readings.as_slice_mut().expect("kept in standard layout")
     }
 
     /// Number of samples.
     pub fn samples(&self) -> usize {
-        self.resistances_ohm.nrows()
+        self.readings.nrows()
     }
 
-    /// Row-wires read, hence samples of each snapshot.
-    pub fn rows(&self) -> usize {
-        self.rows
+    /// Readings of a sample.
+    pub fn channels(&self) -> usize {
+        self.readings.ncols()
     }
 
-    /// Number of whole snapshots.
-    pub fn snapshots(&self) -> usize {
-        self.samples() / self.rows
+    /// Targets of a sample.
+    pub fn outputs(&self) -> usize {
+        self.targets.ncols()
     }
 
-    /// The samples with these numbers, in this order. They need not be whole snapshots any more.
+    /// The row-wires read, from 0 in ascending order; `None` where samples do not know theirs.
+    pub fn row_wires_read(&self) -> Option<&[usize]> {
+        self.rows.as_ref().map(|rows| &*rows.read)
+    }
+
+    /// Number of row-wires read; 1 where samples do not know theirs.
+    pub fn row_count(&self) -> usize {
+        self.row_wires_read().map_or(1, <[usize]>::len)
+    }
+
+    /// The row-wire of a sample, from 0, where it is known.
+    pub fn row_wire(&self, sample: usize) -> Option<usize> {
+        self.rows.as_ref().map(|rows| rows.read[rows.indices[sample]])
+    }
+
+    /// The index of a sample's row-wire among those read; 0 where it is not known.
+    pub fn row_index(&self, sample: usize) -> usize {
+        self.rows.as_ref().map_or(0, |rows| rows.indices[sample])
+    }
+
+    /// The group of each sample: the snapshot it belongs to.
+    pub fn groups(&self) -> &[usize] {
+        &self.groups
+    }
+
+    /// The samples of each snapshot, in the order in which snapshots first occur.
+    pub fn snapshots(&self) -> Vec<Vec<usize>> {
+        let mut order = HashMap::new();
+        let mut snapshots: Vec<Vec<usize>> = Vec::new();
+        for (sample, &group) in self.groups.iter().enumerate() {
+            let snapshot = *order.entry(group).or_insert_with(|| {
+                snapshots.push(Vec::new());
+                snapshots.len() - 1
+            });
+            snapshots[snapshot].push(sample);
+        }
+        snapshots
+    }
+
+    /// The samples with these numbers, in this order; each keeps its row-wire and its group.
+    #[must_use]
     pub fn select(&self, samples: &[usize]) -> Self {
         Self {
-            resistances_ohm: self.resistances_ohm.select(Axis(0), samples),
-            coordinates_mm: self.coordinates_mm.select(Axis(0), samples),
-            rows: self.rows,
+            readings: self.readings.select(Axis(0), samples),
+            targets: self.targets.select(Axis(0), samples),
+            rows: self.rows.as_ref().map(|rows| SampleRows {
+                read: Arc::clone(&rows.read),
+                indices: samples.iter().map(|&sample| rows.indices[sample]).collect(),
+            }),
+            groups: samples.iter().map(|&sample| self.groups[sample]).collect(),
         }
     }
 
-    /// Position in millimetres of each node of one snapshot, row by row (M1·M2 of them), read from `coordinates_mm`,
-    /// which has the shape of [`Self::coordinates_mm`]: the true ones or decoupled ones.
-    pub fn snapshot_nodes_mm(&self, coordinates_mm: &Array2<f64>, snapshot: usize) -> Vec<DVec3> {
-        let first = snapshot * self.rows;
-        let nodes = (first..first + self.rows).flat_map(|sample| {
-            let row = coordinates_mm.row(sample);
-            (0..row.len() / 3).map(move |node| DVec3::new(row[3 * node], row[3 * node + 1], row[3 * node + 2]))
-        });
-        nodes.collect()
+    /// The samples of the row-wire with this index among those read, in their order; all samples where none knows its
+    /// row-wire.
+    #[must_use]
+    pub fn of_row(&self, row_index: usize) -> Self {
+        let samples: Vec<usize> = (0..self.samples())
+            .filter(|&sample| self.rows.is_none() || self.row_index(sample) == row_index)
+            .collect();
+        self.select(&samples)
     }
+}
+
+fn contiguous(values: &Array2<f64>, sample: usize) -> &[f64] {
+    let all = values.as_slice().expect("kept in standard layout");
+    &all[sample * values.ncols()..(sample + 1) * values.ncols()]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        dataset::{Seed, Stream},
-        sensor::ArrayScale,
-    };
 
-    fn draw(scale: &str, samples: usize, seed: u64) -> Dataset {
-        let model = SensorModel::new(scale.parse().unwrap());
-        Dataset::simulate(
-            &model,
-            &Scene::default(),
-            samples,
-            &mut Seed(seed).rng(Stream::Training),
-        )
-        .unwrap()
+    /// Readings and targets that name their sample.
+    fn set(row_wires: Option<&[usize]>, groups: Vec<usize>) -> Result<Dataset, DatasetError> {
+        let samples = groups.len();
+        let readings = Array2::from_shape_fn((samples, 2), |(s, c)| (10 * s + c) as f64);
+        let targets = Array2::from_shape_fn((samples, 1), |(s, _)| s as f64);
+        Dataset::new(readings, targets, row_wires, groups)
     }
 
     #[test]
-    fn samples_come_as_whole_snapshots() {
-        let set = draw("10x6_3x18", 101, 0);
-        assert_eq!((set.samples(), set.snapshots()), (110, 11));
-        assert_eq!((set.resistances_ohm.ncols(), set.coordinates_mm.ncols()), (18, 18));
-        assert_eq!(draw("1x1_1x3", 1, 0).samples(), 1);
+    fn samples_keep_their_row_wire_and_group_wherever_they_go() {
+        let set = set(Some(&[7, 2, 7, 2, 4]), vec![5, 5, 9, 9, 9]).unwrap();
+        assert_eq!(set.row_wires_read(), Some(&[2, 4, 7][..]));
+        assert_eq!(set.snapshots(), [vec![0, 1], vec![2, 3, 4]]);
+        let part = set.select(&[4, 0, 2]);
+        assert_eq!(part.row_count(), 3, "the rows read are those of the sensor");
+        let row_wires: Vec<_> = (0..3).map(|sample| part.row_wire(sample).unwrap()).collect();
+        assert_eq!(row_wires, [4, 7, 7]);
+        assert_eq!(
+            (0..3).map(|sample| part.row_index(sample)).collect::<Vec<_>>(),
+            [1, 2, 2]
+        );
+        assert_eq!(part.groups(), [9, 5, 9]);
+        assert_eq!(part.snapshots(), [vec![0, 2], vec![1]]);
+        assert_eq!(part.targets().column(0).to_vec(), [4.0, 0.0, 2.0]);
+        let row = part.of_row(2);
+        assert_eq!(row.targets().column(0).to_vec(), [0.0, 2.0]);
+        assert_eq!(row.row_wire(1), Some(7));
+        assert_eq!(part.of_row(0).samples(), 0);
     }
 
     #[test]
-    fn coordinates_are_absolute_and_only_z_varies_within_a_row() {
-        let set = draw("10x6_3x18", 200, 1);
-        for (sample, coordinates) in set.coordinates_mm.rows().into_iter().enumerate() {
-            for node in 0..6 {
-                assert_eq!(coordinates[3 * node], 8.0 + (sample % 10) as f64);
-                assert_eq!(coordinates[3 * node + 1], 9.5 + 2.0 * (node as f64 - 2.5));
-                assert!((4.0..=5.0).contains(&coordinates[3 * node + 2]));
-            }
+    fn samples_may_know_no_row_wire() {
+        let set = set(None, vec![0, 0, 1]).unwrap();
+        assert_eq!(
+            (set.row_wires_read(), set.row_count(), set.row_wire(2)),
+            (None, 1, None)
+        );
+        assert_eq!(set.of_row(0), set);
+        assert_eq!(set.clone().among_rows(&[3]).unwrap(), set);
+    }
+
+    #[test]
+    fn a_set_without_samples_of_some_rows_can_say_which_rows_there_are() {
+        let set = set(Some(&[4, 4]), vec![0, 1]).unwrap().among_rows(&[2, 4]).unwrap();
+        assert_eq!((set.row_count(), set.row_index(1), set.row_wire(1)), (2, 1, Some(4)));
+        for rows in [&[2][..], &[4, 2], &[]] {
+            let message = set.clone().among_rows(rows).unwrap_err().to_string();
+            assert!(message.contains("row-wire 5 is not among"), "{rows:?}: {message}");
         }
     }
 
     #[test]
-    fn a_seed_gives_the_same_samples_and_another_gives_others() {
-        assert_eq!(draw("10x6_3x18", 50, 7), draw("10x6_3x18", 50, 7));
-        assert_ne!(draw("10x6_3x18", 50, 7), draw("10x6_3x18", 50, 8));
-    }
-
-    #[test]
-    fn more_samples_extend_a_set_without_changing_its_beginning() {
-        let (few, many) = (draw("10x6_3x18", 20, 3), draw("10x6_3x18", 40, 3));
-        assert_eq!(few, many.select(&(0..20).collect::<Vec<_>>()));
-    }
-
-    #[test]
-    fn a_row_is_every_sample_of_it() {
-        let set = draw("10x6_3x18", 30, 3);
-        let row = set.of_row(4);
-        assert_eq!((row.samples(), row.snapshots()), (3, 3));
-        assert_eq!(row.resistances_ohm, set.select(&[4, 14, 24]).resistances_ohm);
-    }
-
-    #[test]
-    fn noise_changes_readings_and_not_deformations() {
-        let model = SensorModel::new("10x6_3x18".parse().unwrap());
-        let clean = draw("10x6_3x18", 30, 3);
-        let mut noisy = clean.clone();
-        let mut rng = Seed(3).rng(Stream::TrainingNoise);
-        noisy.disturb(&model, &Noise::relative(1e-3), &mut rng).unwrap();
-        assert_eq!(noisy.coordinates_mm, clean.coordinates_mm);
-        let ratio = (&noisy.resistances_ohm / &clean.resistances_ohm).mapv(|ratio| (ratio - 1.0).abs());
-        let mean = ratio.mean().unwrap();
-        // Mean of the absolute value of a normal deviate.
-        let expected = 1e-3 * (2.0 / std::f64::consts::PI).sqrt();
-        assert!((mean / expected - 1.0).abs() < 0.1, "{mean}");
-    }
-
-    #[test]
-    fn no_samples_or_too_many_are_refused() {
-        let model = SensorModel::new(ArrayScale::default());
-        for samples in [0, LARGEST_SAMPLES + 1] {
-            let result = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Test));
-            assert_eq!(result, Err(DatasetError::Count(samples)));
+    fn parts_that_do_not_fit_are_named() {
+        let zeros = |shape: (usize, usize)| Array2::<f64>::zeros(shape);
+        let cases = [
+            (
+                "no samples",
+                Dataset::new(zeros((0, 2)), zeros((0, 1)), None, vec![]),
+                "readings are 0 × 2",
+            ),
+            (
+                "no channels",
+                Dataset::new(zeros((3, 0)), zeros((3, 1)), None, vec![0; 3]),
+                "readings are 3 × 0",
+            ),
+            (
+                "no targets",
+                Dataset::new(zeros((3, 2)), zeros((3, 0)), None, vec![0; 3]),
+                "targets are 3 × 0",
+            ),
+            (
+                "a target too few",
+                Dataset::new(zeros((3, 2)), zeros((2, 1)), None, vec![0; 3]),
+                "2 targets for 3",
+            ),
+            (
+                "a group too many",
+                Dataset::new(zeros((3, 2)), zeros((3, 1)), None, vec![0; 4]),
+                "4 groups for 3",
+            ),
+            (
+                "a row-wire too few",
+                Dataset::new(zeros((3, 2)), zeros((3, 1)), Some(&[0, 1]), vec![0; 3]),
+                "2 row-wires for 3",
+            ),
+        ];
+        for (sentence, result, expected) in cases {
+            let message = result.unwrap_err().to_string();
+            assert!(message.contains(expected), "{sentence}: {message}");
         }
+    }
+
+    #[test]
+    fn any_memory_layout_will_do() {
+        let readings = Array2::from_shape_fn((2, 3), |(c, s)| (10 * s + c) as f64).reversed_axes();
+        let set = Dataset::new(readings, Array2::zeros((3, 1)), None, vec![0, 1, 2]).unwrap();
+        assert_eq!(set.sample_readings(1), [10.0, 11.0]);
     }
 }

@@ -15,23 +15,24 @@ pub struct Split {
 /// snapshots are held out, so that no validation sample shares its moment with a training sample.
 pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
     let snapshots = set.snapshots();
-    let held_out = held_out.min(snapshots.saturating_sub(1));
+    let held_out = held_out.min(snapshots.len().saturating_sub(1));
     if held_out == 0 {
         return Split {
             training: set,
             validation: None,
         };
     }
-    let mut order: Vec<usize> = (0..snapshots).collect();
+    let mut order: Vec<usize> = (0..snapshots.len()).collect();
     order.shuffle(rng);
-    let (validation, training) = order.split_at_mut(held_out);
-    let samples = |snapshots: &mut [usize]| -> Vec<usize> {
-        snapshots.sort_unstable();
-        let rows = set.rows();
-        snapshots
+    let (validation, training) = order.split_at(held_out);
+    let samples = |chosen: &[usize]| -> Vec<usize> {
+        let mut samples: Vec<usize> = chosen
             .iter()
-            .flat_map(|snapshot| snapshot * rows..(snapshot + 1) * rows)
-            .collect()
+            .flat_map(|&snapshot| &snapshots[snapshot])
+            .copied()
+            .collect();
+        samples.sort_unstable();
+        samples
     };
     Split {
         training: set.select(&samples(training)),
@@ -60,13 +61,13 @@ mod tests {
         let validation = split.validation.unwrap();
         assert_eq!((split.training.samples(), validation.samples()), (170, 30));
         // Every z is drawn afresh, so the first node's z names the sample.
-        let z = |set: &Dataset| set.coordinates_mm.column(2).to_vec();
+        let z = |set: &Dataset| set.targets().column(2).to_vec();
         let mut apart = [z(&split.training), z(&validation)].concat();
         let mut whole = z(&set);
         apart.sort_by(f64::total_cmp);
         whole.sort_by(f64::total_cmp);
         assert_eq!(apart, whole);
-        for (row, coordinates) in validation.coordinates_mm.rows().into_iter().enumerate() {
+        for (row, coordinates) in validation.targets().rows().into_iter().enumerate() {
             assert_eq!(
                 coordinates[0],
                 8.0 + (row % 10) as f64,

@@ -1,11 +1,11 @@
 use ndarray::{Axis, Slice};
 use pulp::{Simd, WithSimd};
 
-use super::{
-    frame::{DecodeError, FrameDecoder},
-    real::Real,
+use super::{DecodeError, Decoder, real::Real};
+use crate::{
+    dataset::PerRow,
+    network::{DecouplingNetwork, Networks, Quantity},
 };
-use crate::network::{DecouplingNetwork, Quantity};
 
 /// Networks made ready to decode frames fast, in double or single precision, without allocating: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.
@@ -19,9 +19,8 @@ use crate::network::{DecouplingNetwork, Quantity};
 pub struct CompiledNetworks<T> {
     rows: usize,
     channels: usize,
-    coordinates_per_row: usize,
-    /// One for all rows, or one for each.
-    networks: Vec<Compiled<T>>,
+    outputs_per_row: usize,
+    networks: PerRow<Compiled<T>>,
     /// Of one row.
     inputs: Vec<T>,
     /// Of all rows, so that hyperbolic tangents fill the vector registers.
@@ -44,9 +43,9 @@ struct Compiled<T> {
     wide_hidden_layer: Option<Vec<f64>>,
     /// (padded hidden nodes + 1) × padded outputs, the bias last.
     output_layer: Vec<T>,
-    /// The middle of every coordinate, which constant ones keep.
-    middles_mm: Vec<f64>,
-    /// Which coordinate each output moves.
+    /// The middle of every target, which constant ones keep.
+    middles: Vec<f64>,
+    /// Which target each output moves.
     varying: Vec<usize>,
     padded_hidden: usize,
     padded_outputs: usize,
@@ -61,33 +60,25 @@ const USUAL_CHANGE: f64 = 0.1;
 const LANES: usize = 4;
 
 impl<T: Real> CompiledNetworks<T> {
-    /// One network for all of `rows` row-wires.
-    pub fn shared(network: &DecouplingNetwork, rows: usize) -> Self {
-        Self::new(vec![Compiled::new(network)], rows)
-    }
-
-    /// One network for each row-wire.
+    /// Prepares `networks` to decode frames of `rows` row-wires.
     ///
     /// # Panics
-    /// If there is none, or their channels differ.
-    pub fn each(networks: &[DecouplingNetwork]) -> Self {
-        Self::new(networks.iter().map(Compiled::new).collect(), networks.len())
-    }
-
-    fn new(networks: Vec<Compiled<T>>, rows: usize) -> Self {
-        let first = networks.first().expect("at least one network");
-        let channels = first.centre_ohm.len();
-        let coordinates_per_row = first.middles_mm.len();
-        assert!(networks.iter().all(|network| network.centre_ohm.len() == channels));
-        let widest = |width: fn(&Compiled<T>) -> usize| networks.iter().map(width).max().unwrap_or(0);
-        let (hidden, outputs) = (widest(|n| n.padded_hidden), widest(|n| n.padded_outputs));
+    /// If their channels or outputs differ.
+    pub fn new(networks: &Networks, rows: usize) -> Self {
+        let networks = networks.map(Compiled::new);
+        let (channels, outputs) = (networks.at(0).centre_ohm.len(), networks.at(0).middles.len());
+        let of_same_size =
+            |network: &Compiled<T>| (network.centre_ohm.len(), network.middles.len()) == (channels, outputs);
+        assert!(networks.values().iter().all(of_same_size));
+        let widest = |width: fn(&Compiled<T>) -> usize| networks.values().iter().map(width).max().unwrap_or(0);
+        let (hidden, padded_outputs) = (widest(|n| n.padded_hidden), widest(|n| n.padded_outputs));
         Self {
             rows,
             channels,
-            coordinates_per_row,
+            outputs_per_row: outputs,
             inputs: vec![T::ZERO; channels],
             hidden: vec![T::ZERO; rows * hidden],
-            outputs: vec![T::ZERO; outputs],
+            outputs: vec![T::ZERO; padded_outputs],
             wide_inputs: vec![0.0; channels],
             wide_sums: vec![0.0; hidden],
             networks,
@@ -109,14 +100,14 @@ impl<T: Real> Compiled<T> {
         // What is computed of a reading is (R − R₀)/R for a conductance; the rest is folded into the weights.
         let per_computed = |channel: usize| match quantity {
             Quantity::Conductance => -1.0 / centre_ohm[channel],
-            Quantity::Resistance | Quantity::LogResistance => 1.0,
+            Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => 1.0,
         };
         let folded = matrix
             .t()
             .dot(&mlp.hidden_layer().slice_axis(Axis(0), Slice::from(..shape.inputs)));
         let usual_input = |channel: usize| match quantity {
             Quantity::Conductance | Quantity::LogResistance => USUAL_CHANGE,
-            Quantity::Resistance => USUAL_CHANGE * centre_ohm[channel],
+            Quantity::Resistance | Quantity::Raw => USUAL_CHANGE * centre_ohm[channel],
         };
         let mut wide = vec![0.0; (channels + 1) * padded_hidden];
         let mut rounding = 0.0_f64;
@@ -135,8 +126,8 @@ impl<T: Real> Compiled<T> {
         let ranges = network.outputs().middles_and_half_widths();
         let varying = network.outputs().varying();
         let mut output_layer = vec![T::ZERO; (padded_hidden + 1) * padded_outputs];
-        for (output, &coordinate) in varying.iter().enumerate() {
-            let half_width = ranges[coordinate].1;
+        for (output, &target) in varying.iter().enumerate() {
+            let half_width = ranges[target].1;
             for node in 0..shape.hidden {
                 let weight = mlp.output_layer()[[node, output]] * half_width;
                 output_layer[node * padded_outputs + output] = T::of(weight);
@@ -150,7 +141,7 @@ impl<T: Real> Compiled<T> {
             hidden_layer,
             wide_hidden_layer: is_wide.then_some(wide),
             output_layer,
-            middles_mm: ranges.iter().map(|range| range.0).collect(),
+            middles: ranges.iter().map(|range| range.0).collect(),
             varying,
             padded_hidden,
             padded_outputs,
@@ -161,7 +152,9 @@ impl<T: Real> Compiled<T> {
     fn read<U: Real>(&self, readings_ohm: &[f64], inputs: &mut [U]) {
         let pairs = inputs.iter_mut().zip(readings_ohm).zip(&self.centre_ohm);
         match self.quantity {
-            Quantity::Resistance => pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre)),
+            Quantity::Resistance | Quantity::Raw => {
+                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre));
+            }
             Quantity::Conductance => {
                 pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre) / U::of(ohm));
             }
@@ -172,23 +165,49 @@ impl<T: Real> Compiled<T> {
     }
 }
 
-impl<T: Real> FrameDecoder for CompiledNetworks<T> {
-    fn decode(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
-        assert_eq!(readings_ohm.len(), self.rows * self.channels);
-        assert_eq!(coordinates_mm.len(), self.rows * self.coordinates_per_row);
-        pulp::Arch::new().dispatch(Decoding {
-            decoder: self,
-            readings_ohm,
-            coordinates_mm,
+impl<T: Real> Decoder for CompiledNetworks<T> {
+    fn channels(&self) -> usize {
+        self.channels
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs_per_row
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        assert_eq!((readings.len(), targets.len()), (self.channels, self.outputs_per_row));
+        self.decode_from(row_index, readings, targets)
+    }
+
+    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        assert_eq!(readings.len(), self.rows * self.channels);
+        assert_eq!(targets.len(), self.rows * self.outputs_per_row);
+        self.decode_from(0, readings, targets).map_err(|error| DecodeError {
+            row_index: error.channel / self.channels,
+            channel: error.channel % self.channels,
+            ..error
         })
     }
 }
 
-/// A type rather than a closure, which would be too long to be moved into the code for vector registers.
+impl<T: Real> CompiledNetworks<T> {
+    /// Decodes rows that follow upon each other from `first_row` on.
+    fn decode_from(&mut self, first_row: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        pulp::Arch::new().dispatch(Decoding {
+            decoder: self,
+            first_row,
+            readings,
+            targets,
+        })
+    }
+}
+
+/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
 struct Decoding<'a, T> {
     decoder: &'a mut CompiledNetworks<T>,
-    readings_ohm: &'a [f64],
-    coordinates_mm: &'a mut [f64],
+    first_row: usize,
+    readings: &'a [f64],
+    targets: &'a mut [f64],
 }
 
 impl<T: Real> WithSimd for Decoding<'_, T> {
@@ -196,10 +215,21 @@ impl<T: Real> WithSimd for Decoding<'_, T> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        DecodeError::check(self.readings_ohm)?;
-        self.decoder.feed_hidden_nodes(self.readings_ohm);
-        T::tanh_in_place(&mut self.decoder.hidden);
-        self.decoder.move_nodes(self.coordinates_mm);
+        let Self {
+            decoder,
+            first_row,
+            readings,
+            targets,
+        } = self;
+        match decoder.networks.at(first_row).quantity {
+            Quantity::Raw => DecodeError::check_that(readings, f64::is_finite)?,
+            _ => DecodeError::check(readings)?,
+        }
+        let width = decoder.hidden.len() / decoder.rows;
+        let rows = readings.len() / decoder.channels;
+        decoder.feed_hidden_nodes(first_row, readings);
+        T::tanh_in_place(&mut decoder.hidden[..rows * width]);
+        decoder.write_targets(first_row, targets);
         Ok(())
     }
 }
@@ -207,14 +237,13 @@ impl<T: Real> WithSimd for Decoding<'_, T> {
 impl<T: Real> CompiledNetworks<T> {
     /// Sums of all hidden nodes.
     #[inline(always)]
-    fn feed_hidden_nodes(&mut self, readings_ohm: &[f64]) {
-        let last = self.networks.len() - 1;
+    fn feed_hidden_nodes(&mut self, first_row: usize, readings: &[f64]) {
         let width = self.hidden.len() / self.rows;
-        let rows = readings_ohm
+        let rows = readings
             .chunks_exact(self.channels)
             .zip(self.hidden.chunks_exact_mut(width));
         for (row, (readings, hidden)) in rows.enumerate() {
-            let network = &self.networks[row.min(last)];
+            let network = self.networks.at(first_row + row);
             let hidden = &mut hidden[..network.padded_hidden];
             if let Some(layer) = &network.wide_hidden_layer {
                 let sums = &mut self.wide_sums[..network.padded_hidden];
@@ -228,21 +257,20 @@ impl<T: Real> CompiledNetworks<T> {
         }
     }
 
-    /// Coordinates from the hidden nodes' outputs.
+    /// Targets from the hidden nodes' outputs.
     #[inline(always)]
-    fn move_nodes(&mut self, coordinates_mm: &mut [f64]) {
-        let last = self.networks.len() - 1;
+    fn write_targets(&mut self, first_row: usize, targets: &mut [f64]) {
         let width = self.hidden.len() / self.rows;
-        let rows = coordinates_mm
-            .chunks_exact_mut(self.coordinates_per_row)
+        let rows = targets
+            .chunks_exact_mut(self.outputs_per_row)
             .zip(self.hidden.chunks_exact(width));
-        for (row, (coordinates, hidden)) in rows.enumerate() {
-            let network = &self.networks[row.min(last)];
+        for (row, (targets, hidden)) in rows.enumerate() {
+            let network = self.networks.at(first_row + row);
             let outputs = &mut self.outputs[..network.padded_outputs];
             affine(&hidden[..network.padded_hidden], &network.output_layer, outputs);
-            coordinates.copy_from_slice(&network.middles_mm);
-            for (&coordinate, output) in network.varying.iter().zip(&*outputs) {
-                coordinates[coordinate] += output.to_f64();
+            targets.copy_from_slice(&network.middles);
+            for (&target, output) in network.varying.iter().zip(&*outputs) {
+                targets[target] += output.to_f64();
             }
         }
     }
@@ -301,28 +329,27 @@ mod tests {
     use crate::{
         dataset::{Dataset, Seed, Stream},
         decoupling::decode_set,
-        network::{InputChoice, Inputs, MinMax, ScalingChoice, Shape, nguyen_widrow},
-        scene::Scene,
+        network::{InputChoice, Inputs, MinMax, ScalingChoice, ScalingError, Shape, nguyen_widrow},
+        scene::{RowModel, Scene},
         sensor::SensorModel,
     };
 
-    fn networks(scale: &str, choice: InputChoice, hidden: usize) -> (Dataset, Vec<DecouplingNetwork>) {
+    fn networks(scale: &str, choice: InputChoice, hidden: usize) -> (Dataset, Networks) {
         let model = SensorModel::new(scale.parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 400, &mut Seed(0).rng(Stream::Training)).unwrap();
         let mut rng = Seed(0).rng(Stream::Start);
-        let network = |row: usize| {
-            let set = set.of_row(row);
-            let inputs = Inputs::fit(choice, set.resistances_ohm.view(), 1e-3).unwrap();
-            let outputs = MinMax::fit(set.coordinates_mm.view()).unwrap();
+        let network = |set: &Dataset| {
+            let inputs = Inputs::fit(choice, set.readings(), 1e-3)?;
+            let outputs = MinMax::fit(set.targets())?;
             let shape = Shape {
                 inputs: inputs.count(),
                 hidden,
                 outputs: outputs.varying().len(),
             };
             let mlp = nguyen_widrow(shape, &mut rng);
-            DecouplingNetwork::new(inputs, mlp, outputs)
+            Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
         };
-        let networks = (0..model.scale.rows()).map(network).collect();
+        let networks = PerRow::fit(&set, RowModel::Each, network).unwrap();
         (set, networks)
     }
 
@@ -332,26 +359,42 @@ mod tests {
             for quantity in Quantity::ALL {
                 for scaling in [ScalingChoice::MinMax, ScalingChoice::Whitening] {
                     let (set, networks) = networks(scale, InputChoice { quantity, scaling }, hidden);
-                    let double = decode_set(&mut CompiledNetworks::<f64>::each(&networks), &set).unwrap();
-                    let single = decode_set(&mut CompiledNetworks::<f32>::each(&networks), &set).unwrap();
-                    for (row, network) in networks.iter().enumerate() {
-                        let expected = network.decouple(set.of_row(row).resistances_ohm.view());
-                        for (snapshot, expected) in expected.rows().into_iter().enumerate() {
-                            let sample = snapshot * networks.len() + row;
-                            for (coordinate, expected) in expected.iter().enumerate() {
-                                let of_double = double[[sample, coordinate]];
-                                let of_single = single[[sample, coordinate]];
-                                assert!(
-                                    (of_double - expected).abs() < 1e-9,
-                                    "{scale} {quantity}: {of_double} {expected}"
-                                );
-                                assert!(
-                                    (of_single - expected).abs() < 1e-3,
-                                    "{scale} {quantity}: {of_single} {expected}"
-                                );
-                            }
-                        }
+                    let rows = set.row_count();
+                    let double = decode_set(&mut CompiledNetworks::<f64>::new(&networks, rows), &set).unwrap();
+                    let single = decode_set(&mut CompiledNetworks::<f32>::new(&networks, rows), &set).unwrap();
+                    let expected = networks.decouple(&set);
+                    for ((of_double, of_single), expected) in double.iter().zip(&single).zip(&expected) {
+                        assert!(
+                            (of_double - expected).abs() < 1e-9,
+                            "{scale} {quantity}: {of_double} {expected}"
+                        );
+                        assert!(
+                            (of_single - expected).abs() < 1e-3,
+                            "{scale} {quantity}: {of_single} {expected}"
+                        );
                     }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_gives_the_bits_of_its_rows() {
+        for hidden in [1, 5, 12, 29] {
+            let (set, networks) = networks("5x6_3x18", InputChoice::BEST, hidden);
+            let mut double = CompiledNetworks::<f64>::new(&networks, 5);
+            let mut single = CompiledNetworks::<f32>::new(&networks, 5);
+            let frames = set.frames().unwrap();
+            for decoder in [&mut double as &mut dyn Decoder, &mut single] {
+                let by_rows = decode_set(decoder, &set).unwrap();
+                let mut whole = vec![0.0; 5 * 18];
+                for frame in 0..frames.count() {
+                    decoder.decode(frames.frame(frame), &mut whole).unwrap();
+                    let rows = frames
+                        .samples(frame)
+                        .iter()
+                        .flat_map(|&sample| by_rows.row(sample).to_vec());
+                    assert!(whole.iter().map(|x| x.to_bits()).eq(rows.map(f64::to_bits)));
                 }
             }
         }
@@ -360,13 +403,20 @@ mod tests {
     #[test]
     fn a_shared_network_decodes_every_row_and_bad_readings_are_named() {
         let (set, networks) = networks("3x4_2x7", InputChoice::PAPER, 4);
-        let mut compiled = CompiledNetworks::<f64>::shared(&networks[0], 3);
+        let shared = Networks::shared(networks.at(0).clone());
+        let mut compiled = CompiledNetworks::<f64>::new(&shared, 3);
         let decoded = decode_set(&mut compiled, &set).unwrap();
-        let expected = networks[0].decouple(set.resistances_ohm.view());
+        let expected = networks.at(0).decouple(set.readings());
         assert!((&decoded - &expected).iter().all(|difference| difference.abs() < 1e-10));
         let mut readings = vec![10.0; 21];
         readings[9] = -1.0;
         let error = compiled.decode(&readings, &mut [0.0; 36]).unwrap_err();
-        assert_eq!(error, DecodeError { index: 9, value: -1.0 });
+        let expected = DecodeError {
+            row_index: 1,
+            channel: 2,
+            value: -1.0,
+        };
+        assert_eq!(error, expected);
+        assert!(error.to_string().starts_with("row 2, reading 3: -1"), "{error}");
     }
 }

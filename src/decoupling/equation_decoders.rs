@@ -1,19 +1,15 @@
-use super::{
-    frame::{DecodeError, FrameDecoder},
-    newton::Newton,
-    newton_report::{NewtonError, NewtonRules},
-    posterior::Posterior,
-};
+use super::{DecodeError, Decoder, newton::Newton, newton_report::NewtonRules, posterior::Posterior};
 use crate::{
-    scene::Scene,
-    sensor::{SensorError, SensorModel},
+    scene::{RowModel, Scene},
+    sensor::{ArrayScale, SensorError, SensorModel},
 };
 
-/// Which row-wire each part of a frame is read from, where need be found out by trying.
+/// The row-wire of each row of a frame, found by trying where the scene's decoders are not told.
 #[derive(Clone, Debug)]
 struct RowSearch {
+    scale: ArrayScale,
+    /// The row-wires read.
     rows: Vec<usize>,
-    coordinates_per_row: usize,
     /// ln R of each of `rows` at rest; empty where rows are known.
     rest: Vec<Vec<f64>>,
     trial_mm: Vec<f64>,
@@ -29,48 +25,47 @@ impl RowSearch {
             let readings = model.row_resistances(row, &at_rest)?;
             Ok(readings.into_iter().map(f64::ln).collect())
         };
-        let searched = if scene.rows.are_known() { &[] } else { rows };
+        let searched = match scene.rows.model() {
+            RowModel::Each => &[],
+            RowModel::Shared => rows,
+        };
         Ok(Self {
+            scale: model.scale,
             rest: searched.iter().map(rest).collect::<Result<_, SensorError>>()?,
             rows: rows.to_vec(),
-            coordinates_per_row: model.scale.coordinates_per_row(),
             trial_mm: vec![0.0; model.scale.coordinates_per_row()],
         })
     }
 
-    /// Solves every row of a frame by `solve`, which answers for one row-wire and gives the rms relative misfit. Where
-    /// rows are not known, row-wires are tried in the order of how alike their readings at rest are, and the one that
-    /// explains the readings best is taken: rows that mirror each other then come back as either of them.
+    /// Solves one row by `solve`, which answers for one row-wire and gives the rms relative misfit. Where rows are not
+    /// known, row-wires are tried in the order of how alike their readings at rest are, and the one that explains the
+    /// readings best is taken: rows that mirror each other then come back as either of them.
     fn solve(
         &mut self,
+        row_index: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<f64, NewtonError>,
+        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<f64, DecodeError>,
     ) -> Result<(), DecodeError> {
         DecodeError::check(readings_ohm)?;
-        let readings = readings_ohm.chunks_exact(readings_ohm.len() / self.rows.len());
-        let coordinates = coordinates_mm.chunks_exact_mut(self.coordinates_per_row);
-        for (place, (readings, coordinates)) in readings.zip(coordinates).enumerate() {
-            if self.rest.is_empty() {
-                solve(self.rows[place], readings, coordinates).map_err(in_frame(place, readings))?;
-                continue;
+        if self.rest.is_empty() {
+            return solve(self.rows[row_index], readings_ohm, coordinates_mm).map(drop);
+        }
+        let unlike = |rest: &Vec<f64>| -> f64 {
+            let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
+            differences.map(|difference| difference * difference).sum()
+        };
+        let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut least = f64::INFINITY;
+        for (_, row_wire) in order {
+            let residual = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
+            if residual < least {
+                least = residual;
+                coordinates_mm.copy_from_slice(&self.trial_mm);
             }
-            let unlike = |rest: &Vec<f64>| -> f64 {
-                let differences = rest.iter().zip(readings).map(|(rest, ohm)| ohm.ln() - rest);
-                differences.map(|difference| difference * difference).sum()
-            };
-            let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
-            order.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let mut least = f64::INFINITY;
-            for (_, row) in order {
-                let residual = solve(row, readings, &mut self.trial_mm).map_err(in_frame(place, readings))?;
-                if residual < least {
-                    least = residual;
-                    coordinates.copy_from_slice(&self.trial_mm);
-                }
-                if least < EXPLAINED {
-                    break;
-                }
+            if least < EXPLAINED {
+                break;
             }
         }
         Ok(())
@@ -97,11 +92,19 @@ impl NewtonDecoder {
     }
 }
 
-impl FrameDecoder for NewtonDecoder {
-    fn decode(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
+impl Decoder for NewtonDecoder {
+    fn channels(&self) -> usize {
+        self.search.scale.columns()
+    }
+
+    fn outputs(&self) -> usize {
+        self.search.scale.coordinates_per_row()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let newton = &mut self.newton;
         self.search
-            .solve(readings_ohm, coordinates_mm, |row, readings, coordinates| {
+            .solve(row_index, readings, targets, |row, readings, coordinates| {
                 Ok(newton.solve(row, readings, coordinates)?.residual)
             })
     }
@@ -128,11 +131,19 @@ impl PosteriorDecoder {
     }
 }
 
-impl FrameDecoder for PosteriorDecoder {
-    fn decode(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
+impl Decoder for PosteriorDecoder {
+    fn channels(&self) -> usize {
+        self.search.scale.columns()
+    }
+
+    fn outputs(&self) -> usize {
+        self.search.scale.coordinates_per_row()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let posterior = &mut self.posterior;
         self.search
-            .solve(readings_ohm, coordinates_mm, |row, readings, coordinates| {
+            .solve(row_index, readings, targets, |row, readings, coordinates| {
                 Ok(posterior.solve(row, readings, coordinates)?.residual)
             })
     }
@@ -140,11 +151,11 @@ impl FrameDecoder for PosteriorDecoder {
 
 /// Another decoder's answer, improved by a few steps of Newton's method: with noise and prior where the scene has noise.
 pub struct PolishedDecoder {
-    first: Box<dyn FrameDecoder>,
+    first: Box<dyn Decoder>,
     model: SensorModel,
     posterior: Posterior,
     rows: Vec<usize>,
-    known: bool,
+    row_model: RowModel,
     steps: usize,
 }
 
@@ -152,7 +163,7 @@ impl PolishedDecoder {
     /// `steps` steps after `first`, for `rows` of `model` in `scene`, all of which `posterior` was made for. Where rows
     /// are not known, the row-wire nearest to the first answer is taken.
     pub fn new(
-        first: Box<dyn FrameDecoder>,
+        first: Box<dyn Decoder>,
         posterior: Posterior,
         model: &SensorModel,
         scene: &Scene,
@@ -164,7 +175,7 @@ impl PolishedDecoder {
             model: *model,
             posterior,
             rows: rows.to_vec(),
-            known: scene.rows.are_known(),
+            row_model: scene.rows.model(),
             steps,
         }
     }
@@ -182,30 +193,22 @@ impl PolishedDecoder {
     }
 }
 
-impl FrameDecoder for PolishedDecoder {
-    fn decode(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Result<(), DecodeError> {
-        self.first.decode(readings_ohm, coordinates_mm)?;
-        let readings = readings_ohm.chunks_exact(readings_ohm.len() / self.rows.len());
-        let coordinates = coordinates_mm.chunks_exact_mut(self.model.scale.coordinates_per_row());
-        for (place, (readings, coordinates)) in readings.zip(coordinates).enumerate() {
-            let row = if self.known {
-                self.rows[place]
-            } else {
-                self.nearest_row(coordinates)
-            };
-            self.posterior
-                .polish(row, readings, coordinates, self.steps)
-                .map_err(in_frame(place, readings))?;
-        }
-        Ok(())
+impl Decoder for PolishedDecoder {
+    fn channels(&self) -> usize {
+        self.first.channels()
     }
-}
 
-/// The place in the frame of a reading refused in its row.
-fn in_frame(place: usize, readings: &[f64]) -> impl FnOnce(NewtonError) -> DecodeError {
-    let before = place * readings.len();
-    move |NewtonError::Reading { column, value }| DecodeError {
-        index: before + column,
-        value,
+    fn outputs(&self) -> usize {
+        self.first.outputs()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        self.first.decode_row(row_index, readings, targets)?;
+        let row_wire = match self.row_model {
+            RowModel::Each => self.rows[row_index],
+            RowModel::Shared => self.nearest_row(targets),
+        };
+        self.posterior.polish(row_wire, readings, targets, self.steps)?;
+        Ok(())
     }
 }

@@ -1,66 +1,48 @@
-//! Decoupling: resistances in, coordinates of nodes out, by every way we know.
+//! Decoupling: readings in, deformation (or whatever was measured) out, by every way we know. Every way is a
+//! [`Decoder`], of single rows and of whole frames.
 //!
-//! | decoder | what it is |
+//! | decoder | how it decodes |
 //! |---|---|
 //! | [`TrainingMean`] | knows nothing: the baseline |
-//! | [`RidgeMap`] | affine, with a penalty chosen by cross-validation |
+//! | [`AffineMap`] | an affine map, by least squares or with a ridge penalty chosen by cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
 //! | [`NewtonDecoder`] | solves Eq. (2) |
-//! | [`PolishedDecoder`] | any of them, then a few of Newton's steps |
+//! | [`PolishedDecoder`] | another decoder's answer, then a few Newton steps |
 //! | [`PosteriorDecoder`] | Newton's method with noise and prior |
 //!
-//! All are [`FrameDecoder`]s. [`resistance_residual`] tells how well an answer explains the readings, without ground truth.
-//! [`Decoupler`] is the older interface of networks and baselines to rows without order.
+//! [`DecoderKind`] lists them with all that is said of each.
+//! Decoders of readings alone come as [`PerRow`](crate::dataset::PerRow): one for every row-wire, or one for each.
+//! [`resistance_residual`] tells how well an answer explains the readings, without ground truth.
 
+mod affine_map;
 mod box_posterior;
 mod compiled_network;
+mod decoder;
 mod equation_decoders;
-mod frame;
 mod gauss_newton;
-mod linear_map;
+mod kind;
+mod least_squares;
 mod newton;
 mod newton_report;
 mod posterior;
 mod radial_basis;
 mod real;
 mod residual;
-mod ridge_map;
+mod ridge;
 mod row_prior;
 mod row_problem;
 mod training_mean;
 
+pub use affine_map::AffineMap;
 pub use compiled_network::CompiledNetworks;
+pub use decoder::{DecodeError, Decoder, decode_set};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
-pub use frame::{DecodeError, FrameDecoder, RowMap, RowMaps, decode_set, fit_rows};
-pub use linear_map::LinearMap;
+pub use kind::{ColourKey, DecoderKind, DecoderKindError, Precision};
 pub use newton::Newton;
-pub use newton_report::{NewtonError, NewtonReport, NewtonRules, NewtonStop};
+pub use newton_report::{NewtonReport, NewtonRules, NewtonStop};
 pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
 pub use real::Real;
 pub use residual::resistance_residual;
-pub use ridge_map::RidgeMap;
 pub use training_mean::TrainingMean;
-
-use ndarray::{Array2, ArrayView2};
-
-use crate::network::DecouplingNetwork;
-
-/// A way from resistances to coordinates.
-pub trait Decoupler {
-    /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4).
-    fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64>;
-}
-
-impl Decoupler for DecouplingNetwork {
-    fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        Self::decouple(self, resistances_ohm)
-    }
-}
-
-impl RowMap for TrainingMean {
-    fn map(&mut self, _readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
-        coordinates_mm.copy_from_slice(self.coordinates_mm());
-    }
-}

@@ -1,6 +1,7 @@
 use super::{
+    DecodeError,
     gauss_newton::{Linearised, damped_step},
-    newton_report::{NewtonError, NewtonReport, NewtonRules, NewtonStop},
+    newton_report::{NewtonReport, NewtonRules, NewtonStop},
     row_problem::{Range, RowProblem, ranges, wide_ranges},
 };
 use crate::{scene::Scene, sensor::SensorModel};
@@ -59,7 +60,7 @@ impl Newton {
         row: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-    ) -> Result<NewtonReport, NewtonError> {
+    ) -> Result<NewtonReport, DecodeError> {
         self.read(row, readings_ohm)?;
         let start = vec![0.0; self.problem.unknowns()];
         Ok(self.run(&start, coordinates_mm))
@@ -74,15 +75,15 @@ impl Newton {
         row: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-    ) -> Result<NewtonReport, NewtonError> {
+    ) -> Result<NewtonReport, DecodeError> {
         self.read(row, readings_ohm)?;
         let mut start = vec![0.0; self.problem.unknowns()];
         self.problem.unknowns_of(coordinates_mm, &mut start);
         Ok(self.run(&start, coordinates_mm))
     }
 
-    fn read(&mut self, row: usize, readings_ohm: &[f64]) -> Result<(), NewtonError> {
-        NewtonError::check(readings_ohm)?;
+    fn read(&mut self, row: usize, readings_ohm: &[f64]) -> Result<(), DecodeError> {
+        DecodeError::check(readings_ohm)?;
         self.problem.read(row, readings_ohm);
         Ok(())
     }
@@ -233,12 +234,14 @@ mod tests {
         let mut most_steps = 0;
         for sample in 0..set.samples() {
             let mut coordinates = vec![0.0; model.scale.coordinates_per_row()];
-            let readings = set.resistances_ohm.row(sample).to_vec();
-            let report = newton.solve(sample % rows, &readings, &mut coordinates).unwrap();
+            let readings = set.sample_readings(sample);
+            let report = newton
+                .solve(set.row_wire(sample).unwrap(), readings, &mut coordinates)
+                .unwrap();
             assert_eq!(report.stop, NewtonStop::Converged, "{report:?}");
             assert!(report.residual < 1e-13);
             most_steps = most_steps.max(report.steps);
-            for (ours, truth) in coordinates.iter().zip(set.coordinates_mm.row(sample)) {
+            for (ours, truth) in coordinates.iter().zip(set.sample_targets(sample)) {
                 worst_mm = worst_mm.max((ours - truth).abs());
             }
         }
@@ -274,7 +277,7 @@ mod tests {
         let mut readings = vec![20.0; 18];
         readings[3] = f64::NAN;
         let error = newton.solve(0, &readings, &mut coordinates).unwrap_err();
-        assert!(error.to_string().contains("reading 3"), "{error}");
+        assert!(error.to_string().contains("reading 4"), "{error}");
         for ohm in [1e-300, 1e-3, 1e6, 1e300] {
             let report = newton.solve(0, &[ohm; 18], &mut coordinates).unwrap();
             assert!(!report.residual.is_nan());
@@ -288,8 +291,8 @@ mod tests {
     fn the_residual_is_the_relative_error_of_the_readings() {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 10, &mut Seed(0).rng(Stream::Test)).unwrap();
-        let coordinates = set.coordinates_mm.row(7).to_vec();
-        let readings: Vec<f64> = set.resistances_ohm.row(7).iter().map(|ohm| ohm * 1.03).collect();
+        let coordinates = set.sample_targets(7).to_vec();
+        let readings: Vec<f64> = set.sample_readings(7).iter().map(|ohm| ohm * 1.03).collect();
         assert!((resistance_residual(&model, &readings, &coordinates) - 0.03).abs() < 1e-12);
         assert_eq!(resistance_residual(&model, &readings, &[f64::NAN; 18]), f64::INFINITY);
     }

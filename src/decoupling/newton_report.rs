@@ -1,7 +1,5 @@
 use std::fmt;
 
-use thiserror::Error;
-
 /// When to end Newton's method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonRules {
@@ -54,28 +52,4 @@ pub struct NewtonReport {
     pub steps: usize,
     /// rms over readings of the relative misfit m/R − 1.
     pub residual: f64,
-}
-
-/// Readings or sizes that cannot be solved.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum NewtonError {
-    /// A reading is not a resistance.
-    #[error("reading {column} is {value} ohm: give finite numbers above 0")]
-    Reading {
-        /// Column-wire, from 0.
-        column: usize,
-        /// The reading.
-        value: f64,
-    },
-}
-
-impl NewtonError {
-    /// Refuses readings that are not above 0 and finite.
-    pub(super) fn check(readings_ohm: &[f64]) -> Result<(), Self> {
-        let bad = |&(_, value): &(usize, &f64)| !(*value > 0.0 && value.is_finite());
-        match readings_ohm.iter().enumerate().find(bad) {
-            Some((column, &value)) => Err(Self::Reading { column, value }),
-            None => Ok(()),
-        }
-    }
 }

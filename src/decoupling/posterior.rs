@@ -2,9 +2,10 @@ use faer::Mat;
 use rand::Rng;
 
 use super::{
+    DecodeError,
     box_posterior::{BoxPosterior, Marginal},
     newton::Newton,
-    newton_report::{NewtonError, NewtonReport, NewtonRules},
+    newton_report::{NewtonReport, NewtonRules},
     row_prior::RowPrior,
     row_problem::{Range, RowProblem, ranges},
 };
@@ -92,8 +93,8 @@ impl Posterior {
         row: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-    ) -> Result<PosteriorReport, NewtonError> {
-        let is_noisy = NewtonError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
+    ) -> Result<PosteriorReport, DecodeError> {
+        let is_noisy = DecodeError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
         let middle: Vec<f64> = self.ranges.iter().map(|range| range.middle()).collect();
         if is_noisy && let Some(report) = self.iterate(row, readings_ohm, middle, STEPS, coordinates_mm) {
             return Ok(report);
@@ -116,8 +117,8 @@ impl Posterior {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
         steps: usize,
-    ) -> Result<PosteriorReport, NewtonError> {
-        let is_noisy = NewtonError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
+    ) -> Result<PosteriorReport, DecodeError> {
+        let is_noisy = DecodeError::check(readings_ohm).map(|()| self.largest_noise(readings_ohm) >= SMALLEST_NOISE)?;
         if is_noisy {
             let mut first = vec![0.0; self.ranges.len()];
             self.problem.read(row, readings_ohm);
@@ -305,7 +306,7 @@ mod tests {
                 .unwrap();
             let mut posterior = Posterior::new(&model, &scene, &[0], &mut Seed(1).rng(Stream::Expectation)).unwrap();
             for sample in 0..set.samples() {
-                let readings = set.resistances_ohm.row(sample).to_vec();
+                let readings = set.sample_readings(sample).to_vec();
                 let exact = by_sampling(&model, &readings, noise, 1.0);
                 posterior.problem.read(0, &readings);
                 let mut at = vec![0.5; 2];
@@ -327,11 +328,9 @@ mod tests {
         let mut rng = Seed(1).rng(Stream::Expectation);
         let mut posterior = Posterior::new(&model, &Scene::default(), &[0, 1], &mut rng).unwrap();
         let mut coordinates = vec![0.0; 12];
-        let report = posterior
-            .solve(1, &set.resistances_ohm.row(3).to_vec(), &mut coordinates)
-            .unwrap();
+        let report = posterior.solve(1, set.sample_readings(3), &mut coordinates).unwrap();
         assert_eq!(report.spread_mm, 0.0);
-        for (ours, truth) in coordinates.iter().zip(set.coordinates_mm.row(3)) {
+        for (ours, truth) in coordinates.iter().zip(set.sample_targets(3)) {
             assert!((ours - truth).abs() < 1e-9);
         }
     }

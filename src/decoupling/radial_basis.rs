@@ -5,7 +5,7 @@ use faer::{
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use rand::{Rng, seq::index};
 
-use super::frame::RowMap;
+use super::{DecodeError, Decoder};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, Inputs, MinMax, ScalingError},
@@ -72,10 +72,10 @@ impl RadialBasisNetwork {
         settings: RadialBasisSettings,
         rng: &mut impl Rng,
     ) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit(choice, training.resistances_ohm.view(), noise)?;
-        let outputs = MinMax::fit(training.coordinates_mm.view())?;
-        let x = inputs.of(training.resistances_ohm.view());
-        let y = outputs.scale(training.coordinates_mm.view());
+        let inputs = Inputs::fit(choice, training.readings(), noise)?;
+        let outputs = MinMax::fit(training.targets())?;
+        let x = inputs.of(training.readings());
+        let y = outputs.scale(training.targets());
         let centres = match settings.centres {
             Centres::Samples => x.clone(),
             Centres::KMeans(count) => k_means(x.view(), count.clamp(1, x.nrows()), rng),
@@ -129,9 +129,18 @@ impl RadialBasisNetwork {
     }
 }
 
-impl RowMap for RadialBasisNetwork {
-    fn map(&mut self, readings_ohm: &[f64], coordinates_mm: &mut [f64]) {
-        let readings = ArrayView2::from_shape((1, readings_ohm.len()), readings_ohm).expect("one row");
+impl Decoder for RadialBasisNetwork {
+    fn channels(&self) -> usize {
+        self.inputs.channels()
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs.channels()
+    }
+
+    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        DecodeError::check_that(readings, |value| self.inputs.quantity().accepts(value))?;
+        let readings = ArrayView2::from_shape((1, readings.len()), readings).expect("one row");
         let x = self.inputs.of(readings);
         let count = self.centres.nrows();
         let mut answer = self.coefficients.row(count).to_owned();
@@ -139,10 +148,11 @@ impl RowMap for RadialBasisNetwork {
             answer.scaled_add(gaussian(x.row(0), centre, self.sharpness), &coefficients);
         }
         let restored = self.outputs.restore(answer.insert_axis(Axis(0)).view());
-        coordinates_mm
+        targets
             .iter_mut()
             .zip(&restored)
             .for_each(|(target, value)| *target = *value);
+        Ok(())
     }
 }
 
@@ -212,8 +222,10 @@ mod tests {
         assert_eq!(network.centres(), 40);
         for sample in 0..40 {
             let mut coordinates = [0.0; 12];
-            network.map(&set.resistances_ohm.row(sample).to_vec(), &mut coordinates);
-            for (ours, truth) in coordinates.iter().zip(set.coordinates_mm.row(sample)) {
+            network
+                .decode_row(0, set.sample_readings(sample), &mut coordinates)
+                .unwrap();
+            for (ours, truth) in coordinates.iter().zip(set.sample_targets(sample)) {
                 assert!((ours - truth).abs() < 1e-7, "{sample}: {ours} {truth}");
             }
         }

@@ -1,12 +1,13 @@
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, Axis};
 
-use super::Decoupler;
+use super::{DecodeError, Decoder};
 use crate::dataset::Dataset;
 
-/// Answers with the mean coordinates of the training set, whatever it reads: what knowing nothing scores.
+/// Answers with the mean targets of the training set, whatever it reads: what knowing nothing scores.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingMean {
-    coordinates_mm: Array1<f64>,
+    channels: usize,
+    targets: Array1<f64>,
 }
 
 impl TrainingMean {
@@ -15,25 +16,25 @@ impl TrainingMean {
     /// # Panics
     /// If there are no samples.
     pub fn fit(training: &Dataset) -> Self {
-        let coordinates_mm = training
-            .coordinates_mm
-            .mean_axis(Axis(0))
-            .expect("a training set has samples");
-        Self { coordinates_mm }
-    }
-
-    /// The mean, 3·M2.
-    pub(super) fn coordinates_mm(&self) -> &[f64] {
-        self.coordinates_mm.as_slice().expect("a mean is contiguous")
+        let targets = training.targets().mean_axis(Axis(0));
+        Self {
+            channels: training.channels(),
+            targets: targets.expect("a training set has samples"),
+        }
     }
 }
 
-impl Decoupler for TrainingMean {
-    fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        let shape = (resistances_ohm.nrows(), self.coordinates_mm.len());
-        self.coordinates_mm
-            .broadcast(shape)
-            .expect("a row broadcasts to many")
-            .to_owned()
+impl Decoder for TrainingMean {
+    fn channels(&self) -> usize {
+        self.channels
+    }
+
+    fn outputs(&self) -> usize {
+        self.targets.len()
+    }
+
+    fn decode_row(&mut self, _row_index: usize, _readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        targets.copy_from_slice(self.targets.as_slice().expect("a mean is contiguous"));
+        Ok(())
     }
 }

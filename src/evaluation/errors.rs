@@ -31,9 +31,9 @@ pub struct Errors {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeAddress {
-    /// Snapshot of the set.
+    /// The group of its sample: of a simulated set the number of the snapshot.
     pub snapshot: usize,
-    /// Row-wire.
+    /// Row-wire of the array.
     pub row: usize,
     /// Node on the row-wire.
     pub node: usize,
@@ -45,12 +45,12 @@ impl Errors {
     /// # Panics
     /// If the shapes differ.
     pub fn measure(truth: &Dataset, decoupled_mm: &Array2<f64>, stroke_mm: f64) -> Self {
-        assert_eq!(truth.coordinates_mm.dim(), decoupled_mm.dim());
+        assert_eq!(truth.targets().dim(), decoupled_mm.dim());
         let mut relative = [0.0; 3];
         let mut total_z_mm = 0.0;
         let mut worst_mm = 0.0;
         let mut worst_node = NodeAddress::default();
-        let pairs = decoupled_mm.indexed_iter().zip(&truth.coordinates_mm);
+        let pairs = decoupled_mm.indexed_iter().zip(truth.targets());
         for (((sample, channel), decoupled), true_value) in pairs {
             let error_mm = (decoupled - true_value).abs();
             let (node, axis) = (channel / 3, channel % 3);
@@ -60,8 +60,8 @@ impl Errors {
                 if error_mm > worst_mm {
                     worst_mm = error_mm;
                     worst_node = NodeAddress {
-                        snapshot: sample / truth.rows(),
-                        row: sample % truth.rows(),
+                        snapshot: truth.groups()[sample],
+                        row: truth.row_wire(sample).unwrap_or(0),
                         node,
                     };
                 }
@@ -98,12 +98,12 @@ mod tests {
     #[test]
     fn one_wrong_node_counts_as_the_definitions_say() {
         let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
-        let mut decoupled = truth.coordinates_mm.clone();
+        let mut decoupled = truth.targets().to_owned();
         decoupled[[13, 2 * 3 + 2]] += 0.3;
         decoupled[[4, 0]] -= 0.6;
         let errors = Errors::measure(&truth, &decoupled, 1.0);
         let nodes = 20.0 * 6.0;
-        let z = truth.coordinates_mm[[13, 8]];
+        let z = truth.targets()[[13, 8]];
         assert!((errors.z_percent.unwrap() - 100.0 * 0.3 / z / nodes).abs() < 1e-12);
         assert!((errors.x_percent.unwrap() - 100.0 * 0.6 / 12.0 / nodes).abs() < 1e-12);
         assert_eq!(errors.y_percent, Some(0.0));
@@ -125,7 +125,7 @@ mod tests {
         let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
         model.geometry.row_x0_mm = 0.0;
         let truth = truth(&model);
-        let errors = Errors::measure(&truth, &truth.coordinates_mm.mapv(|value| value + 0.1), 1.0);
+        let errors = Errors::measure(&truth, &truth.targets().mapv(|value| value + 0.1), 1.0);
         assert_eq!(errors.x_percent, None);
         assert!(errors.z_percent.is_some());
     }

@@ -1,46 +1,44 @@
 use std::time::{Duration, Instant};
 
-use ndarray::Axis;
-
 use super::Run;
 use crate::{
     dataset::Dataset,
-    decoupling::{CompiledNetworks, DecodeError, FrameDecoder, Real},
-    network::Networks,
+    decoupling::{CompiledNetworks, DecodeError, Decoder},
 };
 
 /// Time to decode a frame of the test set by the best network so far, in double precision on one thread. `None` if the
-/// test set has readings that are no resistances.
+/// test set has readings that cannot be decoded.
 pub fn network_frame_time(run: &Run) -> Option<Duration> {
-    let mut decoder = compiled::<f64>(&run.network(), run.test().rows());
-    let microseconds = frame_us(&mut *decoder, run.test()).ok()?;
+    let mut decoder = CompiledNetworks::<f64>::new(&run.network(), run.test().row_count());
+    let microseconds = frame_us(&mut decoder, run.test()).ok()?;
     Some(Duration::from_secs_f64(1e-6 * microseconds))
 }
 
-/// Networks of `rows` row-wires, ready to decode.
-pub(super) fn compiled<T: Real + 'static>(networks: &Networks, rows: usize) -> Box<dyn FrameDecoder> {
-    Box::new(match networks.each() {
-        [only] => CompiledNetworks::<T>::shared(only, rows),
-        each => CompiledNetworks::<T>::each(each),
-    })
-}
-
-/// Microseconds to decode a frame of `test`: the median over blocks of frames, each long enough for the clock.
-pub(super) fn frame_us(decoder: &mut dyn FrameDecoder, test: &Dataset) -> Result<f64, DecodeError> {
+/// Microseconds to decode a frame of `test`, or a sample where `test` is not of whole frames: the median over blocks of
+/// frames, each long enough for the clock.
+pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {
     const FEWEST_BLOCKS: usize = 3;
     const MOST_BLOCKS: usize = 101;
     const BLOCK_SECONDS: f64 = 100e-6;
     const MOST_SECONDS: f64 = 0.03;
-    let frames: Vec<_> = test.resistances_ohm.axis_chunks_iter(Axis(0), test.rows()).collect();
-    let mut answer_mm = vec![0.0; test.rows() * test.coordinates_mm.ncols()];
+    let frames = test.frames().ok();
+    let mut answer = vec![0.0; test.row_count() * test.outputs()];
     let mut at = 0;
-    let mut decode = |frames_in_block: usize| -> Result<f64, DecodeError> {
+    let mut decode = |count: usize| -> Result<f64, DecodeError> {
         let begun = Instant::now();
-        for _ in 0..frames_in_block {
-            let frame = frames[at % frames.len()];
-            let readings = frame.to_slice().expect("rows of a standard array are contiguous");
-            decoder.decode(std::hint::black_box(readings), &mut answer_mm)?;
-            std::hint::black_box(&answer_mm);
+        for _ in 0..count {
+            match &frames {
+                Some(frames) => {
+                    let readings = std::hint::black_box(frames.frame(at % frames.count()));
+                    decoder.decode(readings, &mut answer)?;
+                }
+                None => {
+                    let sample = at % test.samples();
+                    let readings = std::hint::black_box(test.sample_readings(sample));
+                    decoder.decode_row(test.row_index(sample), readings, &mut answer[..test.outputs()])?;
+                }
+            }
+            std::hint::black_box(&answer);
             at += 1;
         }
         Ok(begun.elapsed().as_secs_f64())

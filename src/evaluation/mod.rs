@@ -1,6 +1,8 @@
 //! What a decoupler is worth: axis errors as the paper defines them and beyond, the published figures, and a whole
 //! run from settings to report.
 
+mod baselines;
+mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
@@ -12,16 +14,22 @@ mod published;
 mod reference;
 mod run;
 mod run_error;
+mod sets;
 mod settings;
+mod simulated_sets;
+mod source;
 mod spread;
 mod start_trainer;
 mod starts;
 mod table;
+mod target_errors;
 mod task;
 mod trade;
 mod trade_level;
 
-pub use decoder_set::{DecoderKind, DecoderKindError, DecoderReport, DecoderSet, Precision};
+pub use baselines::Baselines;
+pub use cross_validation::{CrossValidated, CrossValidation, Effort};
+pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet, TargetReport};
 pub use errors::{Errors, NodeAddress};
 pub use frame_time::network_frame_time;
 pub use node_spread::node_rms_mm;
@@ -29,12 +37,14 @@ pub use outlook::{Outlook, OutlookError};
 pub use preset::{Preset, PresetError};
 pub use published::{PublishedErrors, published_errors};
 pub use reference::reference_errors;
-pub use run::{Baselines, Run};
+pub use run::{NodeScores, Run};
 pub use run_error::RunError;
-pub use settings::{CountError, MOST_STARTS, ModelSize, RunSettings};
+pub use settings::{CountError, MOST_STARTS, RunSettings, SimulatedSettings};
+pub use source::{Measured, ModelSize, Simulation, Source};
 pub use spread::Spread;
 pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
+pub use target_errors::{TargetErrors, TargetRow};
 pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under, pareto_front};
 pub use trade_level::{TradeCost, TradeLevel};

@@ -1,4 +1,4 @@
-use super::RunSettings;
+use super::Simulation;
 use crate::{
     scene::Rows,
     sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
@@ -14,15 +14,15 @@ pub struct Outlook {
 }
 
 impl Outlook {
-    /// Looks at every row-wire that the scene of `settings` reads.
+    /// Looks at every row-wire that the simulated scene reads.
     ///
     /// # Errors
     /// An impossible sensor or scene, or singular values that do not converge.
-    pub fn of(settings: &RunSettings) -> Result<Self, OutlookError> {
-        let RunSettings { sensor, scene, .. } = settings;
+    pub fn of(simulation: &Simulation) -> Result<Self, OutlookError> {
+        let Simulation { sensor, scene, .. } = simulation;
         sensor.check().map_err(IdentifiabilityError::from)?;
         scene.check()?;
-        let stroke_mm = settings.stroke_mm();
+        let stroke_mm = simulation.stroke_mm();
         let half_way = vec![glam::DVec3::new(0.0, 0.0, 0.5 * stroke_mm); sensor.scale.nodes_per_row()];
         let mut worst: Option<Identifiability> = None;
         for row in scene.rows.read(sensor.scale.rows())? {

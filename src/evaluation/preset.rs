@@ -2,7 +2,7 @@ use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
-use super::RunSettings;
+use super::{SimulatedSettings, Simulation};
 use crate::{
     network::InputChoice,
     scene::{Noise, Rows, Scene},
@@ -29,15 +29,15 @@ impl Preset {
     pub const ALL: [Self; 2] = [Self::Paper, Self::Best];
 
     /// The settings it stands for, without noise.
-    pub fn settings(self) -> RunSettings {
+    pub fn settings(self) -> SimulatedSettings {
         self.settings_in(Noise::default())
     }
 
     /// The settings it stands for where readings bear `noise`: then a network is as good as its samples are many, and
     /// it has learnt what it can after few epochs.
-    pub fn settings_in(self, noise: Noise) -> RunSettings {
-        let mut paper = RunSettings::default();
-        paper.scene.noise = noise;
+    pub fn settings_in(self, noise: Noise) -> SimulatedSettings {
+        let mut paper = SimulatedSettings::default();
+        paper.source.scene.noise = noise;
         let (samples, validation_samples, epochs) = if noise.is_none() {
             (5000, 1000, 1000)
         } else {
@@ -45,14 +45,17 @@ impl Preset {
         };
         match self {
             Self::Paper => paper,
-            Self::Best => RunSettings {
-                scene: Scene {
-                    rows: Rows::Known,
-                    ..paper.scene
+            Self::Best => SimulatedSettings {
+                source: Simulation {
+                    scene: Scene {
+                        rows: Rows::Known,
+                        ..paper.source.scene
+                    },
+                    samples,
+                    validation_samples,
+                    ..paper.source
                 },
                 inputs: InputChoice::BEST,
-                samples,
-                validation_samples,
                 training: TrainingSettings {
                     stopping: StoppingRules {
                         epochs,

@@ -26,25 +26,22 @@ use crate::{
 /// A sensor without resistances at rest.
 ///
 /// # Panics
-/// If `test` is not of the rows that the scene reads.
+/// If a sample of `test` is not of a row-wire that the scene reads, or knows none.
 pub fn reference_errors(
     model: &SensorModel,
     scene: &Scene,
-    rows: &[usize],
     test: &Dataset,
     rng: &mut impl Rng,
 ) -> Result<Errors, SensorError> {
-    assert_eq!(test.rows(), rows.len());
+    let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
     let mut posterior = Posterior::new(model, scene, rows, rng)?;
-    let mut limit_mm = Array2::zeros(test.coordinates_mm.dim());
+    let mut limit_mm = Array2::zeros(test.targets().dim());
     for (sample, mut answer) in limit_mm.rows_mut().into_iter().enumerate() {
-        let (readings, truth) = (test.resistances_ohm.row(sample), test.coordinates_mm.row(sample));
-        let contiguous = "a row of a standard array is contiguous";
         posterior.limit(
-            rows[sample % rows.len()],
-            readings.as_slice().expect(contiguous),
-            truth.as_slice().expect(contiguous),
-            answer.as_slice_mut().expect(contiguous),
+            rows[test.row_index(sample)],
+            test.sample_readings(sample),
+            test.sample_targets(sample),
+            answer.as_slice_mut().expect("a row of a standard array is contiguous"),
         );
     }
     Ok(Errors::measure(test, &limit_mm, scene.stroke_mm(&model.geometry)))
@@ -69,7 +66,7 @@ mod tests {
         test.disturb(model, &scene.noise, &mut Seed(2).rng(Stream::TestNoise))
             .unwrap();
         let mut rng = Seed(2).rng(Stream::Expectation);
-        reference_errors(model, &scene, &rows, &test, &mut rng).unwrap().z_mm
+        reference_errors(model, &scene, &test, &mut rng).unwrap().z_mm
     }
 
     /// One node: the posterior is normal with deviation ε/s while that is small against the stroke, and readings tell

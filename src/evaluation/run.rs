@@ -2,17 +2,23 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::{Errors, RunError, RunSettings, StartRecord, StartTrainer, reference_errors, starts::lowest, task::Task};
+use super::{
+    Baselines, Errors, RunError, RunSettings, SimulatedSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
+    baselines::fit_baselines,
+    reference_errors,
+    sets::check_sets,
+    starts::lowest,
+    task::{Task, tasks},
+};
 use crate::{
-    dataset::{Dataset, Split, Stream, hold_out},
-    decoupling::{Decoupler, LinearMap, TrainingMean},
+    dataset::{Dataset, PerRow, Split, Stream},
+    decoupling::decode_set,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, Shape, nguyen_widrow},
-    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError},
+    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState},
 };
 
-/// A run: the sets drawn, one training for each start, and what the best network is worth.
+/// A run: sets of samples, one training for each start, and what the best network is worth.
 ///
 /// The starts share sets and scaling and differ in their first weights only. The *leader* is the start whose best
 /// network has the lowest validation error so far (training error where nothing is held out); the test set never
@@ -20,23 +26,21 @@ use crate::{
 pub struct Run {
     settings: RunSettings,
     test: Arc<Dataset>,
-    /// Of each row-wire that has a network of its own, or of all.
-    scalings: Vec<(Inputs, MinMax)>,
+    scalings: PerRow<(Inputs, MinMax)>,
     starts: Vec<StartTrainer>,
-    baselines: Baselines,
+    /// Errors of the training mean and of the linear map, target by target.
+    target_baselines: [TargetRow; 2],
+    /// The same on nodes, with the reference, where the targets are nodes.
+    baselines: Option<Baselines>,
 }
 
-/// What stands beside a network in every table.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Baselines {
-    /// Always answering the mean of the training set.
-    pub mean: Errors,
-    /// The best affine map on resistance.
-    pub linear: Errors,
-    /// The Bayesian reference, below which no decoder comes: [`reference_errors`]. Absent from older files.
-    #[serde(default)]
-    pub reference: Option<Errors>,
+/// What networks and baselines are worth on the nodes of a test set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeScores {
+    /// Of the leader's best networks.
+    pub network: Errors,
+    /// What stands beside them.
+    pub baselines: Baselines,
 }
 
 /// The most memory that the equations of all starts may take.
@@ -47,15 +51,15 @@ impl Run {
     ///
     /// # Errors
     /// Settings that are impossible, with the reason.
-    pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
-        let (split, test) = Self::draw(&settings)?;
-        Self::on_sets(settings, split, test)
+    pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
+        let (split, test) = settings.draw()?;
+        Self::on_sets(settings.into(), split, test)
     }
 
-    /// As [`Self::prepare`], on sets that come from elsewhere, such as the folds of a cross-validation.
+    /// As [`Self::prepare`], on sets that come from elsewhere: measured ones, or the folds of a cross-validation.
     ///
     /// # Errors
-    /// Settings that are impossible, with the reason.
+    /// Settings that are impossible or sets that do not belong together, with the reason.
     pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
         Self::with_sets(settings, split, test, |tasks| {
             let starts = (0..settings.starts).into_par_iter().map(|number| {
@@ -77,17 +81,26 @@ impl Run {
     ///
     /// # Errors
     /// Settings that are impossible, or states that are damaged or not theirs.
-    pub fn resume(settings: RunSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
+    pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
         settings.check_counts()?;
-        let networks = settings.model_size()?.networks;
-        if states.len() != settings.starts * networks {
-            return Err(RunError::Starts {
-                found: states.len(),
-                expected: settings.starts * networks,
-            });
-        }
-        let (split, test) = Self::draw(&settings)?;
+        check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
+        let (split, test) = settings.draw()?;
+        Self::resume_on_sets(settings.into(), states, split, test)
+    }
+
+    /// As [`Self::resume`], on the sets that the run was begun on.
+    ///
+    /// # Errors
+    /// As [`Self::on_sets`], or states that are damaged or not of these settings and sets.
+    pub fn resume_on_sets(
+        settings: RunSettings,
+        states: Vec<TrainerState>,
+        split: Split,
+        test: Dataset,
+    ) -> Result<Self, RunError> {
         Self::with_sets(settings, split, test, |tasks| {
+            let networks = tasks.len();
+            check_states(&states, settings.starts * networks)?;
             let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
                 let (start, task) = (number / networks, &tasks[number % networks]);
                 let refused = |source| RunError::Resume { start, source };
@@ -103,89 +116,45 @@ impl Run {
         })
     }
 
-    /// The training and validation set of these settings, and their test set.
-    ///
-    /// # Errors
-    /// Settings that are impossible, with the reason.
-    pub fn draw(settings: &RunSettings) -> Result<(Split, Dataset), RunError> {
-        settings.check_counts()?;
-        settings.training.check().map_err(TrainingError::from)?;
-        let test = Self::test_set(settings)?;
-        let rows = settings.model_size()?.rows;
-        let held_out = settings.validation_samples.div_ceil(rows);
-        let drawn = Self::training_set(settings, (settings.samples.div_ceil(rows) + held_out) * rows)?;
-        Ok((hold_out(drawn, held_out, &mut settings.seed.rng(Stream::Split)), test))
-    }
-
-    /// As many samples as are asked for, drawn and disturbed as those that a network is trained on.
-    ///
-    /// # Errors
-    /// An impossible sensor, scene, or number of samples.
-    pub fn training_set(settings: &RunSettings, samples: usize) -> Result<Dataset, RunError> {
-        let RunSettings {
-            sensor, scene, seed, ..
-        } = settings;
-        sensor.check()?;
-        scene.check()?;
-        let mut set = Dataset::simulate(sensor, scene, samples, &mut seed.rng(Stream::Training))?;
-        set.disturb(sensor, &scene.noise.in_training(), &mut seed.rng(Stream::TrainingNoise))?;
-        Ok(set)
-    }
-
-    /// The test set of these settings: what the window shows before anything is trained.
-    ///
-    /// # Errors
-    /// An impossible sensor, scene, or number of samples.
-    pub fn test_set(settings: &RunSettings) -> Result<Dataset, RunError> {
-        let RunSettings {
-            sensor, scene, seed, ..
-        } = settings;
-        sensor.check()?;
-        scene.check()?;
-        let mut set = Dataset::simulate(sensor, scene, settings.test_samples, &mut seed.rng(Stream::Test))?;
-        set.disturb(sensor, &scene.noise.in_test(), &mut seed.rng(Stream::TestNoise))?;
-        Ok(set)
-    }
-
     fn with_sets(
         settings: RunSettings,
         split: Split,
         test: Dataset,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Self, RunError> {
-        settings.check_counts()?;
-        let networks = settings.model_size()?.networks;
-        let Split { training, validation } = split;
-        let stroke_mm = settings.stroke_mm();
-        let score = |decoupler: &dyn Decoupler| {
-            Errors::measure(&test, &decoupler.decouple(test.resistances_ohm.view()), stroke_mm)
+        settings.check_network()?;
+        check_sets(&settings, &split, &test)?;
+        let (mut mean, mut linear) = fit_baselines(&split.training, &settings)?;
+        let (mean, linear) = (decode_set(&mut mean, &test)?, decode_set(&mut linear, &test)?);
+        let baselines = match settings.simulated() {
+            Some(simulated) => {
+                let errors = |answers| Errors::measure(&test, answers, simulated.source.stroke_mm());
+                Some(Baselines {
+                    mean: errors(&mean),
+                    linear: errors(&linear),
+                    reference: Some(reference(&simulated, &test)?),
+                })
+            }
+            None => None,
         };
-        let baselines = Baselines {
-            mean: score(&TrainingMean::fit(&training)),
-            linear: score(&LinearMap::fit(&training)?),
-            reference: Some(reference(&settings, &test)?),
-        };
-        let tasks: Vec<Task> = if networks == 1 {
-            vec![Task::new(&settings, &training, validation.as_ref(), &test)?]
-        } else {
-            let of_row = |row| {
-                let validation = validation.as_ref().map(|set| set.of_row(row));
-                Task::new(&settings, &training.of_row(row), validation.as_ref(), &test.of_row(row))
-            };
-            (0..networks).map(of_row).collect::<Result<_, _>>()?
-        };
+        let target_baselines = [("training mean", &mean), ("linear map", &linear)].map(|(name, answers)| TargetRow {
+            name,
+            targets: TargetErrors::measure(test.targets(), answers.view()),
+        });
+        let tasks = tasks(&settings, &split, &test)?;
         // They are in the tasks, scaled: large sets need not be held twice.
-        drop((training, validation));
-        let first = &tasks[0];
+        drop(split);
+        let first = tasks.at(0);
         let samples = first.problem.training.samples();
-        let trainings = settings.starts * networks;
+        let trainings = settings.starts * tasks.values().len();
         check_memory(&settings.training.method, first.shape, samples, trainings)?;
-        let starts = begin(&tasks)?;
+        let starts = begin(tasks.values())?;
         Ok(Self {
             settings,
             test: Arc::new(test),
-            scalings: tasks.into_iter().map(|task| task.scaling).collect(),
+            scalings: tasks.map(|task| task.scaling.clone()),
             starts,
+            target_baselines,
             baselines,
         })
     }
@@ -233,7 +202,7 @@ impl Run {
     pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
         let rows = self.leader().rows();
         let trainings = rows.len() * self.starts.len();
-        let samples = self.settings.samples.div_ceil(rows.len());
+        let samples = rows[0].samples();
         check_memory(&method, rows[0].present().shape(), samples, trainings)?;
         // The starts have the same shapes, so the first is refused or none.
         for start in &mut self.starts {
@@ -277,7 +246,9 @@ impl Run {
             StartRecord {
                 train_mse: best.training_mse,
                 validation_mse: best.validation_mse,
-                z_percent: self.test_errors(&self.network_of(trainer)).1.z_percent,
+                z_percent: self
+                    .errors_of(&self.network_of(trainer).decouple(&self.test))
+                    .and_then(|errors| errors.z_percent),
                 epochs: trainer.latest().epoch,
                 best_epoch: trainer.best_epoch(),
                 stop_reason: trainer.stop_reason(),
@@ -296,49 +267,70 @@ impl Run {
         &self.test
     }
 
-    /// The baselines on the test set.
-    pub fn baselines(&self) -> &Baselines {
-        &self.baselines
-    }
-
-    /// The leader's best networks so far, ready to read resistances.
+    /// The leader's best networks so far, ready to decode readings.
     pub fn network(&self) -> Networks {
         self.network_of(self.leader())
     }
 
     fn network_of(&self, start: &StartTrainer) -> Networks {
-        let rows = self.scalings.iter().zip(start.best());
+        let rows = self.scalings.values().iter().zip(start.best());
         let network = |((inputs, outputs), mlp): (&(Inputs, MinMax), &Mlp)| {
             DecouplingNetwork::new(inputs.clone(), mlp.clone(), outputs.clone())
         };
-        Networks::new(rows.map(network).collect())
+        Networks::each(rows.map(network).collect())
     }
 
-    /// What [`Self::network`] makes of the test set: coordinates in millimetres (samples × 3·M2) and their errors.
-    pub fn decouple_test(&self) -> (Array2<f64>, Errors) {
-        self.test_errors(&self.network())
+    /// What [`Self::network`] makes of the test set: samples × outputs, in the units of the targets.
+    pub fn decouple_test(&self) -> Array2<f64> {
+        self.network().decouple(&self.test)
     }
 
-    fn test_errors(&self, network: &Networks) -> (Array2<f64>, Errors) {
-        let decoupled_mm = network.decouple(self.test.resistances_ohm.view());
-        let errors = Errors::measure(&self.test, &decoupled_mm, self.settings.stroke_mm());
-        (decoupled_mm, errors)
+    /// The errors of answers to the test set (samples × 3·M2, mm) on its nodes; `None` for a measured run.
+    pub fn errors_of(&self, answers: &Array2<f64>) -> Option<Errors> {
+        let simulation = self.settings.source.simulation()?;
+        Some(Errors::measure(&self.test, answers, simulation.stroke_mm()))
+    }
+
+    /// What [`Self::network`] and the baselines are worth on the nodes of the test set; `None` for a measured run, whose
+    /// targets are judged by [`Self::target_table`].
+    pub fn node_scores(&self) -> Option<NodeScores> {
+        Some(NodeScores {
+            network: self.errors_of(&self.decouple_test())?,
+            baselines: self.baselines?,
+        })
+    }
+
+    /// The baselines on the nodes of the test set; `None` for a measured run.
+    pub fn baselines(&self) -> Option<&Baselines> {
+        self.baselines.as_ref()
+    }
+
+    /// The errors of the baselines and of [`Self::network`] on each target of the test set, whatever it means.
+    pub fn target_table(&self) -> Vec<TargetRow> {
+        let mut rows = self.target_baselines.to_vec();
+        rows.push(TargetRow {
+            name: "network",
+            targets: TargetErrors::measure(self.test.targets(), self.decouple_test().view()),
+        });
+        rows
+    }
+}
+
+/// Refuses another number of saved trainings than is needed.
+fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError> {
+    let found = states.len();
+    if found == expected {
+        Ok(())
+    } else {
+        Err(RunError::Starts { found, expected })
     }
 }
 
 /// The errors of the Bayesian reference on `test`.
-pub(super) fn reference(settings: &RunSettings, test: &Dataset) -> Result<Errors, RunError> {
-    let RunSettings {
-        sensor, scene, seed, ..
-    } = settings;
-    let rows = scene.rows.read(sensor.scale.rows())?;
-    Ok(reference_errors(
-        sensor,
-        scene,
-        &rows,
-        test,
-        &mut seed.rng(Stream::Expectation),
-    )?)
+pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Errors, RunError> {
+    let SimulatedSettings { source, seed, .. } = settings;
+    let mut rng = seed.rng(Stream::Expectation);
+    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
 }
 
 /// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.

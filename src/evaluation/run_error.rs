@@ -2,7 +2,7 @@ use thiserror::Error;
 
 use super::CountError;
 use crate::{
-    dataset::{DatasetError, FoldsError},
+    dataset::{FoldsError, SimulationError},
     decoupling::DecodeError,
     network::ScalingError,
     scene::SceneError,
@@ -24,7 +24,7 @@ pub enum RunError {
     Scene(#[from] SceneError),
     /// Samples that cannot be drawn.
     #[error(transparent)]
-    Dataset(#[from] DatasetError),
+    Simulation(#[from] SimulationError),
     /// Folds that cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
@@ -34,6 +34,29 @@ pub enum RunError {
     /// A reading that is no resistance.
     #[error(transparent)]
     Decode(#[from] DecodeError),
+    /// Sets that do not belong together.
+    #[error("the {set} set has {found}, the training set {expected}: give sets of one sensor")]
+    Sets {
+        /// Validation or test.
+        set: &'static str,
+        /// Its channels, targets or row-wires.
+        found: String,
+        /// Those of the training set.
+        expected: String,
+    },
+    /// A row-wire is to have a network of its own, and there is nothing to fit it to.
+    #[error("row {} has no {set} samples: give some of every row, or train one network for all rows", .row_wire + 1)]
+    RowWithoutSamples {
+        /// The row-wire, from 0.
+        row_wire: usize,
+        /// Training, validation or test.
+        set: &'static str,
+    },
+    /// A simulated run on samples that do not know their row-wire.
+    #[error(
+        "samples of a simulated sensor must know their row-wire: build the set with row-wires, or call it measured"
+    )]
+    NoRowWires,
     /// A training that cannot begin.
     #[error(transparent)]
     Training(#[from] TrainingError),

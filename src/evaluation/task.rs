@@ -1,12 +1,12 @@
-use super::{RunError, RunSettings};
+use super::{RunError, RunSettings, Source};
 use crate::{
-    dataset::Dataset,
+    dataset::{Dataset, PerRow, Split},
     network::{Inputs, MinMax, Shape},
-    scene::NoisySets,
+    scene::{NoisySets, RowModel},
     training::{Examples, Problem},
 };
 
-/// What a network of the run is to learn: of one row-wire, or of all.
+/// A network's task: what it is to learn, of one row-wire or of all.
 pub(super) struct Task {
     pub(super) problem: Problem,
     pub(super) shape: Shape,
@@ -21,11 +21,11 @@ impl Task {
         validation: Option<&Dataset>,
         test: &Dataset,
     ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(settings.inputs, training.resistances_ohm.view(), unseen_noise(settings))?;
-        let outputs = MinMax::fit(training.coordinates_mm.view())?;
+        let inputs = Inputs::fit(settings.inputs, training.readings(), unseen_noise(&settings.source))?;
+        let outputs = MinMax::fit(training.targets())?;
         let examples = |set: &Dataset| {
-            let scaled = inputs.of(set.resistances_ohm.view());
-            Examples::new(scaled.view(), outputs.scale(set.coordinates_mm.view()).view())
+            let scaled = inputs.of(set.readings());
+            Examples::new(scaled.view(), outputs.scale(set.targets()).view())
         };
         let problem = Problem {
             training: examples(training),
@@ -45,9 +45,33 @@ impl Task {
     }
 }
 
+/// The tasks of a run: one, or one for each row-wire.
+pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<PerRow<Task>, RunError> {
+    let Split { training, validation } = split;
+    match settings.source.row_model() {
+        RowModel::Shared => Ok(PerRow::shared(Task::new(
+            settings,
+            training,
+            validation.as_ref(),
+            test,
+        )?)),
+        RowModel::Each => {
+            let of_row = |row| {
+                let validation = validation.as_ref().map(|set| set.of_row(row));
+                Task::new(settings, &training.of_row(row), validation.as_ref(), &test.of_row(row))
+            };
+            let tasks = (0..training.row_count()).map(of_row);
+            Ok(PerRow::each(tasks.collect::<Result<_, _>>()?))
+        }
+    }
+}
+
 /// The relative noise that readings have and the training set lacks, with which whitening reckons.
-pub(super) fn unseen_noise(settings: &RunSettings) -> f64 {
-    let noise = settings.scene.noise;
+pub(super) fn unseen_noise(source: &Source) -> f64 {
+    let Source::Simulated(simulation) = source else {
+        return 0.0;
+    };
+    let noise = simulation.scene.noise;
     if noise.sets == NoisySets::Test {
         noise.relative
     } else {

@@ -1,6 +1,5 @@
-use super::{
-    DecoderKind, DecoderReport, DecoderSet, Errors, Precision, Preset, Run, RunError, RunSettings, run::reference,
-};
+use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, run::reference};
+use crate::decoupling::{DecoderKind, Precision};
 
 /// One choice, with what it costs and gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -8,7 +7,7 @@ pub struct TradePoint {
     /// Where its settings began.
     pub preset: Preset,
     /// What was run; its hidden nodes count only where the decoder has a network.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// The decoder, its errors, and its time for a frame.
     pub report: DecoderReport,
     /// Time of training or fitting in seconds, of all rows together, as if one after another.
@@ -36,7 +35,7 @@ impl TradePoint {
 
     /// Its decoding time in microseconds and its error.
     pub fn decoding(&self) -> (f64, f64) {
-        (self.report.frame_us, self.z_percent())
+        (self.report.cost.frame_us, self.z_percent())
     }
 
     /// Its training time in seconds and its error.
@@ -53,14 +52,14 @@ impl TradePoint {
 /// Settings that are impossible, with the reason.
 pub fn measure_trade(
     preset: Preset,
-    settings: &RunSettings,
+    settings: &SimulatedSettings,
     hidden: &[usize],
     decoders: &[DecoderKind],
     is_cancelled: impl Fn() -> bool,
     mut on_point: impl FnMut(TradePoint),
 ) -> Result<bool, RunError> {
     let mut set = DecoderSet::new(settings, None)?;
-    let test = Run::test_set(settings)?;
+    let test = settings.draw_test()?;
     let reference = reference(settings, &test)?;
     let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) =
         decoders.iter().partition(|kind| kind.needs_network());
@@ -74,7 +73,7 @@ pub fn measure_trade(
             preset,
             settings: *settings,
             report,
-            training_seconds: report.fit_seconds,
+            training_seconds: report.cost.fit_seconds,
             reference,
         });
     }
@@ -82,7 +81,7 @@ pub fn measure_trade(
         return Ok(true);
     }
     for &hidden in hidden {
-        let settings = RunSettings { hidden, ..*settings };
+        let settings = SimulatedSettings { hidden, ..*settings };
         let mut run = Run::prepare(settings)?;
         while run.step().is_none() {
             if is_cancelled() {
@@ -91,8 +90,7 @@ pub fn measure_trade(
         }
         set.set_networks(Some(run.network()));
         for &kind in &with_network {
-            let single = (kind == DecoderKind::Network).then_some(Precision::Single);
-            for precision in std::iter::once(Precision::Double).chain(single) {
+            for &precision in kind.precisions() {
                 let report = set.measure(kind, precision, &test)?.expect("it has its network");
                 on_point(TradePoint {
                     preset,
@@ -124,7 +122,7 @@ pub fn fastest_under(points: &[TradePoint], percent: f64) -> Option<&TradePoint>
 
 /// The point of least error that decodes a frame within `microseconds`.
 pub fn most_accurate_under(points: &[TradePoint], microseconds: f64) -> Option<&TradePoint> {
-    let quick = points.iter().filter(|point| point.report.frame_us <= microseconds);
+    let quick = points.iter().filter(|point| point.report.cost.frame_us <= microseconds);
     quick.min_by(|a, b| a.z_percent().total_cmp(&b.z_percent()))
 }
 

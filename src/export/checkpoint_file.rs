@@ -14,7 +14,7 @@ use super::{
     soundness::settings_flaw,
 };
 use crate::{
-    evaluation::{Run, RunError, RunSettings},
+    evaluation::{Run, RunError, SimulatedSettings},
     training::TrainerState,
 };
 
@@ -34,7 +34,7 @@ pub struct CheckpointFile {
     /// Program and version that wrote it.
     pub program: String,
     /// What was asked for, with the method and the stopping rules of that epoch.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// Each start; where rows are known, each with its rows one after another.
     pub starts: Vec<TrainerState>,
 }
@@ -86,6 +86,9 @@ pub enum CheckpointFileError {
         /// What is wrong.
         flaw: String,
     },
+    /// A run on measured samples, which cannot be drawn again.
+    #[error("a training on measured samples has no checkpoint file; keep its states and resume it on the same sets")]
+    Measured,
     /// A run that could not be read back.
     #[error("'{}' is not saved: the training has numbers that no file can hold ({flaw})", .path.display())]
     Unsound {
@@ -114,18 +117,21 @@ struct Document<'a> {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RunDocument {
-    settings: RunSettings,
+    settings: SimulatedSettings,
     starts: Vec<TrainerState>,
 }
 
 impl CheckpointFile {
     /// `run` as it stands.
-    pub fn from_run(run: &Run) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// [`CheckpointFileError::Measured`] if the samples were measured.
+    pub fn from_run(run: &Run) -> Result<Self, CheckpointFileError> {
+        Ok(Self {
             program: PROGRAM.to_owned(),
-            settings: *run.settings(),
+            settings: run.settings().simulated().ok_or(CheckpointFileError::Measured)?,
             starts: run.states(),
-        }
+        })
     }
 
     /// The run, to go on from this epoch: draws its samples and takes up every start.

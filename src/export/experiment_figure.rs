@@ -107,7 +107,7 @@ fn along_the_axis(results: &ExperimentResults) -> Plot {
 
 /// Eq. (12) and (13).
 fn suggestions(results: &ExperimentResults) -> Vec<Span> {
-    let scale = results.experiment.base.sensor.scale;
+    let scale = results.experiment.base.source.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let span = |name: &str, from: usize, to: usize| Span {
         name: name.to_owned(),

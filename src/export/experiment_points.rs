@@ -78,7 +78,10 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{FoldUnit, Seed},
-        evaluation::experiments::{CrossValidation, Finished, PaperTable, run_experiments},
+        evaluation::{
+            CrossValidation,
+            experiments::{Finished, PaperTable, run_experiments},
+        },
     };
 
     #[test]

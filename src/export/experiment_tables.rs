@@ -155,9 +155,9 @@ pub fn write_trials(results: &ExperimentResults, writer: &mut dyn Write) -> io::
             write!(
                 writer,
                 "{},{},{},{method},{},{},{}",
-                settings.sensor.scale,
+                settings.source.sensor.scale,
                 settings.hidden,
-                settings.samples,
+                settings.source.samples,
                 training.stopping.epochs,
                 trial.seed,
                 trial.repeat + 1

@@ -1,7 +1,10 @@
 //! What stands around the table of an experiment, in words.
 
 use crate::{
-    evaluation::experiments::{Axis, CrossValidation, Experiment, ExperimentResults},
+    evaluation::{
+        CrossValidation,
+        experiments::{Axis, Experiment, ExperimentResults},
+    },
     network::HiddenSuggestions,
 };
 
@@ -10,7 +13,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     let base = &experiment.base;
     let mut said = vec![base.training.method.name().to_owned()];
     if !matches!(experiment.axis, Axis::Array(_)) {
-        said.push(base.sensor.scale.to_string());
+        said.push(base.source.sensor.scale.to_string());
     }
     if !matches!(experiment.axis, Axis::Hidden(_)) {
         said.push(format!("{} hidden nodes", base.hidden));
@@ -27,7 +30,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     said.push(match experiment.cross_validation {
         None => format!(
             "{} training samples, {} more for validation, {} for test",
-            base.samples, base.validation_samples, base.test_samples
+            base.source.samples, base.source.validation_samples, base.source.test_samples
         ),
         Some(CrossValidation { folds, repeats, unit }) => {
             let validation = match folds {
@@ -39,7 +42,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     });
     let mut conditions = said.join(", ");
     if matches!(experiment.axis, Axis::Hidden(_)) {
-        let scale = base.sensor.scale;
+        let scale = base.source.sensor.scale;
         let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
         let (root, logarithm) = (suggested.square_root, suggested.logarithm);
         let (fewest, most) = (root.start(), root.end());

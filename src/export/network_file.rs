@@ -13,7 +13,7 @@ use super::{
     soundness::flaw,
 };
 use crate::{
-    evaluation::{Baselines, Errors, Run, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, Run, SimulatedSettings, StartRecord},
     network::Networks,
     training::{EpochRecord, History, Stage, StopReason},
 };
@@ -31,7 +31,7 @@ pub struct NetworkFile {
     /// Program and version that wrote it.
     pub program: String,
     /// What was asked for: sensor, scene, samples, method, stopping, seed.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// The best network of the training, or of each row-wire.
     pub network: Networks,
     /// How the training went.
@@ -113,6 +113,9 @@ pub enum NetworkFileError {
         /// What is wrong, with the field or with line and column.
         flaw: String,
     },
+    /// A network of measured samples: the file tells of a simulated sensor.
+    #[error("a network of measured samples has no network file; write the networks themselves instead")]
+    Measured,
     /// A network that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
     Unsound {
@@ -133,7 +136,7 @@ struct Document {
     format: String,
     version: u64,
     program: String,
-    settings: RunSettings,
+    settings: SimulatedSettings,
     network: Networks,
     training: TrainingDocument,
     errors: Errors,
@@ -156,11 +159,16 @@ struct TrainingDocument {
 
 impl NetworkFile {
     /// The best network of `run` so far, and what is known of it.
-    pub fn from_run(run: &Run) -> Self {
+    ///
+    /// # Errors
+    /// [`NetworkFileError::Measured`] if the samples were measured.
+    pub fn from_run(run: &Run) -> Result<Self, NetworkFileError> {
+        let simulated = run.settings().simulated().zip(run.node_scores());
+        let (settings, scores) = simulated.ok_or(NetworkFileError::Measured)?;
         let trainer = run.leader();
-        Self {
+        Ok(Self {
             program: PROGRAM.to_owned(),
-            settings: *run.settings(),
+            settings,
             network: run.network(),
             training: TrainingRecord {
                 stop_reason: run.stop_reason(),
@@ -170,9 +178,9 @@ impl NetworkFile {
                 stages: trainer.stages().to_vec(),
                 starts: run.starts(),
             },
-            errors: run.decouple_test().1,
-            baselines: *run.baselines(),
-        }
+            errors: scores.network,
+            baselines: scores.baselines,
+        })
     }
 
     /// Writes the file whole or not at all.

@@ -25,25 +25,27 @@ pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut 
 }
 
 /// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
-/// millimetres, and the same as `decoded_mm` (samples × 3·M2) has it. `rows` are the row-wires of a snapshot, from 0.
-/// Everything is written counted from 1, snapshots from `first_snapshot`.
+/// millimetres, and the same as `decoded_mm` (samples × 3·M2) has it. Row-wires are written counted from 1, snapshots from
+/// `first_snapshot`; the row-wire is empty where it is not known.
 ///
 /// # Errors
 /// What `writer` said.
 pub fn write_samples(
     set: &Dataset,
-    rows: &[usize],
     decoded_mm: Option<&Array2<f64>>,
     first_snapshot: usize,
     writer: &mut dyn Write,
 ) -> io::Result<()> {
-    let samples = set.resistances_ohm.rows().into_iter().zip(set.coordinates_mm.rows());
-    for (sample, (resistances_ohm, coordinates_mm)) in samples.enumerate() {
-        let (snapshot, row) = (first_snapshot + sample / rows.len(), 1 + rows[sample % rows.len()]);
-        write!(writer, "{snapshot},{row},")?;
+    for sample in 0..set.samples() {
+        write!(writer, "{},", first_snapshot + set.groups()[sample])?;
+        if let Some(row_wire) = set.row_wire(sample) {
+            write!(writer, "{}", row_wire + 1)?;
+        }
+        write!(writer, ",")?;
         let decoded_mm = decoded_mm.map(|decoded_mm| decoded_mm.row(sample));
         let decoded_mm = decoded_mm.iter().flatten();
-        write_numbers(resistances_ohm.iter().chain(&coordinates_mm).chain(decoded_mm), writer)?;
+        let measured = set.sample_readings(sample).iter().chain(set.sample_targets(sample));
+        write_numbers(measured.chain(decoded_mm), writer)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@ use std::fmt::Display;
 
 use super::NetworkFile;
 use crate::{
-    evaluation::{Baselines, Errors, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, SimulatedSettings, StartRecord},
     network::{DecouplingNetwork, Networks},
     sensor::ArrayScale,
 };
@@ -28,9 +28,10 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     };
     let last_epoch = training.history.last().map(|record| record.epoch);
     let flaws = [
-        (network.each().iter().find_map(weight)).map(|index| format!("network: weight {index} is not a finite number")),
+        (network.values().iter().find_map(weight))
+            .map(|index| format!("network: weight {index} is not a finite number")),
         number_flaw(network, settings),
-        (network.each().iter()).find_map(|network| mismatch(network, settings.sensor.scale, settings.hidden)),
+        (network.values().iter()).find_map(|network| mismatch(network, settings.source.sensor.scale, settings.hidden)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
@@ -49,12 +50,20 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
 }
 
 /// What is impossible about the settings in a file, and where.
-pub(super) fn settings_flaw(settings: &RunSettings) -> Option<String> {
+pub(super) fn settings_flaw(settings: &SimulatedSettings) -> Option<String> {
     let at = |field: &str, flaw: &dyn Display| format!("{field}: {flaw}");
     let checks = [
         settings.check_counts().map_err(|flaw| at("settings", &flaw)),
-        settings.sensor.check().map_err(|flaw| at("settings.sensor", &flaw)),
-        settings.scene.check().map_err(|flaw| at("settings.scene", &flaw)),
+        settings
+            .source
+            .sensor
+            .check()
+            .map_err(|flaw| at("settings.source.sensor", &flaw)),
+        settings
+            .source
+            .scene
+            .check()
+            .map_err(|flaw| at("settings.source.scene", &flaw)),
         settings.training.check().map_err(|flaw| at("settings.training", &flaw)),
     ];
     checks.into_iter().find_map(Result::err)
@@ -78,15 +87,15 @@ fn starts_flaw(file: &NetworkFile) -> Option<String> {
     ))
 }
 
-fn number_flaw(network: &Networks, settings: &RunSettings) -> Option<String> {
-    let (found, rows) = (network.each().len(), settings.scene.rows);
-    match settings.model_size() {
+fn number_flaw(network: &Networks, settings: &SimulatedSettings) -> Option<String> {
+    let (found, rows) = (network.values().len(), settings.source.scene.rows);
+    match settings.source.model_size() {
         Ok(size) if size.networks == found => None,
         Ok(size) => Some(format!(
             "network: {found} of them, but rows {rows} of {} need {}",
-            settings.sensor.scale, size.networks
+            settings.source.sensor.scale, size.networks
         )),
-        Err(flaw) => Some(format!("settings.scene.rows: {flaw}")),
+        Err(flaw) => Some(format!("settings.source.scene.rows: {flaw}")),
     }
 }
 

@@ -3,7 +3,10 @@
 use std::io::{self, Write};
 
 use super::figures::{Hue, Marker, Plot, PlotAxis, PlotPoint, Series};
-use crate::evaluation::{DecoderKind, Precision, Preset, TradeCost, TradeLevel, TradePoint};
+use crate::{
+    decoupling::{ColourKey, DecoderKind, Precision},
+    evaluation::{Preset, TradeCost, TradeLevel, TradePoint},
+};
 
 /// Writes every point of every level as CSV. Numbers are written so that reading gives the same bits; where there is none
 /// the field is empty.
@@ -31,14 +34,14 @@ pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<
             )?;
             if let Some(hidden) = point.hidden() {
                 let epochs = point.settings.training.stopping.epochs;
-                write!(writer, "{hidden},{},{epochs}", point.settings.samples)?;
+                write!(writer, "{hidden},{},{epochs}", point.settings.source.samples)?;
             } else {
-                write!(writer, ",{},", point.settings.samples)?;
+                write!(writer, ",{},", point.settings.source.samples)?;
             }
             let numbers = [
                 report.errors.z_percent,
                 Some(report.errors.z_mm),
-                Some(report.frame_us),
+                Some(report.cost.frame_us),
                 Some(point.training_seconds),
                 Some(report.residual),
                 point.reference.z_percent,
@@ -82,7 +85,12 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
             let points = level.points.iter();
             let points = points.filter(|point| point.report.kind == kind && point.preset == preset);
             let name = format!("{kind}, {preset} preset");
-            all.push(series(name, hue(kind), Some(marker), points.map(place).collect()));
+            all.push(series(
+                name,
+                hue(kind.colour()),
+                Some(marker),
+                points.map(place).collect(),
+            ));
         }
     }
     let limit = level.points.first().and_then(|point| point.reference.z_percent);
@@ -118,13 +126,15 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
     }
 }
 
-fn hue(kind: DecoderKind) -> Hue {
-    match kind {
-        DecoderKind::Mean => Hue::Grey,
-        DecoderKind::Ridge => Hue::Violet,
-        DecoderKind::Network => Hue::Blue,
-        DecoderKind::RadialBasis => Hue::Orange,
-        DecoderKind::Newton => Hue::Red,
-        DecoderKind::Polish => Hue::Green,
+/// The colour of a decoder in print.
+fn hue(colour: ColourKey) -> Hue {
+    match colour {
+        ColourKey::Grey => Hue::Grey,
+        ColourKey::Violet => Hue::Violet,
+        ColourKey::Blue => Hue::Blue,
+        ColourKey::Orange => Hue::Orange,
+        ColourKey::Red => Hue::Red,
+        ColourKey::Green => Hue::Green,
+        ColourKey::Cyan => Hue::Cyan,
     }
 }

@@ -22,6 +22,11 @@ impl InputChoice {
         quantity: Quantity::Resistance,
         scaling: ScalingChoice::MinMax,
     };
+    /// Readings as they are between −1 and 1, for measured data of any unit.
+    pub const MEASURED: Self = Self {
+        quantity: Quantity::Raw,
+        scaling: ScalingChoice::MinMax,
+    };
     /// Whitened conductances.
     pub const BEST: Self = Self {
         quantity: Quantity::Conductance,
@@ -102,6 +107,12 @@ impl Inputs {
     /// No samples, values that are not finite, or a range that overflows.
     pub fn fit(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>, noise: f64) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
+        let foreign = resistances_ohm
+            .indexed_iter()
+            .find(|(_, value)| !quantity.accepts(**value));
+        if let Some(((sample, channel), &value)) = foreign {
+            return Err(ScalingError::Reading { sample, channel, value });
+        }
         let values = resistances_ohm.mapv(|ohm| quantity.of(ohm));
         let scaling = match choice.scaling {
             ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),

@@ -1,74 +1,51 @@
 use std::fmt;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::Array2;
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
     de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
 
 use super::DecouplingNetwork;
+use crate::dataset::{Dataset, PerRow};
 
-/// The networks of a scene: one for every row-wire read, or one for each where the row is known.
+/// Trained networks: one for every row-wire read, or one for each where the row is known.
 ///
 /// In files a single network stands for itself and several are a list.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Networks(Vec<DecouplingNetwork>);
+pub type Networks = PerRow<DecouplingNetwork>;
 
-impl From<DecouplingNetwork> for Networks {
-    fn from(network: DecouplingNetwork) -> Self {
-        Self(vec![network])
+impl PerRow<DecouplingNetwork> {
+    /// Weights of all networks together.
+    pub fn weights(&self) -> usize {
+        self.values().iter().map(|network| network.mlp().weights().len()).sum()
     }
-}
 
-impl Networks {
-    /// One network for each row-wire read, or a single one for all.
+    /// Decodes every sample of `set` by the network of its row-wire: samples × outputs, in the units of the targets.
     ///
     /// # Panics
-    /// If there is none.
-    pub fn new(networks: Vec<DecouplingNetwork>) -> Self {
-        assert!(!networks.is_empty());
-        Self(networks)
-    }
-
-    /// All of them.
-    pub fn each(&self) -> &[DecouplingNetwork] {
-        &self.0
-    }
-
-    /// The network of the row-wire in this place of those read.
-    pub fn of_place(&self, place: usize) -> &DecouplingNetwork {
-        &self.0[place % self.0.len()]
-    }
-
-    /// Weights of all of them together.
-    pub fn weights(&self) -> usize {
-        self.0.iter().map(|network| network.mlp().weights().len()).sum()
-    }
-
-    /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4). Where each row-wire has a
-    /// network of its own, samples are whole snapshots, in each the rows from first to last.
-    pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        if let [only] = &self.0[..] {
-            return only.decouple(resistances_ohm);
+    /// If the set has other channels, or row-wires without a network.
+    pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
+        if let Some(only) = self.only() {
+            return only.decouple(set.readings());
         }
-        let coordinates = self.0[0].outputs().channels();
-        let mut all_mm = Array2::zeros((resistances_ohm.nrows(), coordinates));
-        for (place, network) in self.0.iter().enumerate() {
-            let samples: Vec<usize> = (place..resistances_ohm.nrows()).step_by(self.0.len()).collect();
-            let decoupled_mm = network.decouple(resistances_ohm.select(Axis(0), &samples).view());
-            for (&sample, row) in samples.iter().zip(decoupled_mm.rows()) {
-                all_mm.row_mut(sample).assign(&row);
+        let outputs = self.at(0).outputs().channels();
+        let mut answers = Array2::zeros((set.samples(), outputs));
+        for row_index in 0..set.row_count() {
+            let of_row = self.at(row_index).decouple(set.of_row(row_index).readings());
+            let samples = (0..set.samples()).filter(|&sample| set.row_index(sample) == row_index);
+            for (sample, answer) in samples.zip(of_row.rows()) {
+                answers.row_mut(sample).assign(&answer);
             }
         }
-        all_mm
+        answers
     }
 }
 
 impl Serialize for Networks {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match &self.0[..] {
-            [only] => only.serialize(serializer),
-            all => all.serialize(serializer),
+        match self.only() {
+            Some(only) => only.serialize(serializer),
+            None => self.values().serialize(serializer),
         }
     }
 }
@@ -89,7 +66,7 @@ impl<'de> Visitor<'de> for OneOrMany {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Networks, A::Error> {
-        DecouplingNetwork::deserialize(MapAccessDeserializer::new(map)).map(Networks::from)
+        DecouplingNetwork::deserialize(MapAccessDeserializer::new(map)).map(Networks::shared)
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Networks, A::Error> {
@@ -100,6 +77,6 @@ impl<'de> Visitor<'de> for OneOrMany {
         if all.is_empty() {
             return Err(serde::de::Error::custom("there is no network in the list"));
         }
-        Ok(Networks(all))
+        Ok(Networks::each(all))
     }
 }

@@ -14,6 +14,8 @@ pub enum Quantity {
     Conductance,
     /// ln R: relative errors become additive.
     LogResistance,
+    /// The reading as it is, of whatever unit and sign: for measured data that are no resistances.
+    Raw,
 }
 
 /// A word that is none of the quantities.
@@ -22,22 +24,31 @@ pub enum Quantity {
 pub struct QuantityError(String);
 
 impl Quantity {
-    /// All of them, in the order offered.
+    /// Those of a resistance, in the order offered.
     pub const ALL: [Self; 3] = [Self::Resistance, Self::Conductance, Self::LogResistance];
 
     /// The value for a resistance in ohm.
     pub fn of(self, resistance_ohm: f64) -> f64 {
         match self {
-            Self::Resistance => resistance_ohm,
+            Self::Resistance | Self::Raw => resistance_ohm,
             Self::Conductance => 1.0 / resistance_ohm,
             Self::LogResistance => resistance_ohm.ln(),
+        }
+    }
+
+    /// Whether it has a value for a reading: any finite number, and where it is a resistance above 0.
+    #[inline(always)]
+    pub fn accepts(self, reading: f64) -> bool {
+        match self {
+            Self::Raw => reading.is_finite(),
+            _ => (reading > 0.0) & (reading < f64::INFINITY),
         }
     }
 
     /// The resistance in ohm behind a value.
     pub fn resistance_ohm(self, value: f64) -> f64 {
         match self {
-            Self::Resistance => value,
+            Self::Resistance | Self::Raw => value,
             Self::Conductance => 1.0 / value,
             Self::LogResistance => value.exp(),
         }
@@ -50,6 +61,7 @@ impl Quantity {
             Self::Resistance => resistance_ohm,
             Self::Conductance => 1.0 / resistance_ohm,
             Self::LogResistance => 1.0,
+            Self::Raw => resistance_ohm.abs(),
         }
     }
 }
@@ -60,6 +72,7 @@ impl fmt::Display for Quantity {
             Self::Resistance => "resistance",
             Self::Conductance => "conductance",
             Self::LogResistance => "log",
+            Self::Raw => "raw",
         })
     }
 }

@@ -20,7 +20,7 @@ pub enum ScalingError {
     #[error("there are no samples to scale")]
     Empty,
     /// A value is NaN or infinite.
-    #[error("sample {sample}, channel {channel}: {value} is not a finite number")]
+    #[error("sample {}, channel {}: {value} is not a finite number", .sample + 1, .channel + 1)]
     NotFinite {
         /// Sample, from 0.
         sample: usize,
@@ -29,8 +29,18 @@ pub enum ScalingError {
         /// The value.
         value: f64,
     },
+    /// A reading that the chosen input has no value for.
+    #[error("sample {}, channel {}: {value} is not a resistance; give finite numbers above 0, or take readings as they are", .sample + 1, .channel + 1)]
+    Reading {
+        /// Sample, from 0.
+        sample: usize,
+        /// Channel, from 0.
+        channel: usize,
+        /// The reading.
+        value: f64,
+    },
     /// The range of a channel overflows.
-    #[error("channel {channel} ranges from {minimum} to {maximum}: too wide to scale; give it in larger units")]
+    #[error("channel {} ranges from {minimum} to {maximum}: too wide to scale; give it in larger units", .channel + 1)]
     Range {
         /// Channel, from 0.
         channel: usize,

@@ -11,7 +11,7 @@ pub use deformation::Deformation;
 pub use loading::{DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
 pub use noise::{Noise, NoiseSource, NoisySets, RelativeSpread};
-pub use rows::Rows;
+pub use rows::{RowModel, Rows};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

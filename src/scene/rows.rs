@@ -17,6 +17,16 @@ pub enum Rows {
     One(usize),
 }
 
+/// How row-wires share a decoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RowModel {
+    /// One for every row-wire, which is not told which one it reads.
+    Shared,
+    /// One for each row-wire read: the electronics know which one they address.
+    Each,
+}
+
 impl Rows {
     /// The row-wires read, of an array with `rows` of them.
     ///
@@ -30,9 +40,12 @@ impl Rows {
         }
     }
 
-    /// Whether a decoder knows which row-wire it reads.
-    pub fn are_known(self) -> bool {
-        self != Self::All
+    /// One decoder for every row-wire, or one for each.
+    pub fn model(self) -> RowModel {
+        match self {
+            Self::All => RowModel::Shared,
+            Self::Known | Self::One(_) => RowModel::Each,
+        }
     }
 }
 

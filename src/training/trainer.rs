@@ -224,6 +224,11 @@ impl Trainer {
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
     }
 
+    /// Training samples.
+    pub fn samples(&self) -> usize {
+        self.problem.training.samples()
+    }
+
     /// How it is trained.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings

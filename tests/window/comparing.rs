@@ -53,7 +53,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     driver.enter("Name of run 1", "Six hidden nodes");
     assert!(driver.has("Six hidden nodes as A"), "{:#?}", driver.texts());
 
-    let settings = [6, 4].map(|hidden| decoupler::evaluation::RunSettings { hidden, ..small() });
+    let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(NetworkFile::from_run);
     let check = |driver: &Driver| {
@@ -66,7 +66,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));
         for (compared, run) in driver.state().runs.compared.iter().flatten().zip(&runs) {
-            assert_eq!(*compared.decoupled_mm, run.decouple_test().0, "the same bits");
+            assert_eq!(*compared.decoupled_mm, run.decouple_test(), "the same bits");
         }
         let kept = driver.state().runs.workspace.runs.iter();
         for (kept, file) in kept.zip(&shown) {
@@ -167,8 +167,8 @@ fn figures_of_the_paper_are_one_click() {
     let mut driver = Driver::open();
     driver.click("Fig. 8");
     let settings = driver.state().draft;
-    assert_eq!(settings.sensor.scale.to_string(), "10×6_3×18");
-    assert_eq!((settings.hidden, settings.samples), (12, 1000));
+    assert_eq!(settings.source.sensor.scale.to_string(), "10×6_3×18");
+    assert_eq!((settings.hidden, settings.source.samples), (12, 1000));
     assert_eq!(driver.state().look.mode, ViewMode::Top);
     driver.wait("its training", |driver| driver.state().phase == Phase::Training);
     assert!(!driver.is_enabled("Fig. 4"), "one at a time");

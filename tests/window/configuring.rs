@@ -2,7 +2,7 @@
 
 use decoupler::{
     app::{Action, Phase},
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     sensor::{ArrayScale, Geometry},
     training::Method,
 };
@@ -15,7 +15,7 @@ use crate::driver::{Driver, small, table_of};
 fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
     let mut driver = Driver::open();
     driver.settle();
-    assert_eq!(driver.state().draft, RunSettings::default());
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
     assert!(driver.has("Ready: press Train"));
     assert!(driver.is_enabled("▶ Train"));
     assert!(!driver.is_enabled("■ Stop") && !driver.is_enabled("⏸ Pause"));
@@ -74,7 +74,7 @@ fn presets_set_the_array_and_its_surface_follows() {
     let mut driver = Driver::open();
     for scale in ArrayScale::PRESETS {
         driver.click(&format!("{}×{}", scale.rows(), scale.nodes_per_row()));
-        assert_eq!(driver.state().draft.sensor.scale, scale);
+        assert_eq!(driver.state().draft.source.sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
             let frame = &driver.state().frames.actual;
@@ -88,7 +88,7 @@ fn presets_set_the_array_and_its_surface_follows() {
 fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "4x5_2x16");
-    let scale = driver.state().draft.sensor.scale;
+    let scale = driver.state().draft.source.sensor.scale;
     assert_eq!(scale.to_string(), "4×5_2×16");
     assert!(driver.says("4 row-wires of 5 nodes over 16 column-wires of 2 nodes"));
     assert!(
@@ -104,7 +104,7 @@ fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
         ("4x5_2x9999", "column-wires (M4) is 9999"),
     ] {
         driver.type_into("Array scale", wrong);
-        assert_eq!(driver.state().draft.sensor.scale, scale, "{wrong}");
+        assert_eq!(driver.state().draft.source.sensor.scale, scale, "{wrong}");
         driver.harness().run_steps(2);
         assert!(driver.says(reason), "{wrong}: {:#?}", driver.texts());
     }
@@ -131,15 +131,15 @@ fn numbers_are_typed_and_kept_within_what_is_possible() {
     }
     let draft = driver.state().draft;
     assert_eq!(
-        (draft.hidden, draft.samples, draft.validation_samples),
+        (draft.hidden, draft.source.samples, draft.source.validation_samples),
         (17, 330, 0),
         "{draft:?}"
     );
     assert_eq!(
-        (draft.test_samples, draft.training.stopping.epochs, draft.seed.0),
+        (draft.source.test_samples, draft.training.stopping.epochs, draft.seed.0),
         (40, 77, u64::MAX)
     );
-    assert_eq!(draft.scene.largest_compression, 0.125);
+    assert_eq!(draft.source.scene.largest_compression, 0.125);
     let Method::LevenbergMarquardt(settings) = draft.training.method else {
         panic!("{draft:?}")
     };
@@ -150,7 +150,10 @@ fn numbers_are_typed_and_kept_within_what_is_possible() {
         driver.enter(label, text);
     }
     let draft = driver.state().draft;
-    assert_eq!((draft.hidden, draft.samples, draft.training.stopping.epochs), (1, 1, 1));
+    assert_eq!(
+        (draft.hidden, draft.source.samples, draft.training.stopping.epochs),
+        (1, 1, 1)
+    );
     driver.enter("Hidden nodes", "a dozen");
     assert_eq!(driver.state().draft.hidden, 1, "words are not taken");
     driver.settle();
@@ -192,7 +195,7 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         driver
             .state()
             .test()
-            .is_some_and(|test| test.sensor == driver.state().draft.sensor)
+            .is_some_and(|test| test.sensor == driver.state().draft.source.sensor)
     });
     let x_mm: Vec<f64> = driver
         .state()
@@ -203,17 +206,17 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         .map(|node| node.x)
         .collect();
     assert!((x_mm[10] - x_mm[0] - 2.5).abs() < 1e-12, "rows are 2.5 mm apart");
-    assert_eq!(driver.state().draft.sensor.resistivity_ohm_per_mm, 1e3);
+    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 1e3);
     assert!(
         driver.get("Actual surface").value().unwrap().contains("to 7.9")
             || driver.get("Actual surface").value().unwrap().contains("to 8")
     );
     driver.click("Back to the assumed geometry");
-    assert_eq!(driver.state().draft.sensor.geometry, Geometry::default());
-    assert_eq!(driver.state().draft.sensor.resistivity_ohm_per_mm, 1e3);
+    assert_eq!(driver.state().draft.source.sensor.geometry, Geometry::default());
+    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 1e3);
     driver.enter("Hidden nodes", "3");
     driver.click(reset);
-    assert_eq!(driver.state().draft, RunSettings::default());
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
     assert!(!driver.is_enabled(reset));
     driver.settle();
 }
@@ -236,7 +239,7 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
     // Faster than the worker draws the other array.
     let run = driver.state().run.as_ref().unwrap().settings;
     let mut other = run;
-    other.sensor.scale = ArrayScale::PRESETS[1];
+    other.source.sensor.scale = ArrayScale::PRESETS[1];
     driver.window_mut().apply(Action::Configure(Box::new(other)));
     driver.window_mut().apply(Action::Configure(Box::new(run)));
     for _ in 0..40 {

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use decoupler::{
     app::{Notice, Phase},
-    evaluation::{Run, RunSettings, Spread, StartRecord},
+    evaluation::{Run, SimulatedSettings, Spread, StartRecord},
     export::{CheckpointFile, NetworkFile, format_number},
     training::{Method, MomentumSettings, StopReason, StoppingRules},
 };
@@ -33,7 +33,7 @@ fn save(driver: &mut Driver, button: &str, path: &Path) {
     driver.click("Dismiss");
 }
 
-fn momentum(epochs: usize) -> RunSettings {
+fn momentum(epochs: usize) -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = epochs;
@@ -58,7 +58,7 @@ fn pause(driver: &mut Driver) {
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
-fn stepped(settings: RunSettings, epochs: usize) -> Run {
+fn stepped(settings: SimulatedSettings, epochs: usize) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     (0..epochs).for_each(|_| {
         run.step();
@@ -77,7 +77,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
     driver.configure_small();
     driver.enter("Starts", "4");
     driver.train();
-    let run = trained(RunSettings { starts: 4, ..small() });
+    let run = trained(SimulatedSettings { starts: 4, ..small() });
     let (starts, shown) = (run.starts(), driver.state().run.as_ref().unwrap());
     assert_eq!(shown.starts, starts);
     assert_eq!(shown.history, run.leader().history());
@@ -123,7 +123,7 @@ fn the_spread_is_shown_while_the_starts_train() {
     assert!(driver.has("SPREAD OVER 3 STARTS") && driver.has("0 of 3 starts ended"));
     driver.click("■ Stop");
     ended(&mut driver);
-    let settings = RunSettings {
+    let settings = SimulatedSettings {
         starts: 3,
         ..momentum(1_000_000)
     };
@@ -168,7 +168,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     expected.training.seconds = found.training.seconds;
     assert_eq!(found, expected);
     let bits = |file: &NetworkFile| -> Vec<u64> {
-        file.network.each()[0]
+        file.network.values()[0]
             .mlp()
             .weights()
             .iter()
@@ -182,7 +182,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
 fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let [terminal, window] = ["terminal", "window"].map(|name| folder.path().join(name));
-    let settings = RunSettings { starts: 3, ..small() };
+    let settings = SimulatedSettings { starts: 3, ..small() };
     CheckpointFile::from_run(&stepped(settings, 7)).save(&terminal).unwrap();
     let mut driver = Driver::open();
     give_path(&mut driver, OPEN, &terminal);

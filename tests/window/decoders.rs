@@ -2,7 +2,7 @@
 
 use decoupler::{
     app::DecoderResult,
-    evaluation::{DecoderSet, Run, RunSettings},
+    evaluation::{DecoderSet, Run, SimulatedSettings},
     export::format_number,
     scene::{Noise, Rows},
 };
@@ -64,10 +64,10 @@ fn table_of(run: &Run) -> Vec<String> {
         .collect()
 }
 
-fn noisy() -> RunSettings {
+fn noisy() -> SimulatedSettings {
     let mut settings = small();
-    settings.scene.rows = Rows::Known;
-    settings.scene.noise = Noise::relative(1e-3);
+    settings.source.scene.rows = Rows::Known;
+    settings.source.scene.noise = Noise::relative(1e-3);
     settings
 }
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
-use decoupler::evaluation::{Run, RunSettings, error_rows};
+use decoupler::evaluation::{Run, SimulatedSettings, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
 use egui_kittest::{
@@ -281,19 +281,19 @@ impl Driver {
 const ROWS: [&str; 5] = ["training mean", "linear map", "network", "reference", "published"];
 
 /// The settings of [`Driver::configure_small`].
-pub(crate) fn small() -> RunSettings {
-    let mut settings = RunSettings {
+pub(crate) fn small() -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
         hidden: 6,
         samples: 200,
-        ..RunSettings::default()
+        ..SimulatedSettings::default()
     };
-    settings.sensor.scale = "10×6_3×18".parse().unwrap();
+    settings.source.sensor.scale = "10×6_3×18".parse().unwrap();
     settings.training.stopping.epochs = 15;
     settings
 }
 
 /// What the library makes of `settings` by itself, trained to the end.
-pub(crate) fn trained(settings: RunSettings) -> Run {
+pub(crate) fn trained(settings: SimulatedSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -302,7 +302,7 @@ pub(crate) fn trained(settings: RunSettings) -> Run {
 /// The error table that the library gives for `run`, in the window's words.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
-    let rows = error_rows(&run.decouple_test().1, run.baselines(), None);
+    let rows = error_rows(&run.node_scores().unwrap().network, run.baselines(), None);
     let cells = rows.iter().flat_map(|row| {
         let named = columns.iter().zip(row.values());
         named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(value)))

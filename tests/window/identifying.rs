@@ -49,7 +49,7 @@ fn shows_condition_of(driver: &Driver, sensor: &SensorModel) {
 #[test]
 fn the_figures_are_the_librarys_and_follow_the_geometry() {
     let mut driver = open();
-    let mut sensor = driver.state().draft.sensor;
+    let mut sensor = driver.state().draft.source.sensor;
     shows_condition_of(&driver, &sensor);
     assert!(driver.says("Without noise every deformation can be told"));
     driver.enter("Height", "8");
@@ -62,7 +62,7 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
 
     driver.click("Use this sensor in the Train view");
     assert_eq!(
-        (driver.state().view, driver.state().draft.sensor),
+        (driver.state().view, driver.state().draft.source.sensor),
         (View::Train, sensor)
     );
     driver.click_button("Identifiability");
@@ -79,7 +79,7 @@ fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
     driver.press(Key::ArrowRight);
     wait_for_the_answer(&mut driver);
     let pitch = analysis(&driver).question.sensor.geometry.node_pitch_mm;
-    assert!(pitch > before.sensor.geometry.node_pitch_mm, "{pitch}");
+    assert!(pitch > before.source.sensor.geometry.node_pitch_mm, "{pitch}");
     assert_eq!(driver.state().draft, before, "trying changes nothing there");
     driver.click("Back to the Train view's");
     wait_for_the_answer(&mut driver);

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use decoupler::{
     app::Phase,
-    evaluation::{Outlook, Preset, RunSettings},
+    evaluation::{Outlook, Preset, SimulatedSettings},
     export::format_number,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
@@ -27,7 +27,8 @@ fn wait_for_scene(driver: &mut Driver) {
             (Some(preview), _) => Some(preview.settings),
             (None, run) => run.as_ref().map(|run| run.settings),
         };
-        shown.is_some_and(|shown| (shown.sensor, shown.scene) == (draft.sensor, draft.scene))
+        shown
+            .is_some_and(|shown| (shown.source.sensor, shown.source.scene) == (draft.source.sensor, draft.source.scene))
     });
 }
 
@@ -43,7 +44,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
-    settings.scene.rows = Rows::Known;
+    settings.source.scene.rows = Rows::Known;
     let run = trained(settings);
     assert_eq!(run.network().each().len(), 10);
     assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
@@ -58,14 +59,14 @@ fn one_row_is_all_that_is_drawn() {
     driver.configure_small();
     driver.click_button("One");
     driver.enter("Row", "4");
-    assert_eq!(driver.state().draft.scene.rows, Rows::One(3));
+    assert_eq!(driver.state().draft.source.scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations a frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.state().frames.actual.nodes_mm.len(), 6);
     assert!(driver.has("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
-    settings.scene.rows = Rows::One(3);
+    settings.source.scene.rows = Rows::One(3);
     assert_eq!(driver.table(), table_of(&trained(settings)));
     driver.click("Show");
     for tab in ["Nodes", "Histogram", "Regression"] {
@@ -78,7 +79,7 @@ fn one_row_is_all_that_is_drawn() {
 
     // A smaller array has a last row too.
     driver.enter("Array scale", "2x3_2x9");
-    assert_eq!(driver.state().draft.scene.rows, Rows::One(1));
+    assert_eq!(driver.state().draft.source.scene.rows, Rows::One(1));
     wait_for_scene(&mut driver);
     driver.settle();
 }
@@ -103,7 +104,7 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
         drift: 0.007,
         sets: NoisySets::Test,
     };
-    assert_eq!(draft.scene.noise, noise);
+    assert_eq!(draft.source.scene.noise, noise);
     let inputs = InputChoice {
         quantity: Quantity::LogResistance,
         scaling: ScalingChoice::Whitening,
@@ -113,10 +114,10 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
         noise,
         ..Scene::default()
     };
-    let paper = RunSettings::default();
+    let paper = SimulatedSettings::default();
     assert_eq!(
         draft,
-        RunSettings { scene, inputs, ..paper },
+        SimulatedSettings { scene, inputs, ..paper },
         "and nothing else changed"
     );
     driver.click("Noise on resistance");
@@ -136,14 +137,14 @@ fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
-    settings.scene.noise = Noise::relative(0.001);
-    (settings.samples, settings.training.stopping.epochs) = (2000, 40);
+    settings.source.scene.noise = Noise::relative(0.001);
+    (settings.source.samples, settings.training.stopping.epochs) = (2000, 40);
     settings.inputs.scaling = ScalingChoice::Whitening;
     let run = trained(settings);
     assert_eq!(driver.table(), table_of(&run));
     let limit = run.baselines().reference.unwrap();
     assert!(limit.z_mm > 0.0);
-    let ratio = run.decouple_test().1.z_mm / limit.z_mm;
+    let ratio = run.node_scores().unwrap().network.z_mm / limit.z_mm;
     let said = format!("{} times the limit that noise sets", format_number(ratio));
     assert!(driver.says(&said), "{said}: {:#?}", driver.texts());
 }
@@ -171,13 +172,13 @@ fn only_the_settings_of_what_is_chosen_are_shown() {
     driver.enter("Correlation length", "6.5");
     let correlation_length_mm = 6.5;
     assert_eq!(
-        driver.state().draft.scene.loading,
+        driver.state().draft.source.scene.loading,
         Loading::SmoothField { correlation_length_mm }
     );
     choose(&mut driver, "Loading", "Indenter");
     shows(&driver, &["Shape", "Radius from", "Radius to", "Spread"]);
     assert_eq!(
-        driver.state().draft.scene.loading,
+        driver.state().draft.source.scene.loading,
         Loading::Indenter(Indenter::default())
     );
     choose(&mut driver, "Shape", "Cylinder");
@@ -187,8 +188,8 @@ fn only_the_settings_of_what_is_chosen_are_shown() {
     );
     driver.enter("Radius from", "8");
     driver.enter("Largest tilt", "12");
-    let Loading::Indenter(indenter) = driver.state().draft.scene.loading else {
-        panic!("{:?}", driver.state().draft.scene)
+    let Loading::Indenter(indenter) = driver.state().draft.source.scene.loading else {
+        panic!("{:?}", driver.state().draft.source.scene)
     };
     let (smallest, largest) = (8.0, 8.0);
     let cylinder = IndenterShape::Cylinder {
@@ -204,7 +205,7 @@ fn only_the_settings_of_what_is_chosen_are_shown() {
     shows(&driver, &["Row", "Largest shift"]);
     driver.click_button("All");
     driver.click_button("z");
-    assert_eq!(driver.state().draft, RunSettings::default());
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
     wait_for_scene(&mut driver);
     driver.settle();
 }
@@ -220,12 +221,12 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
     let draft = driver.state().draft;
     let best = Preset::Best.settings();
     assert_eq!(
-        (draft.inputs, draft.samples, draft.training),
-        (best.inputs, best.samples, best.training)
+        (draft.inputs, draft.source.samples, draft.training),
+        (best.inputs, best.source.samples, best.training)
     );
-    assert_eq!((draft.sensor, draft.hidden), (before.sensor, 7));
+    assert_eq!((draft.source.sensor, draft.hidden), (before.source.sensor, 7));
     assert_eq!(
-        (draft.scene.rows, draft.scene.movement),
+        (draft.source.scene.rows, draft.source.scene.movement),
         (Rows::Known, Movement::SIDEWAYS)
     );
 
@@ -233,8 +234,8 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
     driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     let noisy = Preset::Best.settings_in(Noise::relative(0.001));
-    assert_ne!(noisy.samples, best.samples);
-    assert_eq!(driver.state().draft.samples, noisy.samples);
+    assert_ne!(noisy.samples, best.source.samples);
+    assert_eq!(driver.state().draft.source.samples, noisy.samples);
     let StoppingRules { epochs, .. } = driver.state().draft.training.stopping;
     assert_eq!(epochs, noisy.training.stopping.epochs);
     driver.enter("Relative noise", "0");
@@ -243,7 +244,7 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
     // Who has samples of their own keeps them.
     driver.enter("Training samples", "300");
     driver.enter("Relative noise", "0.1");
-    assert_eq!(driver.state().draft.samples, 300);
+    assert_eq!(driver.state().draft.source.samples, 300);
     driver.enter("Relative noise", "0");
     driver.click_button("Paper");
     assert_eq!(driver.state().draft, before);
@@ -259,8 +260,8 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
         let text = texts.iter().find(|text| text.starts_with("Condition number"));
         text.unwrap().clone()
     };
-    let of = |settings: &RunSettings| {
-        let outlook = Outlook::of(settings).unwrap();
+    let of = |settings: &SimulatedSettings| {
+        let outlook = Outlook::of(&settings.source).unwrap();
         let number = format_number(outlook.worst_row.condition());
         format!("Condition number {number}")
     };
@@ -307,7 +308,10 @@ fn files_written_before_there_were_scenes_still_open() {
     driver.wait("the training", |driver| driver.state().run.is_some());
     driver.wait("its result", |driver| driver.state().result().is_some());
     let draft = driver.state().draft;
-    assert_eq!((draft.scene, draft.inputs), (Scene::default(), InputChoice::PAPER));
+    assert_eq!(
+        (draft.source.scene, draft.inputs),
+        (Scene::default(), InputChoice::PAPER)
+    );
     assert!(matches!(driver.state().phase, Phase::Paused | Phase::Ended(_)));
     assert!(driver.has("Decoupled surface"));
 

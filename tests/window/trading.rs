@@ -127,7 +127,7 @@ fn a_click_on_a_point_loads_its_configuration() {
     let ridge = plan.settings(Preset::Best, 0.0);
     let draft = driver.state().draft;
     assert_eq!(
-        (draft.scene, draft.inputs, draft.samples),
+        (draft.source.scene, draft.inputs, draft.source.samples),
         (ridge.scene, ridge.inputs, ridge.samples)
     );
     driver.click_button("Trade-off");

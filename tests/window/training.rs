@@ -4,7 +4,7 @@ use std::{thread, time::Duration};
 
 use decoupler::{
     app::{Phase, surface_view::ViewMode},
-    evaluation::{Run, RunSettings},
+    evaluation::{Run, SimulatedSettings},
     training::{Method, MomentumSettings, StopReason},
 };
 use eframe::egui::{Key, Modifiers};
@@ -117,7 +117,7 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
 }
 
 /// A training that goes on for as long as one looks.
-fn endless() -> RunSettings {
+fn endless() -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = 1_000_000;

@@ -14,7 +14,7 @@ use super::{DecoderResult, DecodersState};
 use crate::{
     app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
     dataset::Dataset,
-    evaluation::{DecoderReport, DecoderSet, RunSettings},
+    evaluation::{DecoderReport, DecoderSet, SimulatedSettings},
     network::Networks,
 };
 
@@ -56,7 +56,7 @@ impl DecoderMeasuring {
     /// The system gives no thread.
     pub fn begin(
         &mut self,
-        settings: RunSettings,
+        settings: SimulatedSettings,
         networks: Networks,
         test: Arc<Dataset>,
         wake: Wake,
@@ -107,24 +107,28 @@ impl fmt::Debug for DecoderMeasuring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::Run;
+    use crate::evaluation::{Run, Simulation};
 
     #[test]
     fn decoders_that_cannot_be_measured_say_why_and_none_is_left_waiting() {
-        let mut settings = RunSettings {
+        let mut settings = SimulatedSettings {
             hidden: 2,
+            ..SimulatedSettings::default()
+        };
+        settings.source = Simulation {
             samples: 20,
             validation_samples: 0,
             test_samples: 4,
-            ..RunSettings::default()
+            ..settings.source
         };
-        settings.sensor.scale = "2x3_2x9".parse().unwrap();
+        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
         let run = Run::prepare(settings).unwrap();
         let (mut measuring, mut state) = (DecoderMeasuring::default(), DecodersState::default());
         let number = measuring.expect(&mut state);
         assert!(measuring.awaits(number) && state.is_measuring());
         let (waking, woken) = channel();
-        let impossible = RunSettings { samples: 0, ..settings };
+        let mut impossible = settings;
+        impossible.source.samples = 0;
         let wake = move || waking.send(()).unwrap_or(());
         measuring
             .begin(impossible, run.network(), Arc::clone(run.test()), Arc::new(wake))

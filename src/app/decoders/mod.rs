@@ -2,13 +2,11 @@
 //! user has unfolded their table, and shown as they come.
 
 mod measuring;
-mod names;
 mod state;
 mod table;
 
 pub use state::{DecoderResult, DecodersState};
 pub(super) use {
     measuring::DecoderMeasuring,
-    names::decoder_name,
     table::{REFERENCE, decoders_ui},
 };

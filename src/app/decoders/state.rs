@@ -1,4 +1,7 @@
-use crate::evaluation::{DecoderKind, DecoderReport, Precision};
+use crate::{
+    decoupling::{DecoderKind, Precision},
+    evaluation::DecoderReport,
+};
 
 /// The table of decoders.
 #[derive(Debug, Default)]
@@ -24,8 +27,7 @@ impl DecoderResult {
     /// All decoders, none measured yet.
     pub fn pending() -> Vec<Self> {
         let of_kind = |kind: DecoderKind| {
-            let single = (kind == DecoderKind::Network).then_some(Precision::Single);
-            let precisions = std::iter::once(Precision::Double).chain(single);
+            let precisions = kind.precisions().iter().copied();
             precisions.map(move |precision| Self {
                 kind,
                 precision,

@@ -1,6 +1,6 @@
 use eframe::egui::{CollapsingHeader, Ui};
 
-use super::{DecoderResult, decoder_name};
+use super::DecoderResult;
 use crate::{
     app::{
         action::Action,
@@ -8,7 +8,8 @@ use crate::{
         state::{Phase, State},
         theme::{Theme, dim_ui, note_ui, space},
     },
-    evaluation::{DecoderKind, DecoderReport, Errors},
+    decoupling::DecoderKind,
+    evaluation::{DecoderReport, Errors},
     export::format_number,
 };
 
@@ -67,8 +68,8 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
         .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
         .collect();
     let rows = measured.iter().map(|result| Row {
-        name: decoder_name(result.kind, result.precision),
-        meaning: meaning(result.kind),
+        name: result.kind.name(result.precision),
+        meaning: result.kind.meaning(),
         cells: match &result.report {
             None => vec!["…".to_owned(); columns.len()],
             Some(Err(_)) => vec![format_number(None); columns.len()],
@@ -92,7 +93,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
         if let Some(Err(reason)) = &result.report {
-            let name = decoder_name(result.kind, result.precision);
+            let name = result.kind.name(result.precision);
             note_ui(ui, &format!("{name}: {reason}"));
         }
     }
@@ -108,22 +109,9 @@ fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
     let figures = [Some(report.errors.z_percent)].into_iter().chain([
         ratio,
         Some(Some(report.residual)),
-        Some(Some(report.frame_us)),
+        Some(Some(report.cost.frame_us)),
     ]);
     figures.flatten().map(format_number).collect()
-}
-
-fn meaning(kind: DecoderKind) -> &'static str {
-    match kind {
-        DecoderKind::Mean => "Always the mean of the training set",
-        DecoderKind::Ridge => "The best affine map of the inputs chosen on the left, ridge-regularised",
-        DecoderKind::Network => "The trained network, computed with so many bits",
-        DecoderKind::RadialBasis => "A radial-basis network: Gaussians around centres among the training samples",
-        DecoderKind::Newton => {
-            "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior"
-        }
-        DecoderKind::Polish => "The network's answer, improved by at most three of Newton's steps",
-    }
 }
 
 #[cfg(test)]

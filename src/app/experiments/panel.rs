@@ -188,9 +188,9 @@ fn base_ui(ui: &mut Ui, form: &mut Form, state: &State) {
     let base = &form.template.base;
     let text = format!(
         "{}, {} hidden nodes, {} samples, {}, where no axis says otherwise",
-        base.sensor.scale,
+        base.source.sensor.scale,
         base.hidden,
-        base.samples,
+        base.source.samples,
         base.training.method.name()
     );
     dim_ui(ui, &text);

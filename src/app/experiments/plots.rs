@@ -31,7 +31,7 @@ pub fn hidden_nodes_ui(ui: &mut Ui, outcome: &Outcome) {
     ];
     keys_ui(ui, &keys);
     let points = z_points(&outcome.results, &outcome.summaries);
-    let scale = outcome.results.experiment.base.sensor.scale;
+    let scale = outcome.results.experiment.base.source.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let (fewest, most) = (
         *suggested.square_root.start() as f64,

@@ -7,7 +7,7 @@ use std::{
 use super::{ExperimentFile, Form, worker::RunNumber};
 use crate::{
     evaluation::{
-        RunSettings,
+        SimulatedSettings,
         experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
     },
     export::ExperimentTable,
@@ -296,8 +296,8 @@ impl ExperimentsState {
 }
 
 /// About how much memory the finished training of a trial takes.
-fn bytes_of(trial: &Trial, settings: &RunSettings) -> usize {
-    let scale = settings.sensor.scale;
+fn bytes_of(trial: &Trial, settings: &SimulatedSettings) -> usize {
+    let scale = settings.source.sensor.scale;
     let weights = settings.hidden * (scale.columns() + 1) + (settings.hidden + 1) * scale.coordinates_per_row();
     // The present and the best weights, and up to as many numbers of the method's own.
     let of_start = 4 * weights * size_of::<f64>();

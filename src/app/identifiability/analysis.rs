@@ -5,8 +5,8 @@ use thiserror::Error;
 
 use crate::{
     app::test_view::Frame,
-    evaluation::RunSettings,
-    scene::{Noise, Scene, SceneError},
+    evaluation::SimulatedSettings,
+    scene::{Noise, RowModel, Scene, SceneError},
     sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair, SensorError, SensorModel},
     surface::{SurfaceError, SurfaceMap},
 };
@@ -24,11 +24,11 @@ pub struct Question {
 
 impl Question {
     /// Sensor and scene of a training, pressed half as far as the scene presses.
-    pub fn of(settings: &RunSettings) -> Self {
+    pub fn of(settings: &SimulatedSettings) -> Self {
         Self {
-            sensor: settings.sensor,
-            scene: settings.scene,
-            compression: 0.5 * settings.scene.largest_compression,
+            sensor: settings.source.sensor,
+            scene: settings.source.scene,
+            compression: 0.5 * settings.source.scene.largest_compression,
         }
     }
 }
@@ -104,10 +104,10 @@ impl Analysis {
         let smallest = |seen: &Identifiability| seen.singular_values_per_mm.last().copied().unwrap_or(0.0);
         let worst = (0..rows.len()).min_by(|&a, &b| smallest(&rows[a]).total_cmp(&smallest(&rows[b])));
         let worst = worst.unwrap_or(0);
-        let is_paired = !scene.rows.are_known();
-        let alike = is_paired
-            .then(|| Identifiability::most_alike_rows(sensor))
-            .transpose()?;
+        let alike = match scene.rows.model() {
+            RowModel::Shared => Some(Identifiability::most_alike_rows(sensor)?),
+            RowModel::Each => None,
+        };
         let noise = relative_noise(sensor, scene.noise, &rows[worst], &displacements_mm)?;
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         let surface = match last {
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn the_worst_row_is_the_one_that_sees_least_and_each_node_has_its_value() {
-        let question = Question::of(&RunSettings::default());
+        let question = Question::of(&SimulatedSettings::default());
         let found = analysis(&question);
         assert_eq!((found.rows.len(), found.patterns.len()), (10, 1));
         for row in 0..10 {
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn neighbours_point_the_same_way() {
-        let found = analysis(&Question::of(&RunSettings::default()));
+        let found = analysis(&Question::of(&SimulatedSettings::default()));
         let nodes = &found.patterns[0].nodes_mm;
         for row in 1..10 {
             let along: f64 = (0..10)
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn every_source_of_noise_counts() {
-        let mut question = Question::of(&RunSettings::default());
+        let mut question = Question::of(&SimulatedSettings::default());
         question.scene.noise = Noise {
             relative: 3e-3,
             drift: 4e-3,
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_layout_is_told_unless_the_row_is_known() {
-        let mut question = Question::of(&RunSettings::default());
+        let mut question = Question::of(&SimulatedSettings::default());
         question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
         question.sensor.geometry.column_node_x0_mm = 7.5;
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn each_axis_that_moves_has_its_pictures_and_impossible_questions_their_reason() {
-        let mut question = Question::of(&RunSettings::default());
+        let mut question = Question::of(&SimulatedSettings::default());
         question.scene.movement = Movement::SIDEWAYS;
         let found = analysis(&question);
         assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));

@@ -10,7 +10,7 @@ use crate::{
         state::State,
         theme::{dim_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style, space},
     },
-    scene::{Movement, Rows},
+    scene::{Movement, RowModel, Rows},
     sensor::{ArrayScale, LARGEST_COUNT},
 };
 
@@ -95,9 +95,12 @@ fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 
 fn scene_ui(ui: &mut Ui, question: &mut Question) {
     let scene = &mut question.scene;
-    let known = [(false, "Row unknown"), (true, "Row known")];
-    if let Some(is_known) = segmented_ui(ui, "Whether the row is known", &known, scene.rows.are_known(), true) {
-        scene.rows = if is_known { Rows::Known } else { Rows::All };
+    let known = [(RowModel::Shared, "Row unknown"), (RowModel::Each, "Row known")];
+    if let Some(model) = segmented_ui(ui, "Whether the row is known", &known, scene.rows.model(), true) {
+        scene.rows = match model {
+            RowModel::Shared => Rows::All,
+            RowModel::Each => Rows::Known,
+        };
     }
     let is_sideways = scene.movement != Movement::Z;
     let movements = [(false, "Nodes move in z"), (true, "In x, y and z")];
@@ -138,7 +141,7 @@ fn add_slider(ui: &mut Ui, name: &str, present: f64, slider: Slider<'_>) {
 
 fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
     let question = &state.identifiability.question;
-    let can_use = !state.phase.is_busy() && question.sensor != state.draft.sensor;
+    let can_use = !state.phase.is_busy() && question.sensor != state.draft.source.sensor;
     let why_not = if state.phase.is_busy() {
         "A training is under way there: its settings cannot change now"
     } else {

@@ -1,6 +1,6 @@
 use super::{Analysis, Question};
 use crate::{
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     scene::Scene,
     sensor::{Axes, SensorModel},
 };
@@ -24,7 +24,7 @@ pub struct IdentifiabilityState {
 
 impl IdentifiabilityState {
     /// The question of these settings, not yet asked.
-    pub fn new(settings: &RunSettings) -> Self {
+    pub fn new(settings: &SimulatedSettings) -> Self {
         Self {
             question: Question::of(settings),
             analysis: None,
@@ -37,8 +37,8 @@ impl IdentifiabilityState {
 
     /// Asks about these settings, unless they are as they were when last taken: then what was changed here stays.
     /// Returns whether the question is a new one.
-    pub fn follow(&mut self, settings: &RunSettings) -> bool {
-        let present = (settings.sensor, settings.scene);
+    pub fn follow(&mut self, settings: &SimulatedSettings) -> bool {
+        let present = (settings.source.sensor, settings.source.scene);
         if self.followed.replace(present) == Some(present) {
             return false;
         }
@@ -47,16 +47,18 @@ impl IdentifiabilityState {
     }
 
     /// Asks about these settings, whatever was changed here.
-    pub fn take(&mut self, settings: &RunSettings) {
-        self.followed = Some((settings.sensor, settings.scene));
+    pub fn take(&mut self, settings: &SimulatedSettings) {
+        self.followed = Some((settings.source.sensor, settings.source.scene));
         self.question = Question::of(settings);
     }
 
     /// These settings with the sensor looked at; what was tried here stays when they come back.
-    pub fn hand_over(&mut self, settings: &RunSettings) -> RunSettings {
+    pub fn hand_over(&mut self, settings: &SimulatedSettings) -> SimulatedSettings {
         let sensor = self.question.sensor;
-        self.followed = Some((sensor, settings.scene));
-        RunSettings { sensor, ..*settings }
+        self.followed = Some((sensor, settings.source.scene));
+        let mut settings = *settings;
+        settings.source.sensor = sensor;
+        settings
     }
 
     /// The place of [`Self::axis`] among the axes that move; z where that axis rests.
@@ -73,20 +75,20 @@ mod tests {
 
     #[test]
     fn what_is_tried_here_stays_until_the_settings_change() {
-        let mut settings = RunSettings::default();
+        let mut settings = SimulatedSettings::default();
         let mut state = IdentifiabilityState::new(&settings);
         assert!(state.follow(&settings));
         state.question.sensor.geometry.height_mm = 7.0;
         assert!(!state.follow(&settings));
         assert_eq!(state.question.sensor.geometry.height_mm, 7.0);
-        settings.scene.largest_compression = 0.4;
+        settings.source.scene.largest_compression = 0.4;
         assert!(state.follow(&settings));
         assert_eq!(state.question, Question::of(&settings));
     }
 
     #[test]
     fn an_axis_at_rest_gives_way_to_z() {
-        let mut state = IdentifiabilityState::new(&RunSettings::default());
+        let mut state = IdentifiabilityState::new(&SimulatedSettings::default());
         state.axis = 0;
         assert_eq!((state.place_of_axis(Axes::Z), state.place_of_axis(Axes::Xyz)), (0, 0));
         state.axis = 2;

@@ -138,12 +138,12 @@ fn answer_all(incoming: &Receiver<(u64, Question)>, newest: &AtomicU64, report: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::RunSettings;
+    use crate::evaluation::SimulatedSettings;
 
     #[test]
     fn the_last_answer_is_to_the_newest_question() {
         let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
-        let mut question = Question::of(&RunSettings::default());
+        let mut question = Question::of(&SimulatedSettings::default());
         for step in 1..=40 {
             question.sensor.geometry.height_mm = 0.1 * f64::from(step);
             worker.ask(question).unwrap();
@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn an_impossible_question_is_answered_with_its_reason() {
         let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
-        let mut question = Question::of(&RunSettings::default());
+        let mut question = Question::of(&SimulatedSettings::default());
         question.sensor.geometry.row_pitch_mm = 0.0;
         worker.ask(question).unwrap();
         let answer = loop {

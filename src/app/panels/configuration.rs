@@ -14,7 +14,7 @@ use crate::{
         state::{Phase, State},
         theme::{Theme, ghost_button, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{MOST_STARTS, Outlook, RunSettings},
+    evaluation::{MOST_STARTS, Outlook, SimulatedSettings},
     training::{Method, StoppingRules},
 };
 
@@ -31,10 +31,10 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);
-            let noise = draft.scene.noise;
+            let noise = draft.source.scene.noise;
             scene_section_ui(ui, &mut draft, outlook(state));
             // How many samples are best depends on whether there is noise.
-            if let Some(preset) = followed.filter(|_| draft.scene.noise != noise) {
+            if let Some(preset) = followed.filter(|_| draft.source.scene.noise != noise) {
                 draft = applied(preset, &draft);
             }
             samples_section_ui(ui, &mut draft);
@@ -46,13 +46,13 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             ui.add_space(space(4));
-            let is_default = draft == RunSettings::default();
+            let is_default = draft == SimulatedSettings::default();
             let reset = ui.add_enabled(!is_default, eframe::egui::Button::new("Back to the paper's settings"));
             if reset
                 .on_hover_text("10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples")
                 .clicked()
             {
-                draft = RunSettings::default();
+                draft = SimulatedSettings::default();
             }
             ui.add_space(space(4));
         });
@@ -70,7 +70,8 @@ fn outlook(state: &State) -> Option<&Outlook> {
         (None, Some(run)) => (&run.settings, &run.test),
         (None, None) => return None,
     };
-    let is_same = (settings.sensor, settings.scene) == (state.draft.sensor, state.draft.scene);
+    let is_same =
+        (settings.source.sensor, settings.source.scene) == (state.draft.source.sensor, state.draft.source.scene);
     test.outlook.as_ref().filter(|_| is_same)
 }
 
@@ -92,7 +93,7 @@ fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
     });
 }
 
-fn training_section_ui(ui: &mut Ui, draft: &mut RunSettings, is_new: bool) {
+fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
     section_heading_ui(ui, "Training");
     let hint = "Trainings from different random weights, side by side; the best by validation error is kept. One run of \
                 a random start proves little: several show how the results spread. Seeds are derived. Default 1.";

@@ -3,18 +3,18 @@ use eframe::egui::{RichText, Slider, Stroke, Ui};
 use super::fields::{capitalised, count_ui, list_ui, options_ui};
 use crate::{
     app::theme::{Theme, section_heading_ui, slider_style, space, type_size},
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     network::{HiddenSuggestions, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     scene::{Movement, Rows},
 };
 
 /// What the network is given, and how large it is; changes `draft`.
-pub fn network_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Network");
     inputs_ui(ui, draft);
     let hint = "Nodes of the tanh layer between resistances and coordinates.";
     count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
-    let scale = draft.sensor.scale;
+    let scale = draft.source.sensor.scale;
     let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
     hidden_slider_ui(ui, &mut draft.hidden, [suggestions.logarithm, low, high]);
@@ -29,7 +29,7 @@ pub fn network_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     weights_ui(ui, draft);
 }
 
-fn inputs_ui(ui: &mut Ui, draft: &mut RunSettings) {
+fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let options = [
         (Quantity::Resistance, "Resistance", "R: the paper."),
         (
@@ -67,10 +67,10 @@ fn inputs_ui(ui: &mut Ui, draft: &mut RunSettings) {
 }
 
 /// How large the networks are.
-fn weights_ui(ui: &mut Ui, draft: &RunSettings) {
-    let Ok(size) = draft.model_size() else { return };
-    let scale = draft.sensor.scale;
-    let varying_axes = match (draft.scene.movement, draft.scene.rows) {
+fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+    let Ok(size) = draft.source.model_size() else { return };
+    let scale = draft.source.sensor.scale;
+    let varying_axes = match (draft.source.scene.movement, draft.source.scene.rows) {
         (Movement::Xyz { .. }, _) => 3,
         // Without knowing the row a network must find its x, which differs from row to row; y never does.
         (Movement::Z, Rows::All) if scale.rows() > 1 => 2,

@@ -2,12 +2,12 @@ use eframe::egui::Ui;
 
 use crate::{
     app::theme::{explained_options_ui, section_heading_ui},
-    evaluation::{Preset, RunSettings},
+    evaluation::{Preset, SimulatedSettings, Simulation},
     scene::Scene,
 };
 
 /// Where the settings of a network begin; changes `draft`.
-pub fn preset_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Preset");
     let options = [
         (
@@ -31,21 +31,24 @@ pub fn preset_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
 }
 
 /// The preset that `draft` follows, if any.
-pub fn present(draft: &RunSettings) -> Option<Preset> {
+pub fn present(draft: &SimulatedSettings) -> Option<Preset> {
     Preset::ALL.into_iter().find(|&preset| applied(preset, draft) == *draft)
 }
 
 /// `draft` with what `preset` decides: how readings are decoded and trained on, not what happens to the sensor.
-pub fn applied(preset: Preset, draft: &RunSettings) -> RunSettings {
-    let settings = preset.settings_in(draft.scene.noise);
-    RunSettings {
-        sensor: draft.sensor,
-        scene: Scene {
-            rows: settings.scene.rows,
-            ..draft.scene
+pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
+    let settings = preset.settings_in(draft.source.scene.noise);
+    SimulatedSettings {
+        source: Simulation {
+            sensor: draft.source.sensor,
+            scene: Scene {
+                rows: settings.source.scene.rows,
+                ..draft.source.scene
+            },
+            test_samples: draft.source.test_samples,
+            ..settings.source
         },
         hidden: draft.hidden,
-        test_samples: draft.test_samples,
         starts: draft.starts,
         seed: draft.seed,
         ..settings

@@ -15,7 +15,6 @@ use crate::{
         file_task::FileTask,
         shown_figure::ShownPicture,
         state::{Phase, RunResult, RunView, State},
-        test_view::TestView,
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
     evaluation::{ErrorRow, Errors, error_rows},
@@ -34,7 +33,7 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             error_table_ui(ui, &error_rows(&result.errors, &baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
             conditioning_ui(ui, &run.test);
-            worst_node_ui(ui, &run.test, result, &mut actions);
+            worst_node_ui(ui, result, &mut actions);
             decoders_ui(ui, state, baselines.reference.as_ref(), &mut actions);
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.starts);
@@ -202,7 +201,7 @@ fn dim_ui(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
-fn worst_node_ui(ui: &mut Ui, test: &TestView, result: &RunResult, actions: &mut Vec<Action>) {
+fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
     let worst = result.errors.worst_node;
     ui.add_space(space(1));
     ui.horizontal(|ui| {
@@ -212,7 +211,7 @@ fn worst_node_ui(ui: &mut Ui, test: &TestView, result: &RunResult, actions: &mut
             let place = format!(
                 "snapshot {}, row {}, node {}",
                 worst.snapshot + 1,
-                test.rows.get(worst.row).map_or(0, |row| row + 1),
+                worst.row + 1,
                 worst.node + 1
             );
             if ui

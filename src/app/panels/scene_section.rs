@@ -7,59 +7,71 @@ use super::{
 use crate::{
     app::theme::{dim_ui, note_ui, section_heading_ui, space},
     dataset::LARGEST_SAMPLES,
-    evaluation::{Outlook, RunSettings},
+    evaluation::{Outlook, SimulatedSettings},
     export::format_number,
     scene::{Indenter, IndenterShape, Loading, Movement, Rows},
 };
 
 /// What is read, what moves, how it is loaded and what disturbs it; changes `draft`. `outlook` is that of the scene, once
 /// it is known.
-pub fn scene_section_ui(ui: &mut Ui, draft: &mut RunSettings, outlook: Option<&Outlook>) {
+pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Option<&Outlook>) {
     section_heading_ui(ui, "Scene");
     rows_ui(ui, draft);
-    movement_ui(ui, &mut draft.scene.movement);
-    loading_ui(ui, &mut draft.scene.loading);
+    movement_ui(ui, &mut draft.source.scene.movement);
+    loading_ui(ui, &mut draft.source.scene.loading);
     let hint = "The most a node is pressed down, in percent of the height.";
     percent_ui(
         ui,
         "Largest compression",
         hint,
-        &mut draft.scene.largest_compression,
+        &mut draft.source.scene.largest_compression,
         0.001..=99.0,
     );
-    noise_ui(ui, &mut draft.scene.noise);
+    noise_ui(ui, &mut draft.source.scene.noise);
     size_ui(ui, draft);
     outlook_ui(ui, draft, outlook);
 }
 
 /// How many of what the scene describes; changes `draft`.
-pub fn samples_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Samples");
-    let rows = draft.model_size().map_or(1, |size| size.rows);
+    let rows = draft.source.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
         1 => "What the method fits.".to_owned(),
         _ => format!("What the method fits, of all rows together; whole snapshots of {rows} rows are drawn."),
     };
-    count_ui(ui, "Training samples", &hint, &mut draft.samples, 1..=LARGEST_SAMPLES);
+    count_ui(
+        ui,
+        "Training samples",
+        &hint,
+        &mut draft.source.samples,
+        1..=LARGEST_SAMPLES,
+    );
     let hint = "Drawn beside the training samples; they choose the best weights and stop the training. 0 for none.";
     count_ui(
         ui,
         "Validation samples",
         hint,
-        &mut draft.validation_samples,
+        &mut draft.source.validation_samples,
         0..=LARGEST_SAMPLES,
     );
     let hint = "Never trained on: all errors are measured here, and the snapshots shown are these.";
-    count_ui(ui, "Test samples", hint, &mut draft.test_samples, 1..=LARGEST_SAMPLES);
+    count_ui(
+        ui,
+        "Test samples",
+        hint,
+        &mut draft.source.test_samples,
+        1..=LARGEST_SAMPLES,
+    );
     let hint = "Everything random follows from it: the same seed gives the same network.";
     field_ui(ui, "Seed", hint, |ui| {
         ui.add_sized([space(16), space(6)], DragValue::new(&mut draft.seed.0).speed(0.1))
     });
 }
 
-fn rows_ui(ui: &mut Ui, draft: &mut RunSettings) {
-    let rows = &mut draft.scene.rows;
-    let last = draft.sensor.scale.rows() - 1;
+fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let rows = &mut draft.source.scene.rows;
+    let last = draft.source.sensor.scale.rows() - 1;
     let one = match *rows {
         // The array may have become smaller.
         Rows::One(row) => Rows::One(row.min(last)),
@@ -220,8 +232,8 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
 }
 
 /// What the scene came to.
-fn size_ui(ui: &mut Ui, draft: &RunSettings) {
-    let Ok(size) = draft.model_size() else { return };
+fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+    let Ok(size) = draft.source.model_size() else { return };
     let text = format!("{} unknowns, {} equations a frame", size.unknowns, size.equations);
     dim_ui(ui, &text).on_hover_text(
         "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance gives \
@@ -230,7 +242,7 @@ fn size_ui(ui: &mut Ui, draft: &RunSettings) {
 }
 
 /// How badly conditioned the scene is, and what stands in the way.
-fn outlook_ui(ui: &mut Ui, draft: &RunSettings, outlook: Option<&Outlook>) {
+fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
     let condition = outlook.map(|outlook| outlook.worst_row.condition());
     let text = match condition {
         Some(condition) if condition.is_infinite() => "Condition number infinite".to_owned(),
@@ -241,8 +253,8 @@ fn outlook_ui(ui: &mut Ui, draft: &RunSettings, outlook: Option<&Outlook>) {
          By up to so much an error of the readings grows.",
     );
     let Some(outlook) = outlook else { return };
-    let noise = draft.scene.noise.relative;
-    let sideways = draft.scene.movement != Movement::Z;
+    let noise = draft.source.scene.noise.relative;
+    let sideways = draft.source.scene.movement != Movement::Z;
     if outlook.warnings.is_empty() && sideways {
         note_ui(ui, &sideways_in_words(outlook, noise));
     }

@@ -3,20 +3,26 @@ use eframe::egui::{self, CollapsingHeader, RichText, TextEdit, Ui};
 use super::fields::quantity_ui;
 use crate::{
     app::theme::{Theme, note_ui, section_heading_ui, segmented_ui, space, type_size},
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     sensor::{ArrayScale, Geometry},
 };
 
 /// Array scale, geometry and resistivity; changes `draft`.
-pub fn sensor_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+pub fn sensor_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Sensor array");
     let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
     let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
-    if let Some(scale) = segmented_ui(ui, "Array scale of the paper", &options, draft.sensor.scale, true) {
-        draft.sensor.scale = scale;
+    if let Some(scale) = segmented_ui(
+        ui,
+        "Array scale of the paper",
+        &options,
+        draft.source.sensor.scale,
+        true,
+    ) {
+        draft.source.sensor.scale = scale;
     }
-    array_scale_ui(ui, &mut draft.sensor.scale);
-    let scale = draft.sensor.scale;
+    array_scale_ui(ui, &mut draft.source.sensor.scale);
+    let scale = draft.source.sensor.scale;
     let dim = Theme::of(ui).palette.dim;
     let text = format!(
         "{} row-wires of {} nodes over {} column-wires of {} nodes",
@@ -62,7 +68,7 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
     }
 }
 
-fn geometry_ui(ui: &mut Ui, draft: &mut RunSettings) {
+fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let Geometry {
         height_mm,
         row_x0_mm,
@@ -72,7 +78,7 @@ fn geometry_ui(ui: &mut Ui, draft: &mut RunSettings) {
         column_pitch_mm,
         column_node_x0_mm,
         column_node_pitch_mm,
-    } = &mut draft.sensor.geometry;
+    } = &mut draft.source.sensor.geometry;
     let lengths = [
         ("Height", "Row-wires above column-wires, undeformed.", height_mm),
         ("Row pitch", "Between row-wires (the paper's wire gap).", row_pitch_mm),
@@ -108,13 +114,13 @@ fn geometry_ui(ui: &mut Ui, draft: &mut RunSettings) {
         ui,
         "Resistivity",
         hint,
-        &mut draft.sensor.resistivity_ohm_per_mm,
+        &mut draft.source.sensor.resistivity_ohm_per_mm,
         1e-12..=1e12,
         "Ω/mm",
     );
     let dim = Theme::of(ui).palette.dim;
     ui.label(RichText::new(Geometry::ASSUMPTION).size(type_size().note).color(dim));
-    if draft.sensor.geometry != Geometry::default() && ui.button("Back to the assumed geometry").clicked() {
-        draft.sensor.geometry = Geometry::default();
+    if draft.source.sensor.geometry != Geometry::default() && ui.button("Back to the assumed geometry").clicked() {
+        draft.source.sensor.geometry = Geometry::default();
     }
 }

@@ -37,7 +37,7 @@ pub fn top_bar_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                 View::Train => {
                     run_buttons_ui(ui, state, &mut actions);
                     ui.add_space(space(4));
-                    let snapshots = state.test().map_or(0, |test| test.set.snapshots());
+                    let snapshots = state.test().map_or(0, |test| test.snapshots.len());
                     actions.extend(snapshot_ui(ui, state.look.snapshot, snapshots).map(Action::ShowSnapshot));
                 }
                 View::Experiments | View::Identifiability | View::TradeOff => {}

@@ -43,11 +43,11 @@ const FIGURES: [(&str, FigureOf); 18] = [
     ("training mean, Z %", |run| {
         format_number(run.file.baselines.mean.z_percent)
     }),
-    ("array", |run| run.file.settings.sensor.scale.to_string()),
-    ("rows", |run| rows_words(run.file.settings.scene.rows)),
-    ("axes", |run| movement_words(run.file.settings.scene.movement)),
-    ("loading", |run| loading_words(&run.file.settings.scene)),
-    ("noise", |run| noise_words(&run.file.settings.scene.noise)),
+    ("array", |run| run.file.settings.source.sensor.scale.to_string()),
+    ("rows", |run| rows_words(run.file.settings.source.scene.rows)),
+    ("axes", |run| movement_words(run.file.settings.source.scene.movement)),
+    ("loading", |run| loading_words(&run.file.settings.source.scene)),
+    ("noise", |run| noise_words(&run.file.settings.source.scene.noise)),
     ("inputs", |run| inputs_words(run.file.settings.inputs)),
     ("hidden nodes", |run| run.file.settings.hidden.to_string()),
     ("method", |run| {

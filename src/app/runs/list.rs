@@ -9,7 +9,7 @@ use crate::{
         state::State,
         theme::{Theme, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
 };
 
@@ -119,17 +119,17 @@ fn name_ui(ui: &mut Ui, run: &KeptRun, actions: &mut Vec<RunsAction>) {
 }
 
 /// What the run was made with.
-fn conditions(settings: &RunSettings) -> String {
+fn conditions(settings: &SimulatedSettings) -> String {
     let starts = match settings.starts {
         1 => String::new(),
         starts => format!(", {starts} starts"),
     };
     let mut text = format!(
         "{}, {} hidden, {}, {} samples, seed {}{starts}",
-        settings.sensor.scale,
+        settings.source.sensor.scale,
         settings.hidden,
         settings.training.method.short_name(),
-        settings.samples,
+        settings.source.samples,
         settings.seed
     );
     for words in unlike_paper(settings) {

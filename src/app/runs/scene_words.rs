@@ -2,15 +2,15 @@
 
 use crate::{
     app::panels::fields::input_text,
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
 };
 
 /// What a run differs in from the paper's scene and inputs; empty if in nothing.
-pub fn unlike_paper(settings: &RunSettings) -> Vec<String> {
-    let paper = RunSettings::default();
-    let (scene, of_paper) = (&settings.scene, &paper.scene);
+pub fn unlike_paper(settings: &SimulatedSettings) -> Vec<String> {
+    let paper = SimulatedSettings::default();
+    let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);
     let words = [
         (scene.rows != of_paper.rows).then(|| rows_words(scene.rows)),
         (scene.movement != of_paper.movement).then(|| movement_words(scene.movement)),
@@ -69,6 +69,7 @@ pub fn inputs_words(inputs: InputChoice) -> String {
         Quantity::Resistance => "resistance",
         Quantity::Conductance => "conductance",
         Quantity::LogResistance => "log-resistance",
+        Quantity::Raw => "readings",
     };
     match inputs.scaling {
         ScalingChoice::MinMax => quantity.to_owned(),
@@ -83,7 +84,7 @@ mod tests {
 
     #[test]
     fn what_differs_from_the_paper_is_said_and_nothing_else() {
-        assert!(unlike_paper(&RunSettings::default()).is_empty());
+        assert!(unlike_paper(&SimulatedSettings::default()).is_empty());
         let mut best = Preset::Best.settings_in(Noise {
             relative: 1e-3,
             converter_bits: Some(12),
@@ -92,9 +93,9 @@ mod tests {
         });
         let words = ["known rows", "noise 0.001, 12 bits, in test", "conductance, whitened"];
         assert_eq!(unlike_paper(&best), words);
-        best = RunSettings::default();
-        best.scene.rows = Rows::One(2);
-        best.scene.loading = Loading::Indenter(Indenter::all()[1]);
+        best = SimulatedSettings::default();
+        best.source.scene.rows = Rows::One(2);
+        best.source.scene.loading = Loading::Indenter(Indenter::all()[1]);
         assert_eq!(unlike_paper(&best), ["row 3 alone", "flat punch"]);
     }
 }

@@ -7,7 +7,7 @@ use crate::{
         state::{RightCard, error_frame},
         test_view::{Frame, TestView},
     },
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     export::{KeptRun, NetworkFile, Workspace},
 };
 
@@ -49,9 +49,9 @@ pub struct Compared {
 impl Compared {
     /// Makes the frames of `snapshot`, or of the last one if there are fewer.
     pub fn show(&mut self, snapshot: usize) {
-        let snapshot = snapshot.min(self.test.set.snapshots().saturating_sub(1));
-        let actual = self.test.frame(&self.test.set.coordinates_mm, snapshot);
-        let decoupled = self.test.frame(&self.decoupled_mm, snapshot);
+        let snapshot = self.test.nearest_snapshot(snapshot);
+        let actual = self.test.frame(self.test.set.targets(), snapshot);
+        let decoupled = self.test.frame(self.decoupled_mm.view(), snapshot);
         let error = error_frame(&actual, &decoupled);
         self.frames = [actual, decoupled, error];
     }
@@ -79,9 +79,9 @@ impl RunsState {
     }
 
     /// Array, hidden nodes and method; numbered if there is such a name.
-    fn new_name(&self, settings: &RunSettings) -> String {
+    fn new_name(&self, settings: &SimulatedSettings) -> String {
         let method = settings.training.method.short_name();
-        let name = format!("{} h{} {method}", settings.sensor.scale, settings.hidden);
+        let name = format!("{} h{} {method}", settings.source.sensor.scale, settings.hidden);
         let is_taken = |name: &str| self.workspace.runs.iter().any(|run| run.name == name);
         let numbered = (2..).map(|number| format!("{name} ({number})"));
         let mut names = std::iter::once(name.clone()).chain(numbered);
@@ -92,7 +92,7 @@ impl RunsState {
     pub fn snapshots(&self) -> usize {
         let compared = self.compared.iter().flatten();
         compared
-            .map(|compared| compared.test.set.snapshots())
+            .map(|compared| compared.test.snapshots.len())
             .max()
             .unwrap_or(0)
     }

@@ -195,7 +195,7 @@ fn lock(path: &Path) -> Result<File, String> {
 
 fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {
     let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
-    let decoupled_mm = file.network.decouple(test.set.resistances_ohm.view());
+    let decoupled_mm = file.network.decouple(&test.set);
     let mut compared = Compared {
         id,
         test,

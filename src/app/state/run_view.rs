@@ -3,7 +3,7 @@ use crate::{
         test_view::TestView,
         worker::{Began, Progress, RunResult},
     },
-    evaluation::{Baselines, PublishedErrors, RunSettings, StartRecord},
+    evaluation::{Baselines, PublishedErrors, SimulatedSettings, StartRecord},
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -11,10 +11,10 @@ use crate::{
 #[derive(Debug)]
 pub struct RunView {
     /// What it is trained with.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
     /// for from where it stood.
-    pub asked: RunSettings,
+    pub asked: SimulatedSettings,
     /// Weights and biases of the network.
     pub weights: usize,
     /// Its test set.

@@ -13,7 +13,7 @@ use crate::{
         test_view::TestView,
         trade::TradeState,
     },
-    evaluation::{Baselines, RunSettings, node_rms_mm},
+    evaluation::{Baselines, SimulatedSettings, node_rms_mm},
     training::StopReason,
 };
 
@@ -31,7 +31,7 @@ pub struct State {
     /// The Trade-off view.
     pub trade: TradeState,
     /// Settings of the next training.
-    pub draft: RunSettings,
+    pub draft: SimulatedSettings,
     /// What the worker is doing.
     pub phase: Phase,
     /// What is known about the draft before it is trained.
@@ -96,7 +96,7 @@ impl Phase {
 #[derive(Debug)]
 pub struct Preview {
     /// The settings.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// Their test set.
     pub test: TestView,
     /// What will stand beside the network, once it is measured.
@@ -128,9 +128,9 @@ impl State {
             view: View::default(),
             experiments: ExperimentsState::new(),
             runs: RunsState::default(),
-            identifiability: IdentifiabilityState::new(&RunSettings::default()),
+            identifiability: IdentifiabilityState::new(&SimulatedSettings::default()),
             trade: TradeState::default(),
-            draft: RunSettings::default(),
+            draft: SimulatedSettings::default(),
             phase: Phase::Idle,
             preview: None,
             run: None,
@@ -184,7 +184,7 @@ impl State {
             Phase::Ended(reason) => reason != StopReason::Diverged,
             _ => false,
         };
-        let fixed = RunSettings {
+        let fixed = SimulatedSettings {
             training: run.asked.training,
             ..self.draft
         };
@@ -199,9 +199,11 @@ impl State {
     /// Makes the frames of the snapshot on show.
     pub fn refresh_frames(&mut self) {
         let Some(test) = self.test().cloned() else { return };
-        let snapshot = self.look.snapshot.min(test.set.snapshots().saturating_sub(1));
-        let actual = test.frame(&test.set.coordinates_mm, snapshot);
-        let decoupled = self.result().map(|result| test.frame(&result.decoupled_mm, snapshot));
+        let snapshot = test.nearest_snapshot(self.look.snapshot);
+        let actual = test.frame(test.set.targets(), snapshot);
+        let decoupled = self
+            .result()
+            .map(|result| test.frame(result.decoupled_mm.view(), snapshot));
         let spread_mm = self
             .result()
             .filter(|_| self.look.has_error_bars)

@@ -16,11 +16,11 @@ use crate::{
             Key, Mark,
             plot_style::{log_marks, log_marks_across, log_text, plot},
         },
-        decoders::decoder_name,
         state::State,
         theme::{Palette, Theme, dim_ui, semibold, type_size},
     },
-    evaluation::{DecoderKind, Precision, Preset, TradeCost, TradeLevel, TradePoint},
+    decoupling::{ColourKey, DecoderKind, Precision},
+    evaluation::{Preset, TradeCost, TradeLevel, TradePoint},
 };
 
 /// Half the side of the square in which a point answers the pointer.
@@ -28,13 +28,14 @@ const REACH: f32 = 7.0;
 
 /// The colour of a decoder.
 pub fn colour(kind: DecoderKind, palette: &Palette) -> Color32 {
-    match kind {
-        DecoderKind::Mean => palette.dim,
-        DecoderKind::Ridge => palette.text,
-        DecoderKind::Network => palette.accent,
-        DecoderKind::RadialBasis => palette.test_series,
-        DecoderKind::Newton => palette.bad,
-        DecoderKind::Polish => palette.good,
+    match kind.colour() {
+        ColourKey::Grey => palette.dim,
+        ColourKey::Violet => palette.text,
+        ColourKey::Blue => palette.accent,
+        ColourKey::Orange => palette.test_series,
+        ColourKey::Red => palette.bad,
+        ColourKey::Green => palette.good,
+        ColourKey::Cyan => palette.warning,
     }
 }
 
@@ -44,13 +45,7 @@ pub fn keys(level: &TradeLevel, palette: &Palette) -> Vec<Key> {
     let key = |name, mark, colour| Key { name, mark, colour };
     let kinds = DecoderKind::ALL.into_iter().filter(is_there);
     let mut keys: Vec<Key> = kinds
-        .map(|kind| {
-            key(
-                decoder_name(kind, Precision::Double),
-                Mark::Discs,
-                colour(kind, palette),
-            )
-        })
+        .map(|kind| key(kind.name(Precision::Double), Mark::Discs, colour(kind, palette)))
         .collect();
     keys.push(key("no other is better", Mark::Line, palette.dim));
     if limit(level).is_some() {

@@ -76,7 +76,7 @@ fn answer_ui(
         "{}: {}, {}",
         point_name(point),
         format_percent(point.report.errors.z_percent),
-        frame_time(point.report.frame_us)
+        frame_time(point.report.cost.frame_us)
     );
     let accent = Theme::of(ui).palette.accent;
     let response = ui.selectable_label(
@@ -114,7 +114,7 @@ fn marked_ui(ui: &mut Ui, state: &State, marked: usize, point: &TradePoint, acti
         ui,
         &format!(
             "{} training samples, {} epochs at most.",
-            point.settings.samples, point.settings.training.stopping.epochs
+            point.settings.source.samples, point.settings.training.stopping.epochs
         ),
     );
 }

@@ -5,7 +5,8 @@ use thiserror::Error;
 use super::TradePlan;
 use crate::{
     dataset::LARGEST_SAMPLES,
-    evaluation::{DecoderKind, Preset, RunSettings},
+    decoupling::DecoderKind,
+    evaluation::{Preset, SimulatedSettings},
     network::LARGEST_HIDDEN,
     training::StoppingRules,
 };
@@ -116,7 +117,7 @@ impl TradeForm {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn plan(&self, base: &RunSettings) -> Result<TradePlan, TradeFormError> {
+    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
         let decoders: Vec<_> = chosen
             .filter(|(_, is_chosen)| *is_chosen)
@@ -193,19 +194,22 @@ mod tests {
 
     #[test]
     fn the_form_begins_with_a_quick_look_at_everything() {
-        let plan = TradeForm::default().plan(&RunSettings::default()).unwrap();
+        let plan = TradeForm::default().plan(&SimulatedSettings::default()).unwrap();
         // Four without a network, then two sizes with two precisions and polish.
         assert_eq!(plan.points(), 4 * 2 * (4 + 2 * 3));
         let best = plan.settings(Preset::Best, 1e-3);
-        assert_eq!((best.samples, best.training.stopping.epochs), (2000, 60));
-        assert_eq!((best.scene.rows, best.scene.noise.relative), (Rows::Known, 1e-3));
+        assert_eq!((best.source.samples, best.training.stopping.epochs), (2000, 60));
+        assert_eq!(
+            (best.source.scene.rows, best.source.scene.noise.relative),
+            (Rows::Known, 1e-3)
+        );
     }
 
     #[test]
     fn a_thorough_measurement_is_the_presets_own_in_the_scene_at_hand() {
-        let mut base = RunSettings::default();
-        base.scene.largest_compression = 0.1;
-        base.sensor.geometry.height_mm = 4.0;
+        let mut base = SimulatedSettings::default();
+        base.source.scene.largest_compression = 0.1;
+        base.source.sensor.geometry.height_mm = 4.0;
         let form = TradeForm {
             thoroughness: Thoroughness::Full,
             presets: WhichPresets::Only(Preset::Best),
@@ -213,14 +217,17 @@ mod tests {
         };
         let plan = form.plan(&base).unwrap();
         let (settings, preset) = (plan.settings(Preset::Best, 0.0), Preset::Best.settings());
-        assert_eq!((settings.samples, settings.training), (preset.samples, preset.training));
-        assert_eq!(settings.sensor, base.sensor);
-        assert_eq!(settings.scene.largest_compression, 0.1);
+        assert_eq!(
+            (settings.source.samples, settings.training),
+            (preset.source.samples, preset.training)
+        );
+        assert_eq!(settings.source.sensor, base.source.sensor);
+        assert_eq!(settings.source.scene.largest_compression, 0.1);
     }
 
     #[test]
     fn what_cannot_be_measured_says_why() {
-        let base = RunSettings::default();
+        let base = SimulatedSettings::default();
         let error = |form: TradeForm| form.plan(&base).unwrap_err().to_string();
         let with_noises = |text: &str| TradeForm {
             noises: text.to_owned(),

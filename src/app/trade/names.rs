@@ -3,14 +3,13 @@
 use std::time::Duration;
 
 use crate::{
-    app::decoders::decoder_name,
     evaluation::TradePoint,
     export::{format_duration, format_number, format_percent},
 };
 
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradePoint) -> String {
-    let mut name = decoder_name(point.report.kind, point.report.precision).to_owned();
+    let mut name = point.report.kind.name(point.report.precision).to_owned();
     name += &format!(", {} preset", point.preset);
     if let Some(hidden) = point.hidden() {
         name += &format!(", {hidden} hidden");
@@ -51,7 +50,7 @@ pub fn point_facts(point: &TradePoint) -> Vec<String> {
     if let Some(ratio) = point.to_reference() {
         facts.push(format!("{} times the limit of physics", format_number(ratio)));
     }
-    facts.push(format!("{} a frame", frame_time(point.report.frame_us)));
+    facts.push(format!("{} a frame", frame_time(point.report.cost.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));
     facts
 }

@@ -10,7 +10,7 @@ use crate::{
         Action,
         state::{Notice, State},
     },
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
 };
 
 /// Takes what the threads have to tell.
@@ -37,7 +37,7 @@ pub fn take_news(state: &mut State, worker: &TradeWorker) {
 }
 
 /// Does what the user meant; returns the settings of the next training, if they are to change.
-pub fn apply(action: TradeAction, state: &mut State, worker: &mut TradeWorker) -> Option<RunSettings> {
+pub fn apply(action: TradeAction, state: &mut State, worker: &mut TradeWorker) -> Option<SimulatedSettings> {
     let trade = &mut state.trade;
     match action {
         TradeAction::Edit(form) => trade.form = *form,
@@ -67,7 +67,7 @@ pub fn apply(action: TradeAction, state: &mut State, worker: &mut TradeWorker) -
     None
 }
 
-fn settings_of(trade: &TradeState, point: usize) -> Option<RunSettings> {
+fn settings_of(trade: &TradeState, point: usize) -> Option<SimulatedSettings> {
     Some(trade.shown()?.points.get(point)?.settings)
 }
 

@@ -8,7 +8,6 @@ use super::{
 use crate::{
     app::{
         Action,
-        decoders::decoder_name,
         panels::fields::count_ui,
         state::State,
         theme::{
@@ -17,7 +16,8 @@ use crate::{
         },
     },
     dataset::LARGEST_SAMPLES,
-    evaluation::{DecoderKind, Precision, Preset},
+    decoupling::{DecoderKind, Precision},
+    evaluation::Preset,
     training::StoppingRules,
 };
 
@@ -30,7 +30,7 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         let draft = &state.draft;
         let text = format!(
             "{} in the scene of the Train view, seed {}.",
-            draft.sensor.scale, draft.seed
+            draft.source.sensor.scale, draft.seed
         );
         dim_ui(ui, &text);
         let mut form = trade.form.clone();
@@ -68,8 +68,8 @@ fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
     form.presets = segmented_ui(ui, "Presets", &presets, form.presets, true).unwrap_or(form.presets);
     section_heading_ui(ui, "Decoders");
     for (kind, is_chosen) in DecoderKind::ALL.into_iter().zip(&mut form.decoders) {
-        ui.checkbox(is_chosen, decoder_name(kind, Precision::Double))
-            .on_hover_text(meaning(kind));
+        ui.checkbox(is_chosen, kind.name(Precision::Double))
+            .on_hover_text(kind.meaning());
     }
     section_heading_ui(ui, "Training");
     let options = [
@@ -108,19 +108,6 @@ fn list_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
         .desired_width(f32::INFINITY)
         .margin(vec2(space(2), space(1)));
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
-}
-
-fn meaning(kind: DecoderKind) -> &'static str {
-    match kind {
-        DecoderKind::Mean => "Always answers the mean of the training set",
-        DecoderKind::Ridge => "The best affine map of the inputs, ridge-regularised",
-        DecoderKind::Network => "The trained network, in 64 and in 32 bits",
-        DecoderKind::RadialBasis => "Gaussians around centres, fitted by least squares",
-        DecoderKind::Newton => {
-            "Newton's method on the resistance model; with prior and noise where the scene has noise"
-        }
-        DecoderKind::Polish => "The network, then at most three of Newton's steps",
-    }
 }
 
 fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {

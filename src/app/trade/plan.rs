@@ -1,5 +1,6 @@
 use crate::{
-    evaluation::{DecoderKind, Precision, Preset, RunSettings},
+    decoupling::DecoderKind,
+    evaluation::{Preset, SimulatedSettings},
     scene::{Noise, Scene},
 };
 
@@ -7,7 +8,7 @@ use crate::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradePlan {
     /// Sensor, scene and seed.
-    pub base: RunSettings,
+    pub base: SimulatedSettings,
     /// Relative errors of a reading.
     pub noises: Vec<f64>,
     /// Where the settings of the networks begin.
@@ -25,23 +26,26 @@ pub struct TradePlan {
 impl TradePlan {
     /// The settings of a preset at a level of noise, in the sensor and the scene of [`Self::base`]. Which rows are read,
     /// and what networks are given of the readings, is the preset's.
-    pub fn settings(&self, preset: Preset, noise: f64) -> RunSettings {
+    pub fn settings(&self, preset: Preset, noise: f64) -> SimulatedSettings {
         let noise = Noise {
             relative: noise,
-            ..self.base.scene.noise
+            ..self.base.source.scene.noise
         };
         let mut settings = preset.settings_in(noise);
-        settings.sensor = self.base.sensor;
+        settings.source.sensor = self.base.source.sensor;
         settings.seed = self.base.seed;
-        settings.scene = Scene {
-            rows: settings.scene.rows,
+        settings.source.scene = Scene {
+            rows: settings.source.scene.rows,
             noise,
-            ..self.base.scene
+            ..self.base.source.scene
         };
-        settings.test_samples = self.test_samples;
+        settings.source.test_samples = self.test_samples;
         if let Some((samples, epochs)) = self.at_most {
-            settings.samples = settings.samples.min(samples);
-            settings.validation_samples = settings.validation_samples.min(settings.samples.div_ceil(5));
+            settings.source.samples = settings.source.samples.min(samples);
+            settings.source.validation_samples = settings
+                .source
+                .validation_samples
+                .min(settings.source.samples.div_ceil(5));
             settings.training.stopping.epochs = settings.training.stopping.epochs.min(epochs);
         }
         settings
@@ -49,10 +53,9 @@ impl TradePlan {
 
     /// How many points it has.
     pub fn points(&self) -> usize {
-        let of_decoder = |kind: &DecoderKind| match kind {
-            DecoderKind::Network => self.hidden.len() * [Precision::Double, Precision::Single].len(),
-            kind if kind.needs_network() => self.hidden.len(),
-            _ => 1,
+        let of_decoder = |kind: &DecoderKind| {
+            let networks = if kind.needs_network() { self.hidden.len() } else { 1 };
+            networks * kind.precisions().len()
         };
         let of_preset: usize = self.decoders.iter().map(of_decoder).sum();
         self.noises.len() * self.presets.len() * of_preset

@@ -1,7 +1,7 @@
 use std::time::{Duration, Instant};
 
 use super::{TradeForm, TradeFormError, TradePlan, worker::TradeNumber};
-use crate::evaluation::{RunSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
+use crate::evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
 
 /// Everything the Trade-off view reads.
 #[derive(Debug, Default)]
@@ -82,7 +82,7 @@ impl TradeState {
     ///
     /// # Errors
     /// What is wrong with the form.
-    pub fn plan(&self, base: &RunSettings) -> Result<TradePlan, TradeFormError> {
+    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
         self.form.plan(base)
     }
 

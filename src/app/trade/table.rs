@@ -46,7 +46,7 @@ impl Column {
         match self {
             Self::Error => format_number(point.report.errors.z_percent),
             Self::ToLimit => format_number(point.to_reference()),
-            Self::Frame => frame_time(point.report.frame_us),
+            Self::Frame => frame_time(point.report.cost.frame_us),
             Self::Training => training_time(point.training_seconds),
         }
     }
@@ -76,8 +76,9 @@ pub fn table_ui(ui: &mut Ui, state: &State, level: &TradeLevel) -> Vec<Action> {
     order.sort_by(|&a, &b| {
         level.points[a]
             .report
+            .cost
             .frame_us
-            .total_cmp(&level.points[b].report.frame_us)
+            .total_cmp(&level.points[b].report.cost.frame_us)
     });
     ui.spacing_mut().item_spacing.y = 0.0;
     // The strip of the scroll bar stays free.

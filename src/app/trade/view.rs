@@ -169,7 +169,7 @@ pub fn status_ui(ui: &mut Ui, trade: &TradeState) {
         ui.painter().circle_filled(dot.center(), 4.0, colour);
         ui.label(RichText::new(text).size(type_size().note));
         if let Some(outcome) = &trade.outcome {
-            let text = format!("{}, one thread, median of many", outcome.plan.base.sensor.scale);
+            let text = format!("{}, one thread, median of many", outcome.plan.base.source.sensor.scale);
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         }
     });

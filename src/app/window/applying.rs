@@ -10,7 +10,7 @@ use crate::{
         theme, trade,
         worker::{Request, Worker},
     },
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
     training::StopReason,
 };
 
@@ -59,8 +59,7 @@ impl DecouplerWindow {
             }
             Action::GoTo(address) => {
                 state.look.snapshot = address.snapshot;
-                let per_row = state.test().map_or(0, |test| test.sensor.scale.nodes_per_row());
-                state.look.node = Some(address.row * per_row + address.node);
+                state.look.node = state.test().and_then(|test| test.node(address));
                 state.refresh_frames();
             }
             Action::MoveCamera(camera) => state.look.camera = camera,
@@ -190,7 +189,7 @@ impl DecouplerWindow {
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
-    pub(super) fn configure(&mut self, draft: RunSettings) {
+    pub(super) fn configure(&mut self, draft: SimulatedSettings) {
         let before = self.state.draft;
         self.state.draft = draft;
         let run = self.state.run.as_ref();
@@ -218,13 +217,20 @@ impl DecouplerWindow {
 }
 
 /// Whether both draw the same test set.
-pub(super) fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
-    let test_set = |settings: &RunSettings| (settings.sensor, settings.scene, settings.test_samples, settings.seed);
+pub(super) fn have_same_test_set(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
+    let test_set = |settings: &SimulatedSettings| {
+        (
+            settings.source.sensor,
+            settings.source.scene,
+            settings.source.test_samples,
+            settings.seed,
+        )
+    };
     test_set(a) == test_set(b)
 }
 
 /// Whether both draw the same samples, trained on or not.
-pub(super) fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
-    let samples = |settings: &RunSettings| (settings.samples, settings.validation_samples);
+pub(super) fn have_same_sets(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
+    let samples = |settings: &SimulatedSettings| (settings.source.samples, settings.source.validation_samples);
     have_same_test_set(a, b) && samples(a) == samples(b)
 }

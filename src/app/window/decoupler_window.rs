@@ -175,8 +175,8 @@ mod tests {
         let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
         wait(&mut window, |state| state.test().is_some());
         let mut small = window.state.draft;
-        small.sensor.scale = "4x4_2x12".parse().unwrap();
-        (small.hidden, small.samples, small.training.stopping.epochs) = (3, 40, 5);
+        small.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (small.hidden, small.source.samples, small.training.stopping.epochs) = (3, 40, 5);
         window.apply(Action::Configure(Box::new(small)));
         window.apply(Action::Train);
         wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));

@@ -14,7 +14,7 @@ use crate::{
         trade,
         worker::Event,
     },
-    evaluation::RunSettings,
+    evaluation::SimulatedSettings,
 };
 
 impl DecouplerWindow {
@@ -100,7 +100,7 @@ impl DecouplerWindow {
             Event::Continued(Ok(settings)) => {
                 self.measuring.forget(&mut state.decoders);
                 if let Some(run) = &mut state.run {
-                    run.asked = RunSettings {
+                    run.asked = SimulatedSettings {
                         training: state.draft.training,
                         ..run.asked
                     };

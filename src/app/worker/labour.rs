@@ -15,7 +15,7 @@ use crate::{
         test_view::{TestView, TestViewError},
         threads::Report,
     },
-    evaluation::{Baselines, Run, RunSettings, network_frame_time},
+    evaluation::{Baselines, Run, SimulatedSettings, network_frame_time},
     export::{CheckpointFile, NetworkFile},
     training::{GradientDescentSettings, Method, TrainingSettings},
 };
@@ -153,7 +153,9 @@ impl Labour {
 
     fn go_on(&mut self, training: TrainingSettings) {
         let continued = match &mut self.run {
-            Some(run) => continue_run(run, training).map_err(|error| error.to_string()),
+            Some(run) => continue_run(run, training)
+                .map_err(|error| error.to_string())
+                .and_then(|()| run.settings().simulated().ok_or_else(|| LOST.to_owned())),
             None => Err(LOST.to_owned()),
         };
         let has_failed = continued.is_err();
@@ -179,7 +181,11 @@ impl Labour {
         let begun = Instant::now();
         let number = run.leader_number();
         let trainer = &run.trainers()[number];
-        let (decoupled_mm, errors) = run.decouple_test();
+        let decoupled_mm = run.decouple_test();
+        // Every training of the window is simulated.
+        let Some(errors) = run.errors_of(&decoupled_mm) else {
+            return;
+        };
         let cost = begun.elapsed();
         let has_several = run.trainers().len() > 1;
         let is_standing = self.is_paused || run.stop_reason().is_some();
@@ -225,11 +231,9 @@ impl Labour {
         if std::mem::replace(&mut self.is_kept, true) {
             return;
         }
-        let file = NetworkFile::from_run(run);
-        let finished = match file.flaw() {
-            Some(flaw) => Err(format!("This training is not kept in the run list: {flaw}")),
-            None => Ok(Box::new(file)),
-        };
+        let file = NetworkFile::from_run(run).map_err(|error| error.to_string());
+        let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
+        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {flaw}"));
         self.report.send(Event::Finished(finished));
     }
 }
@@ -239,9 +243,9 @@ const LOST: &str = "the network was lost when the training thread ended: train a
 
 /// A run, and what the window is to know of it.
 fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
-    let settings = *run.settings();
+    let simulated = run.settings().simulated().zip(run.baselines().copied());
+    let (settings, baselines) = simulated.ok_or(TestViewError::Measured)?;
     let test = TestView::of(&settings, run.test().clone())?;
-    let baselines = *run.baselines();
     let began = Began {
         settings,
         weights: run.leader().weights(),
@@ -269,11 +273,11 @@ fn enqueue(queue: &mut VecDeque<Request>, request: Request) {
 }
 
 /// What stands beside the network, without one; nothing where it would keep the next request waiting.
-fn baselines(settings: &RunSettings) -> Option<Baselines> {
+fn baselines(settings: &SimulatedSettings) -> Option<Baselines> {
     /// About a tenth of a second.
     const MOST_TERMS: usize = 50_000_000;
-    let scale = settings.sensor.scale;
-    let samples = settings.samples + settings.validation_samples + settings.test_samples;
+    let scale = settings.source.sensor.scale;
+    let samples = settings.source.samples + settings.source.validation_samples + settings.source.test_samples;
     let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
     let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
     if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
@@ -284,11 +288,11 @@ fn baselines(settings: &RunSettings) -> Option<Baselines> {
         method: Method::GradientDescent(GradientDescentSettings::default()),
         ..TrainingSettings::default()
     };
-    let cheapest = RunSettings {
+    let cheapest = SimulatedSettings {
         hidden: 1,
         starts: 1,
         training,
         ..*settings
     };
-    Run::prepare(cheapest).ok().map(|run| *run.baselines())
+    Run::prepare(cheapest).ok()?.baselines().copied()
 }

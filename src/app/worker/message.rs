@@ -7,7 +7,7 @@ use crate::{
         export_kind::ExportKind,
         test_view::{TestView, TestViewError},
     },
-    evaluation::{Baselines, Errors, RunSettings, StartRecord},
+    evaluation::{Baselines, Errors, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
@@ -17,15 +17,15 @@ use crate::{
 #[derive(Debug)]
 pub enum Request {
     /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
-    Preview(Box<RunSettings>),
+    Preview(Box<SimulatedSettings>),
     /// Measure what will stand beside the network of these settings. Only the newest one counts.
-    Baselines(Box<RunSettings>),
+    Baselines(Box<SimulatedSettings>),
     /// Begin a training; one in progress is dropped.
-    Train(Box<RunSettings>),
+    Train(Box<SimulatedSettings>),
     /// Take up the training saved in this file and hold it; one in progress is dropped.
     Open(PathBuf),
     /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
-    TakeUp(Box<RunSettings>, Vec<TrainerState>),
+    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
     /// Go on from the present weights with this method and this many epochs more.
     Continue(TrainingSettings),
     /// Step no further until told to resume.
@@ -44,16 +44,16 @@ pub enum Request {
 #[derive(Debug)]
 pub enum Event {
     /// The test set of these settings.
-    Previewed(Box<RunSettings>, Result<TestView, TestViewError>),
+    Previewed(Box<SimulatedSettings>, Result<TestView, TestViewError>),
     /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
     /// training would explain.
-    Compared(Box<RunSettings>, Option<Baselines>),
+    Compared(Box<SimulatedSettings>, Option<Baselines>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
     /// A saved training stands where it was saved, or why it cannot.
     Opened(Result<Box<Began>, String>),
     /// The training goes on with these settings, or why it cannot.
-    Continued(Result<Box<RunSettings>, String>),
+    Continued(Result<Box<SimulatedSettings>, String>),
     /// News of the training.
     Progressed(Box<Progress>),
     /// The training on show has ended: what is to be kept of it, or why nothing can be.
@@ -68,7 +68,7 @@ pub enum Event {
 #[derive(Debug)]
 pub struct Began {
     /// What was asked for.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// Weights and biases of the network.
     pub weights: usize,
     /// The test set.

@@ -2,7 +2,7 @@ use std::mem::discriminant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{dataset::Seed, evaluation::RunSettings, sensor::ArrayScale, training::Method};
+use crate::{dataset::Seed, evaluation::SimulatedSettings, sensor::ArrayScale, training::Method};
 
 /// What an experiment varies, and over which values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,11 +72,11 @@ impl Axis {
     ///
     /// # Panics
     /// If there are not so many values.
-    pub fn apply(&self, index: usize, settings: &mut RunSettings) {
+    pub fn apply(&self, index: usize, settings: &mut SimulatedSettings) {
         match self {
             Self::Hidden(values) => settings.hidden = values[index],
-            Self::Array(values) => settings.sensor.scale = values[index],
-            Self::Samples(values) => settings.samples = values[index],
+            Self::Array(values) => settings.source.sensor.scale = values[index],
+            Self::Samples(values) => settings.source.samples = values[index],
             Self::Method(values) => settings.training.method = values[index],
             Self::Epochs(values) => settings.training.stopping.epochs = values[index],
             Self::Seed(values) => settings.seed = values[index],

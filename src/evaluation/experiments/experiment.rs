@@ -4,7 +4,8 @@ use thiserror::Error;
 use super::Axis;
 use crate::{
     dataset::{FoldUnit, FoldsError, Seed},
-    evaluation::{CountError, PublishedErrors, RunSettings},
+    evaluation::{CountError, CrossValidation, PublishedErrors, SimulatedSettings},
+    scene::SceneError,
     sensor::ArrayScale,
     training::{SettingError, StoppingRules},
 };
@@ -14,7 +15,7 @@ use crate::{
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// What all cells share; its seed is the first of [`Self::seeds`].
-    pub base: RunSettings,
+    pub base: SimulatedSettings,
     /// What is varied.
     pub axis: Axis,
     /// What else is varied.
@@ -25,32 +26,6 @@ pub struct Experiment {
     pub cross_validation: Option<CrossValidation>,
 }
 
-/// A k-fold cross-validation, repeated with the samples dealt anew.
-///
-/// Fold by fold, the network is tested on the fold, the next fold chooses the best weights and ends the training, and
-/// the others are fitted. With two folds none is left to choose by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CrossValidation {
-    /// k.
-    pub folds: usize,
-    /// How often the samples are dealt anew.
-    pub repeats: usize,
-    /// What is dealt.
-    pub unit: FoldUnit,
-}
-
-impl Default for CrossValidation {
-    /// As the paper: 10 folds of samples, 10 repeats.
-    fn default() -> Self {
-        Self {
-            folds: 10,
-            repeats: 10,
-            unit: FoldUnit::Sample,
-        }
-    }
-}
-
 /// A place in the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
@@ -59,7 +34,7 @@ pub struct Cell {
     /// Index of its value on the second axis; 0 if there is none.
     pub row: usize,
     /// What is run there, with the first seed.
-    pub settings: RunSettings,
+    pub settings: SimulatedSettings,
     /// What the paper reports for it, if it does.
     pub published: Option<PublishedErrors>,
 }
@@ -79,11 +54,9 @@ pub enum ExperimentError {
     /// A setting of the method out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// Single samples are dealt where rows are known.
-    #[error(
-        "known rows need whole snapshots, in which each sample's row follows from its place: deal folds of snapshots"
-    )]
-    KnownRows,
+    /// The array has no such row-wire.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Folds that cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
@@ -119,7 +92,7 @@ impl Experiment {
             None => PublishedErrors::of,
             Some(_) => PublishedErrors::of_cross_validation,
         };
-        let published = published(settings.sensor.scale, settings.hidden, settings.samples);
+        let published = published(settings.source.sensor.scale, settings.hidden, settings.source.samples);
         let published = published.filter(|_| settings.is_papers_scene());
         Cell {
             column,
@@ -135,7 +108,7 @@ impl Experiment {
     }
 
     /// The seeds that the cell with these settings is tried with.
-    pub(super) fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
+    pub(super) fn seeds_of(&self, settings: &SimulatedSettings) -> impl Iterator<Item = Seed> + use<> {
         let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
             1
         } else {
@@ -172,12 +145,6 @@ impl Experiment {
         {
             return Err(ExperimentError::SameAxes(self.axis.name()));
         }
-        let deals_samples = self
-            .cross_validation
-            .is_some_and(|cross_validation| cross_validation.unit == FoldUnit::Sample);
-        if deals_samples && self.base.scene.rows.are_known() {
-            return Err(ExperimentError::KnownRows);
-        }
         for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
             let allowed = 1..=MOST_TRIALS;
             if !allowed.contains(&count) {
@@ -198,14 +165,14 @@ impl Experiment {
         Ok(())
     }
 
-    fn check_cell(&self, settings: &RunSettings) -> Result<(), ExperimentError> {
+    fn check_cell(&self, settings: &SimulatedSettings) -> Result<(), ExperimentError> {
         settings.check_counts()?;
         settings.training.check()?;
         let Some(CrossValidation { folds, unit, .. }) = self.cross_validation else {
             return Ok(());
         };
-        let rows = settings.sensor.scale.rows();
-        let snapshots = settings.samples.div_ceil(rows);
+        let rows = settings.source.model_size()?.rows;
+        let snapshots = settings.source.samples.div_ceil(rows);
         let units = match unit {
             FoldUnit::Sample => snapshots * rows,
             FoldUnit::Snapshot => snapshots,
@@ -261,7 +228,7 @@ impl PaperTable {
     /// redo all tables in about a minute on two cores. All epochs are run; the validation set only chooses the weights.
     pub fn experiment(self) -> Experiment {
         let with = |axis, epochs, starts, cross_validation| {
-            let mut base = RunSettings::default();
+            let mut base = SimulatedSettings::default();
             base.training.stopping.epochs = epochs;
             base.training.stopping.max_fail = StoppingRules::MOST_EPOCHS;
             base.starts = starts;
@@ -317,7 +284,7 @@ mod tests {
         assert_eq!(cells.len(), 6);
         for (index, cell) in cells.iter().enumerate() {
             assert_eq!((cell.row, cell.column), (index / 3, index % 3));
-            assert_eq!(cell.settings.sensor.scale, ArrayScale::PRESETS[cell.column]);
+            assert_eq!(cell.settings.source.sensor.scale, ArrayScale::PRESETS[cell.column]);
             assert_eq!(cell.settings.training.method, Method::all()[cell.row]);
         }
     }

@@ -17,7 +17,7 @@ mod verdict;
 
 pub use axis::Axis;
 pub use bottleneck::Bottleneck;
-pub use experiment::{Cell, CrossValidation, Experiment, ExperimentError, PaperTable};
+pub use experiment::{Cell, Experiment, ExperimentError, PaperTable};
 pub use growth::{Growth, GrowthLaw};
 pub use results::{CellResults, ExperimentResults};
 pub use runner::{Finished, run_experiments, worker_threads};

@@ -11,10 +11,10 @@ use std::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{
-    CrossValidation, Experiment, ExperimentError, Trial, TrialFailure,
+    Experiment, ExperimentError, Trial, TrialFailure,
     time_left::{TimeLeft, work},
 };
-use crate::evaluation::RunSettings;
+use crate::evaluation::{CrossValidation, SimulatedSettings};
 
 /// A trial that has come to something.
 #[derive(Clone, Debug)]
@@ -114,7 +114,7 @@ struct Job {
     /// The cell among the cells of all experiments.
     time_cell: usize,
     /// With the seed of the trial.
-    settings: RunSettings,
+    settings: SimulatedSettings,
     cross_validation: Option<CrossValidation>,
     repeat: usize,
     work: f64,
@@ -138,7 +138,7 @@ impl Queue {
                     experiment: number,
                     cell: cell_number,
                     time_cell: cells.len(),
-                    settings: RunSettings { seed, ..cell.settings },
+                    settings: SimulatedSettings { seed, ..cell.settings },
                     cross_validation: experiment.cross_validation,
                     repeat,
                     work,

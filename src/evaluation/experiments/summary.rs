@@ -81,9 +81,9 @@ impl CellResults {
         let starts = settings.starts;
         let epochs_run = self.spread(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64));
         CellSummary {
-            array: settings.sensor.scale,
+            array: settings.source.sensor.scale,
             hidden: settings.hidden,
-            samples: settings.samples,
+            samples: settings.source.samples,
             method: settings.training.method.short_name(),
             epochs: settings.training.stopping.epochs,
             starts,

@@ -62,10 +62,10 @@ impl TimeLeft {
 /// Multiplications of one job of `cell`, about, if it runs all of its epochs.
 pub(super) fn work(experiment: &Experiment, cell: &Cell) -> f64 {
     let settings = &cell.settings;
-    let scale = settings.sensor.scale;
+    let scale = settings.source.sensor.scale;
     let (n1, h) = ((scale.columns() + 1) as f64, settings.hidden as f64);
     let outputs = scale.coordinates_per_row() as f64;
-    let samples = settings.samples as f64;
+    let samples = settings.source.samples as f64;
     // Forwards and back, and the test and validation sets.
     let passes = 4.0 * samples * h * (n1 + outputs);
     let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);

@@ -1,15 +1,11 @@
-use std::time::Instant;
-
-use ndarray::{Array2, Axis};
-use rand::RngExt;
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Bottleneck, CrossValidation};
+use super::Bottleneck;
 use crate::{
-    dataset::{Dataset, Folds, Seed, Split, Stream},
-    decoupling::{Decoupler, LinearMap, TrainingMean},
-    evaluation::{Baselines, Errors, Run, RunError, RunSettings},
+    dataset::{Dataset, Seed},
+    evaluation::{Baselines, CrossValidated, CrossValidation, Effort, Errors, Run, RunError, SimulatedSettings},
     training::TrainerState,
 };
 
@@ -60,184 +56,75 @@ impl Trial {
 
     /// Trains on sets drawn with the seed of `settings` and tests on the test set. `None` if cancelled.
     pub(super) fn on_drawn_sets(
-        settings: RunSettings,
+        settings: SimulatedSettings,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let (split, test) = Run::draw(&settings)?;
-        let bottleneck = Bottleneck::fit(split.training.coordinates_mm.view(), settings.hidden)?;
-        let reconstructed = bottleneck.reconstruct(test.coordinates_mm.view());
-        let bottleneck = Errors::measure(&test, &reconstructed, settings.stroke_mm());
-        let mut run = Run::on_sets(settings, split, test)?;
-        let Some(spent) = train(&mut run, &is_cancelled) else {
+        let (split, test) = settings.draw()?;
+        let bottleneck = Bottleneck::fit(split.training.targets(), settings.hidden)?;
+        let reconstructed = bottleneck.reconstruct(test.targets());
+        let bottleneck = Errors::measure(&test, &reconstructed, settings.source.stroke_mm());
+        let mut run = Run::on_sets(settings.into(), split, test)?;
+        let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
             return Ok(None);
         };
+        let scores = run.node_scores().expect("the run is simulated");
         Ok(Some(Self {
             seed: settings.seed,
             repeat: 0,
-            errors: run.decouple_test().1,
-            baselines: *run.baselines(),
+            errors: scores.network,
+            baselines: scores.baselines,
             bottleneck,
             networks: 1,
-            epochs: spent.epochs,
-            seconds: spent.seconds,
-            least_epoch_seconds: spent.least_epoch_seconds,
+            epochs: effort.epochs,
+            seconds: effort.seconds,
+            least_epoch_seconds: effort.least_epoch_seconds,
             states: run.states(),
         }))
     }
 
     /// Cross-validates on a set drawn with the seed of `settings`. `None` if cancelled.
     pub(super) fn by_cross_validation(
-        settings: RunSettings,
-        CrossValidation { folds, unit, .. }: CrossValidation,
+        settings: SimulatedSettings,
+        validation: CrossValidation,
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let set = Run::training_set(&settings, settings.samples)?;
-        let own_seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(&set, folds, unit, &mut own_seed.rng(Stream::Split))?;
-        let mut pooled = Pooled::new(&set);
-        let mut spent = Spent::default();
-        for fold in 0..folds.count() {
-            let split = split(&set, &folds, fold);
-            let test = set.select(folds.test(fold));
-            pooled.add_references(folds.test(fold), &split.training, &test, settings.hidden)?;
-            let settings = RunSettings {
-                seed: nth_seed(own_seed, fold),
-                ..settings
-            };
-            let mut run = Run::on_sets(settings, split, test)?;
-            let Some(of_fold) = train(&mut run, &is_cancelled) else {
-                return Ok(None);
-            };
-            scatter(&mut pooled.network, folds.test(fold), &run.decouple_test().0);
-            spent.add(of_fold);
-        }
-        let errors = |decoupled_mm| Errors::measure(&set, decoupled_mm, settings.stroke_mm());
+        let set = settings.draw_training(settings.source.samples)?;
+        let Some(validated) = validation.run(&settings.into(), &set, repeat, is_cancelled)? else {
+            return Ok(None);
+        };
+        let bottleneck = bottleneck_answers(&set, &validated, settings.hidden)?;
+        let errors = |decoupled_mm| Errors::measure(&set, decoupled_mm, settings.source.stroke_mm());
         Ok(Some(Self {
             seed: settings.seed,
             repeat,
-            errors: errors(&pooled.network),
+            errors: errors(&validated.network),
             baselines: Baselines {
-                mean: errors(&pooled.mean),
-                linear: errors(&pooled.linear),
+                mean: errors(&validated.mean),
+                linear: errors(&validated.linear),
                 reference: None,
             },
-            bottleneck: errors(&pooled.bottleneck),
-            networks: folds.count(),
-            epochs: spent.epochs,
-            seconds: spent.seconds,
-            least_epoch_seconds: spent.least_epoch_seconds,
+            bottleneck: errors(&bottleneck),
+            networks: validated.folds.count(),
+            epochs: validated.effort.epochs,
+            seconds: validated.effort.seconds,
+            least_epoch_seconds: validated.effort.least_epoch_seconds,
             states: Vec::new(),
         }))
     }
 }
 
-/// Steps to the end and tells what that took; `None` if cancelled before.
-fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Spent> {
-    let mut spent = Spent::default();
-    while run.stop_reason().is_none() {
-        if is_cancelled() {
-            return None;
-        }
-        let at_work = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_none());
-        let at_work = at_work.count() as f64;
-        let begun = Instant::now();
-        run.step();
-        spent.least_epoch_seconds = spent.least_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
-    }
-    for trainer in run.trainers() {
-        spent.epochs += trainer.latest().epoch;
-        spent.seconds += trainer.elapsed().as_secs_f64();
-    }
-    Some(spent)
-}
-
-/// What is fitted and what is held out when fold `fold` is tested: the fold after it chooses the best weights.
-fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
-    let chooses = (fold + 1) % folds.count();
-    if folds.count() < 3 {
-        return Split {
-            training: set.select(&folds.without(&[fold])),
-            validation: None,
-        };
-    }
-    Split {
-        training: set.select(&folds.without(&[fold, chooses])),
-        validation: Some(set.select(folds.test(chooses))),
-    }
-}
-
-/// Seed number `n` of those that follow from `seed`.
-fn nth_seed(seed: Seed, n: usize) -> Seed {
-    let mut seeds = seed.rng(Stream::Folds).random_iter();
-    Seed(seeds.nth(n).expect("a generator never ends"))
-}
-
-/// Answers for every sample of a set, each by what was fitted without it: samples × 3·M2, in millimetres.
-struct Pooled {
-    network: Array2<f64>,
-    mean: Array2<f64>,
-    linear: Array2<f64>,
-    bottleneck: Array2<f64>,
-}
-
-impl Pooled {
-    fn new(set: &Dataset) -> Self {
-        let empty = Array2::zeros(set.coordinates_mm.dim());
-        Self {
-            network: empty.clone(),
-            mean: empty.clone(),
-            linear: empty.clone(),
-            bottleneck: empty,
+/// The best answers that so few hidden nodes can give, for every sample from what its fold was trained on.
+fn bottleneck_answers(set: &Dataset, validated: &CrossValidated, hidden: usize) -> Result<Array2<f64>, RunError> {
+    let folds = &validated.folds;
+    let mut answers = Array2::zeros(set.targets().dim());
+    for fold in 0..folds.count() {
+        let training = validated.training(set, fold);
+        let bottleneck = Bottleneck::fit(training.targets(), hidden)?;
+        let reconstructed = bottleneck.reconstruct(set.select(folds.test(fold)).targets());
+        for (&sample, answer) in folds.test(fold).iter().zip(reconstructed.rows()) {
+            answers.row_mut(sample).assign(&answer);
         }
     }
-
-    /// Fills in the answers of everything but the network for the `samples` that make up `test`.
-    fn add_references(
-        &mut self,
-        samples: &[usize],
-        training: &Dataset,
-        test: &Dataset,
-        hidden: usize,
-    ) -> Result<(), RunError> {
-        let readings = test.resistances_ohm.view();
-        scatter(&mut self.mean, samples, &TrainingMean::fit(training).decouple(readings));
-        scatter(&mut self.linear, samples, &LinearMap::fit(training)?.decouple(readings));
-        let bottleneck = Bottleneck::fit(training.coordinates_mm.view(), hidden)?;
-        let reconstructed = bottleneck.reconstruct(test.coordinates_mm.view());
-        scatter(&mut self.bottleneck, samples, &reconstructed);
-        Ok(())
-    }
-}
-
-/// Writes the rows of `answers` to the places `samples`.
-fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
-    for (&sample, answer) in samples.iter().zip(answers.axis_iter(Axis(0))) {
-        pooled.row_mut(sample).assign(&answer);
-    }
-}
-
-/// Epochs and the time for them.
-struct Spent {
-    epochs: usize,
-    seconds: f64,
-    least_epoch_seconds: f64,
-}
-
-impl Default for Spent {
-    fn default() -> Self {
-        Self {
-            epochs: 0,
-            seconds: 0.0,
-            least_epoch_seconds: f64::INFINITY,
-        }
-    }
-}
-
-impl Spent {
-    fn add(&mut self, other: Self) {
-        self.epochs += other.epochs;
-        self.seconds += other.seconds;
-        self.least_epoch_seconds = self.least_epoch_seconds.min(other.least_epoch_seconds);
-    }
+    Ok(answers)
 }

@@ -24,6 +24,8 @@ pub enum Hue {
     Orange,
     /// A fourth.
     Violet,
+    /// A fifth.
+    Cyan,
     /// References and bounds.
     Grey,
 }
@@ -36,6 +38,7 @@ impl Hue {
             Self::Green => [0x1a, 0x7f, 0x4b],
             Self::Orange => [0xa8, 0x64, 0x00],
             Self::Violet => [0x7a, 0x3e, 0xb1],
+            Self::Cyan => [0x0b, 0x76, 0x8c],
             Self::Grey => DIM,
         }
     }

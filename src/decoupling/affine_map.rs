@@ -1,0 +1,201 @@
+use ndarray::{Array2, Axis, Slice};
+
+use super::{DecodeError, Decoder, least_squares::fit_least_squares, ridge::fit_ridge};
+use crate::{
+    dataset::Dataset,
+    network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError},
+};
+
+/// An affine map from readings to targets, the scalings on both sides folded into its matrix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AffineMap {
+    quantity: Quantity,
+    /// What each channel is taken relative to.
+    centre: Vec<f64>,
+    /// Targets from centred channels: channels × varying targets, in standard layout.
+    matrix: Array2<f64>,
+    /// Every target where all channels are at their centre.
+    base: Vec<f64>,
+    /// Which targets vary.
+    varying: Vec<usize>,
+    penalty: f64,
+    /// Room for one row's changes of the varying targets.
+    changes: Vec<f64>,
+}
+
+impl AffineMap {
+    /// The map that fits `training` best in the least-squares sense, on `quantity` of the readings.
+    ///
+    /// # Errors
+    /// Values that cannot be scaled.
+    pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
+        let values = training.readings().mapv(|reading| quantity.of(reading));
+        let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
+        let outputs = MinMax::fit(training.targets())?;
+        let coefficients = fit_least_squares(training, &inputs, &outputs);
+        Ok(Self::folded(&inputs, &coefficients, &outputs, 0.0))
+    }
+
+    /// The map with a ridge penalty, whose size is chosen by generalised cross-validation. `noise` as in
+    /// [`Inputs::fit`].
+    ///
+    /// # Errors
+    /// Values that cannot be scaled.
+    pub fn ridge(training: &Dataset, choice: InputChoice, noise: f64) -> Result<Self, ScalingError> {
+        let inputs = Inputs::fit(choice, training.readings(), noise)?;
+        let outputs = MinMax::fit(training.targets())?;
+        let x = inputs.of(training.readings());
+        let y = outputs.scale(training.targets());
+        let (coefficients, penalty) = fit_ridge(x.view(), y.view())?;
+        Ok(Self::folded(&inputs, &coefficients, &outputs, penalty))
+    }
+
+    /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).
+    fn folded(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax, penalty: f64) -> Self {
+        let (centre, to_inputs) = inputs.affine();
+        let ranges = outputs.middles_and_half_widths();
+        let varying = outputs.varying();
+        let mut base: Vec<f64> = ranges.iter().map(|range| range.0).collect();
+        let n = inputs.count();
+        let mut matrix = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
+        for (output, &target) in varying.iter().enumerate() {
+            let half_width = ranges[target].1;
+            matrix.column_mut(output).mapv_inplace(|value| value * half_width);
+            base[target] += coefficients[[n, output]] * half_width;
+        }
+        Self {
+            quantity: inputs.quantity(),
+            centre,
+            matrix: matrix.as_standard_layout().into_owned(),
+            base,
+            changes: vec![0.0; varying.len()],
+            varying,
+            penalty,
+        }
+    }
+
+    /// The penalty chosen, in units of squared singular values of the centred inputs; 0 for plain least squares.
+    pub fn penalty(&self) -> f64 {
+        self.penalty
+    }
+}
+
+impl Decoder for AffineMap {
+    fn channels(&self) -> usize {
+        self.centre.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.base.len()
+    }
+
+    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        DecodeError::check_that(readings, |value| self.quantity.accepts(value))?;
+        self.changes.fill(0.0);
+        let width = self.changes.len();
+        let matrix = self.matrix.as_slice().expect("made in standard layout");
+        for (channel, (&reading, centre)) in readings.iter().zip(&self.centre).enumerate() {
+            let value = self.quantity.of(reading) - centre;
+            let row = &matrix[channel * width..(channel + 1) * width];
+            for (change, weight) in self.changes.iter_mut().zip(row) {
+                *change += value * weight;
+            }
+        }
+        targets.copy_from_slice(&self.base);
+        for (&target, change) in self.varying.iter().zip(&self.changes) {
+            targets[target] += change;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        decoupling::decode_set,
+        network::ScalingChoice,
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    fn draw(scale: &str, samples: usize) -> Dataset {
+        let model = SensorModel::new(scale.parse().unwrap());
+        Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap()
+    }
+
+    /// `set` with another third target: a function of the readings.
+    fn with_target(set: &Dataset, target: impl Fn(&[f64]) -> f64) -> Dataset {
+        let mut targets = set.targets().to_owned();
+        for sample in 0..set.samples() {
+            targets[[sample, 2]] = target(set.sample_readings(sample));
+        }
+        let row_wires: Vec<usize> = (0..set.samples()).map(|sample| set.row_wire(sample).unwrap()).collect();
+        Dataset::new(
+            set.readings().to_owned(),
+            targets,
+            Some(&row_wires),
+            set.groups().to_vec(),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn an_affine_relation_is_found_exactly() {
+        let set = with_target(&draw("10x6_3x18", 300), |ohm| 3.0 * ohm[0] - 0.5 * ohm[17] + 4.0);
+        let mut map = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
+        let answer = decode_set(&mut map, &set).unwrap();
+        for (ours, truth) in answer.column(2).iter().zip(set.targets().column(2)) {
+            assert!((ours - truth).abs() < 1e-10 * truth.abs());
+        }
+    }
+
+    #[test]
+    fn too_few_or_duplicate_samples_give_a_finite_map() {
+        let other = draw("10x6_3x18", 10);
+        for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
+            let least_squares = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
+            let ridge = AffineMap::ridge(&set, InputChoice::BEST, 0.0).unwrap();
+            for mut map in [least_squares, ridge] {
+                let answer = decode_set(&mut map, &other).unwrap();
+                assert!(answer.iter().all(|value| value.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn targets_that_are_affine_in_the_quantity_come_back_by_ridge() {
+        let set = with_target(&draw("1x4_2x12", 60), |ohm| 4.0 + 20.0 / ohm[3] - 7.0 / ohm[8]);
+        for scaling in [ScalingChoice::Whitening, ScalingChoice::MinMax] {
+            let choice = InputChoice {
+                scaling,
+                ..InputChoice::BEST
+            };
+            let answer = decode_set(&mut AffineMap::ridge(&set, choice, 0.0).unwrap(), &set).unwrap();
+            for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
+                assert_eq!(answer[0], truth[0], "what does not vary stays");
+                assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
+            }
+        }
+    }
+
+    #[test]
+    fn readings_outside_the_quantitys_domain_are_named() {
+        let set = draw("1x4_2x12", 30);
+        let mut readings = set.sample_readings(0).to_vec();
+        readings[5] = -1.0;
+        for (quantity, is_refused) in [
+            (Quantity::Resistance, true),
+            (Quantity::Conductance, true),
+            (Quantity::Raw, false),
+        ] {
+            let mut map = AffineMap::least_squares(&set, quantity).unwrap();
+            let result = map.decode(&readings, &mut [0.0; 12]);
+            assert_eq!(result.is_err(), is_refused, "{quantity}");
+            if let Err(error) = result {
+                assert!(error.to_string().starts_with("row 1, reading 6: -1"), "{error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,218 @@
+use std::{fmt, str::FromStr};
+
+use thiserror::Error;
+
+/// A way from the readings of a frame to deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DecoderKind {
+    /// The mean of the training set.
+    Mean,
+    /// The best affine map, ridge-regularised.
+    Ridge,
+    /// The trained network.
+    Network,
+    /// Gaussians around centres.
+    RadialBasis,
+    /// Newton's method on Eq. (2); with noise and prior where the scene has noise.
+    Newton,
+    /// The network, then at most [`DecoderKind::POLISH_STEPS`] of Newton's steps.
+    Polish,
+}
+
+/// The colour of a decoder in charts, on screen and in print.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColourKey {
+    /// For what is only there to be compared with.
+    Grey,
+    /// Violet.
+    Violet,
+    /// The network's own colour.
+    Blue,
+    /// Orange.
+    Orange,
+    /// Red.
+    Red,
+    /// Green.
+    Green,
+    /// Cyan.
+    Cyan,
+}
+
+/// The precision in which a network computes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// 64 bits.
+    #[default]
+    Double,
+    /// 32 bits.
+    Single,
+}
+
+/// A word that is none of the decoders.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{text}' is not a decoder: give {words}", words = words())]
+pub struct DecoderKindError {
+    /// The word.
+    pub text: String,
+}
+
+/// All that is said of a decoder, in one place.
+struct Entry {
+    word: &'static str,
+    name: &'static str,
+    meaning: &'static str,
+    colour: ColourKey,
+    needs: Needs,
+}
+
+/// What a decoder needs beside training samples.
+#[derive(Clone, Copy, PartialEq)]
+enum Needs {
+    Nothing,
+    Network,
+    Sensor,
+    NetworkAndSensor,
+}
+
+impl DecoderKind {
+    /// All of them, in the order offered.
+    pub const ALL: [Self; 6] = [
+        Self::Mean,
+        Self::Ridge,
+        Self::Network,
+        Self::RadialBasis,
+        Self::Newton,
+        Self::Polish,
+    ];
+
+    /// The most steps of [`DecoderKind::Polish`].
+    pub const POLISH_STEPS: usize = 3;
+
+    const fn entry(self) -> Entry {
+        match self {
+            Self::Mean => Entry {
+                word: "mean",
+                name: "Training mean",
+                meaning: "Always answers the mean of the training set",
+                colour: ColourKey::Grey,
+                needs: Needs::Nothing,
+            },
+            Self::Ridge => Entry {
+                word: "ridge",
+                name: "Ridge",
+                meaning: "The best affine map of the chosen inputs, ridge-regularised",
+                colour: ColourKey::Violet,
+                needs: Needs::Nothing,
+            },
+            Self::Network => Entry {
+                word: "network",
+                name: "Network",
+                meaning: "The trained network, in 64 or in 32 bits",
+                colour: ColourKey::Blue,
+                needs: Needs::Network,
+            },
+            Self::RadialBasis => Entry {
+                word: "rbf",
+                name: "Radial basis",
+                meaning: "A radial-basis network: Gaussians around centres among the training samples, fitted by least squares",
+                colour: ColourKey::Orange,
+                needs: Needs::Nothing,
+            },
+            Self::Newton => Entry {
+                word: "newton",
+                name: "Newton",
+                meaning: "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior",
+                colour: ColourKey::Red,
+                needs: Needs::Sensor,
+            },
+            Self::Polish => Entry {
+                word: "polish",
+                name: "Network + Newton",
+                meaning: "The network's answer, improved by at most three Newton steps",
+                colour: ColourKey::Green,
+                needs: Needs::NetworkAndSensor,
+            },
+        }
+    }
+
+    /// Its name in tables, charts and forms; that of a network in single precision says so.
+    pub fn name(self, precision: Precision) -> &'static str {
+        match (self, precision) {
+            (Self::Network, Precision::Single) => "Network f32",
+            _ => self.entry().name,
+        }
+    }
+
+    /// A sentence on how it decodes.
+    pub fn meaning(self) -> &'static str {
+        self.entry().meaning
+    }
+
+    /// Its colour in charts.
+    pub fn colour(self) -> ColourKey {
+        self.entry().colour
+    }
+
+    /// Whether it decodes by the trained network.
+    pub fn needs_network(self) -> bool {
+        matches!(self.entry().needs, Needs::Network | Needs::NetworkAndSensor)
+    }
+
+    /// Whether it solves the sensor's equations, so that measured samples alone are not enough.
+    pub fn needs_sensor(self) -> bool {
+        matches!(self.entry().needs, Needs::Sensor | Needs::NetworkAndSensor)
+    }
+
+    /// The precisions it computes in.
+    pub fn precisions(self) -> &'static [Precision] {
+        match self {
+            Self::Network => &[Precision::Double, Precision::Single],
+            _ => &[Precision::Double],
+        }
+    }
+}
+
+/// The words of all decoders: `mean, ridge … or polish`.
+fn words() -> String {
+    let words = DecoderKind::ALL.map(|kind| kind.entry().word);
+    let [others @ .., last] = &words;
+    format!("{} or {last}", others.join(", "))
+}
+
+impl fmt::Display for DecoderKind {
+    /// The word for it in the terminal and in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.entry().word)
+    }
+}
+
+impl FromStr for DecoderKind {
+    type Err = DecoderKindError;
+
+    fn from_str(text: &str) -> Result<Self, DecoderKindError> {
+        let found = Self::ALL.into_iter().find(|kind| kind.entry().word == text.trim());
+        found.ok_or_else(|| DecoderKindError { text: text.to_owned() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_back_and_others_are_told_the_choice() {
+        for kind in DecoderKind::ALL {
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+        }
+        let message = "neural".parse::<DecoderKind>().unwrap_err().to_string();
+        assert!(message.ends_with("newton or polish"), "{message}");
+    }
+
+    #[test]
+    fn colours_tell_decoders_apart() {
+        for (index, kind) in DecoderKind::ALL.into_iter().enumerate() {
+            let others = &DecoderKind::ALL[..index];
+            assert!(others.iter().all(|other| other.colour() != kind.colour()), "{kind}");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+use faer::Mat;
+use ndarray::{Array2, Axis, Slice};
+
+use crate::{
+    dataset::Dataset,
+    network::{Inputs, MinMax},
+};
+
+/// Coefficients (inputs + 1 × varying outputs, the constant last) of the affine map from scaled inputs to scaled outputs
+/// that fits `training` best in the least-squares sense.
+///
+/// By the singular value decomposition; directions that the training set does not resolve (singular values below
+/// rounding) are left out, which gives the smallest map among equals.
+pub(super) fn fit_least_squares(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Array2<f64> {
+    let (n1, m) = (inputs.count() + 1, outputs.varying().len());
+    let triangle = triangle(training, inputs, outputs);
+    let rows = n1.min(triangle.nrows());
+    let (a, y) = triangle.as_ref().subrows(0, rows).split_at_col(n1);
+    // Finite input always converges; a zero map is the honest answer if it ever does not.
+    let fitted = a.thin_svd().ok().map(|svd| {
+        let singular = svd.S().column_vector();
+        let smallest = f64::EPSILON * training.samples().max(n1) as f64 * singular[0];
+        let mut projected = svd.U().transpose() * y;
+        for (k, &value) in singular.iter().enumerate() {
+            let inverse = if value > smallest { 1.0 / value } else { 0.0 };
+            projected.row_mut(k).iter_mut().for_each(|entry| *entry *= inverse);
+        }
+        svd.V() * projected
+    });
+    Array2::from_shape_fn((n1, m), |(i, t)| fitted.as_ref().map_or(0.0, |b| b[(i, t)]))
+}
+
+/// The triangular factor of [inputs, 1, outputs], all scaled: its least-squares problems are those of the whole set. Found
+/// a chunk of samples at a time, each joined to the factor of those before it, so that memory does not grow with
+/// their number (Golub and Van Loan, Matrix Computations, section 6.5.2).
+fn triangle(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Mat<f64> {
+    /// Samples of a chunk.
+    const CHUNK: usize = 512;
+    let columns = inputs.count() + 1 + outputs.varying().len();
+    let mut factor = Mat::<f64>::zeros(0, columns);
+    for first in (0..training.samples()).step_by(CHUNK) {
+        let chunk = Slice::from(first..training.samples().min(first + CHUNK));
+        let x = inputs.of(training.readings().slice_axis(Axis(0), chunk));
+        let y = outputs.scale(training.targets().slice_axis(Axis(0), chunk));
+        let (before, n) = (factor.nrows(), x.ncols());
+        let joined = Mat::from_fn(before + x.nrows(), columns, |row, column| {
+            if row < before {
+                factor[(row, column)]
+            } else if column < n {
+                x[[row - before, column]]
+            } else if column == n {
+                1.0
+            } else {
+                y[[row - before, column - n - 1]]
+            }
+        });
+        factor = joined.qr().thin_R().to_owned();
+    }
+    factor
+}

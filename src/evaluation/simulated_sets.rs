@@ -1,0 +1,52 @@
+use super::{RunError, SimulatedSettings, Simulation};
+use crate::{
+    dataset::{Dataset, Split, Stream, hold_out},
+    training::TrainingError,
+};
+
+impl SimulatedSettings {
+    /// Draws the training and validation set of these settings, and their test set.
+    ///
+    /// # Errors
+    /// Settings that are impossible, with the reason.
+    pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
+        self.check_counts()?;
+        self.training.check().map_err(TrainingError::from)?;
+        let test = self.draw_test()?;
+        let rows = self.source.model_size()?.rows;
+        let held_out = self.source.validation_samples.div_ceil(rows);
+        let drawn = self.draw_training((self.source.samples.div_ceil(rows) + held_out) * rows)?;
+        Ok((hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split)), test))
+    }
+
+    /// Draws as many samples as are asked for, disturbed as those that a network is trained on.
+    ///
+    /// # Errors
+    /// An impossible sensor, scene, or number of samples.
+    pub fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        sensor.check()?;
+        scene.check()?;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Training))?;
+        set.disturb(
+            sensor,
+            &scene.noise.in_training(),
+            &mut self.seed.rng(Stream::TrainingNoise),
+        )?;
+        Ok(set)
+    }
+
+    /// Draws the test set of these settings: what the window shows before anything is trained.
+    ///
+    /// # Errors
+    /// An impossible sensor, scene, or number of samples.
+    pub fn draw_test(&self) -> Result<Dataset, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        sensor.check()?;
+        scene.check()?;
+        let samples = self.source.test_samples;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Test))?;
+        set.disturb(sensor, &scene.noise.in_test(), &mut self.seed.rng(Stream::TestNoise))?;
+        Ok(set)
+    }
+}
