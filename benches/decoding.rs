@@ -9,16 +9,16 @@
 use std::{hint::black_box, time::Instant};
 
 use decoupler::{
-    dataset::{Dataset, Seed, Stream},
+    dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
-        CompiledNetworks, FrameDecoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
-        RadialBasisNetwork, RadialBasisSettings, RidgeMap, RowMaps, TrainingMean, fit_rows,
+        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
+        RadialBasisNetwork, RadialBasisSettings, TrainingMean,
     },
     network::{
-        DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, Shape, nguyen_widrow, tanh_in_place,
-        tanh_in_place_single,
+        DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
+        nguyen_widrow, tanh_in_place, tanh_in_place_single,
     },
-    scene::{Noise, Rows, Scene},
+    scene::{Noise, RowModel, Rows, Scene},
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
@@ -58,20 +58,20 @@ fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
 }
 
 /// Untrained networks: speed does not depend on the weights.
-fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Vec<DecouplingNetwork> {
+fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Networks {
     let mut rng = Seed(0).rng(Stream::Start);
-    let network = |row: usize| {
-        let set = training.of_row(row);
-        let inputs = Inputs::fit(choice, set.readings(), 0.0).unwrap();
-        let outputs = MinMax::fit(set.targets()).unwrap();
+    let network = |set: &Dataset| {
+        let inputs = Inputs::fit(choice, set.readings(), 0.0)?;
+        let outputs = MinMax::fit(set.targets())?;
         let shape = Shape {
             inputs: inputs.count(),
             hidden,
             outputs: outputs.varying().len(),
         };
-        DecouplingNetwork::new(inputs, nguyen_widrow(shape, &mut rng), outputs)
+        let mlp = nguyen_widrow(shape, &mut rng);
+        Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
     };
-    (0..training.rows()).map(network).collect()
+    PerRow::fit(training, RowModel::Each, network).unwrap()
 }
 
 /// What decoding of a frame by networks cannot avoid, in the precision of the array. The type rather than a closure, which
@@ -123,25 +123,22 @@ fn print_scale(scale: ArrayScale) {
     let rows: Vec<usize> = (0..scale.rows()).collect();
     let mut rng = Seed(0).rng(Stream::Training);
     let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
-    let frame: Vec<f64> = training
-        .resistances_ohm
-        .iter()
-        .take(scale.rows() * scale.columns())
-        .copied()
-        .collect();
-    let mut decoders: Vec<(String, Box<dyn FrameDecoder>)> = vec![
-        (
-            "mean".into(),
-            Box::new(RowMaps::shared(TrainingMean::fit(&training), scale.rows())),
-        ),
+    let frame = training.frames().unwrap().frame(0).to_vec();
+    let mut decoders: Vec<(String, Box<dyn Decoder>)> = vec![
+        ("mean".into(), Box::new(PerRow::shared(TrainingMean::fit(&training)))),
         (
             "ridge".into(),
-            Box::new(fit_rows(&training, true, |set| RidgeMap::fit(set, InputChoice::BEST, 0.0)).unwrap()),
+            Box::new(
+                PerRow::fit(&training, RowModel::Each, |set| {
+                    AffineMap::ridge(set, InputChoice::BEST, 0.0)
+                })
+                .unwrap(),
+            ),
         ),
         (
             "radial basis, 100 centres".into(),
             Box::new(
-                fit_rows(&training, true, |set| {
+                PerRow::fit(&training, RowModel::Each, |set| {
                     let settings = RadialBasisSettings::default();
                     RadialBasisNetwork::fit(set, InputChoice::BEST, 0.0, settings, &mut rng)
                 })
@@ -156,13 +153,13 @@ fn print_scale(scale: ArrayScale) {
                 scaling: ScalingChoice::Whitening,
             };
             let networks = networks(&training, choice, hidden);
-            let double = CompiledNetworks::<f64>::each(&networks);
-            let single = CompiledNetworks::<f32>::each(&networks);
+            let double = CompiledNetworks::<f64>::new(&networks, scale.rows());
+            let single = CompiledNetworks::<f32>::new(&networks, scale.rows());
             decoders.push((format!("network, {hidden} hidden, {quantity}, f64"), Box::new(double)));
             decoders.push((format!("network, {hidden} hidden, {quantity}, f32"), Box::new(single)));
         }
     }
-    let first = CompiledNetworks::<f64>::each(&networks(&training, InputChoice::BEST, 12));
+    let first = CompiledNetworks::<f64>::new(&networks(&training, InputChoice::BEST, 12), scale.rows());
     let exact = Posterior::new(&model, &scene, &rows, &mut rng).unwrap();
     decoders.push((
         "polish, 1 step".into(),

@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, SimulatedSettings, Simulation},
     export::{CheckpointFile, CheckpointFileError, NetworkFile},
     sensor::SensorModel,
     training::{EpochRecord, Method, StopReason},
@@ -15,10 +15,13 @@ use tempfile::TempDir;
 
 fn settings(method: Method) -> SimulatedSettings {
     let mut settings = SimulatedSettings {
-        sensor: SensorModel::new("2x2_2x6".parse().unwrap()),
-        samples: 20,
-        validation_samples: 8,
-        test_samples: 8,
+        source: Simulation {
+            sensor: SensorModel::new("2x2_2x6".parse().unwrap()),
+            samples: 20,
+            validation_samples: 8,
+            test_samples: 8,
+            ..Simulation::default()
+        },
         hidden: 2,
         starts: 2,
         seed: Seed(u64::MAX),
@@ -46,6 +49,7 @@ fn place() -> (TempDir, PathBuf) {
 fn saved(epochs: usize) -> (TempDir, PathBuf, Vec<u8>) {
     let (folder, path) = place();
     CheckpointFile::from_run(&stepped(settings(Method::default()), epochs))
+        .unwrap()
         .save(&path)
         .unwrap();
     let bytes = fs::read(&path).unwrap();
@@ -70,12 +74,13 @@ fn a_run_from_a_file_goes_on_with_the_same_bits() {
     for method in Method::all() {
         let whole = stepped(settings(method), 9);
         CheckpointFile::from_run(&stepped(settings(method), 4))
+            .unwrap()
             .save(&path)
             .unwrap();
         let file = CheckpointFile::load(&path).unwrap();
         let mut run = file.resume().unwrap();
         while run.step().is_none() {}
-        let mut files = [&run, &whole].map(NetworkFile::from_run);
+        let mut files = [&run, &whole].map(|run| NetworkFile::from_run(run).unwrap());
         files.iter_mut().for_each(|file| file.training.seconds = 0.0);
         assert_eq!(files[0], files[1], "{method}");
     }
@@ -89,7 +94,7 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
     *diverging.settings()[0].value = 1e3;
     let mut run = stepped(settings(diverging), 9);
     assert_eq!(run.stop_reason(), Some(StopReason::Diverged));
-    CheckpointFile::from_run(&run).save(&path).unwrap();
+    CheckpointFile::from_run(&run).unwrap().save(&path).unwrap();
     let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
     let text = |run: &Run| -> Vec<_> {
         let text = |record: &EpochRecord| format!("{record:?}");
@@ -100,7 +105,7 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
     let before = run.leader().best_mse();
     for run in [&mut read, &mut run] {
         run.continue_with(Method::default()).unwrap();
-        CheckpointFile::from_run(run).save(&path).unwrap();
+        CheckpointFile::from_run(run).unwrap().save(&path).unwrap();
         *run = CheckpointFile::load(&path).unwrap().resume().unwrap();
         while run.step().is_none() {}
     }
@@ -194,6 +199,7 @@ fn other_files_and_versions_are_named() {
         assert!(message.contains(expected), "{sentence}: {message}");
     }
     NetworkFile::from_run(&stepped(settings(Method::default()), 1))
+        .unwrap()
         .save(&path)
         .unwrap();
     let message = refusal(&fs::read(&path).unwrap());
@@ -212,7 +218,7 @@ fn impossible_contents_are_refused() {
     let run = stepped(settings(Method::default()), 2);
     let (_folder, path) = place();
     let refused = |edit: Edit| {
-        let mut file = CheckpointFile::from_run(&run);
+        let mut file = CheckpointFile::from_run(&run).unwrap();
         edit(&mut file);
         file.save(&path).unwrap();
         match CheckpointFile::load(&path) {

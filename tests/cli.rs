@@ -220,7 +220,7 @@ fn simulate_and_decode_agree_with_the_library() {
     let scale: ArrayScale = "10x6_3x18".parse().unwrap();
     let model = SensorModel::new(scale);
     let truth = Dataset::simulate(&model, &Scene::default(), 100, &mut Seed(5).rng(Stream::Test)).unwrap();
-    let decoded = file.network.decouple(truth.readings());
+    let decoded = file.network.decouple(&truth);
     let text = fs::read_to_string(folder.join("decoded.csv")).unwrap();
     assert!(text.starts_with("x_1,y_1,z_1,x_2,"));
     let lines = text.lines().skip(1);
@@ -229,7 +229,7 @@ fn simulate_and_decode_agree_with_the_library() {
         let numbers = line.split(',').map(|number| number.parse::<f64>().unwrap().to_bits());
         assert!(numbers.eq(row.iter().map(|number| number.to_bits())));
     }
-    let errors = Errors::measure(&truth, &decoded, SimulatedSettings::default().stroke_mm());
+    let errors = Errors::measure(&truth, &decoded, SimulatedSettings::default().source.stroke_mm());
     assert_eq!(file.errors, errors);
     assert_eq!(
         serde_json::from_value::<Errors>(report["errors"].clone()).unwrap(),

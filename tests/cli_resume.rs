@@ -312,7 +312,7 @@ fn threads_and_the_terminal_change_no_bit() {
     let files = [1, 2, 3].map(|threads| network(&folder.path().join(format!("{threads}.json"))));
     let mut run = Run::prepare(files[0].settings).unwrap();
     while run.step().is_none() {}
-    let mut library = NetworkFile::from_run(&run);
+    let mut library = NetworkFile::from_run(&run).unwrap();
     library.training.seconds = 0.0;
     for file in files {
         assert_eq!(file, library);

@@ -3,10 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use decoupler::{
-    dataset::{Dataset, Seed, Stream},
-    decoupling::{CompiledNetworks, FrameDecoder},
-    network::{DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, Shape, nguyen_widrow},
-    scene::Scene,
+    dataset::{Dataset, PerRow, Seed, Stream},
+    decoupling::{CompiledNetworks, Decoder},
+    network::{
+        DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
+    },
+    scene::{RowModel, Scene},
     sensor::{Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
@@ -25,29 +27,29 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
     let model = SensorModel::new("10x10_5x30".parse().unwrap());
     let rows = model.scale.rows();
     let set = Dataset::simulate(&model, &Scene::default(), 1000, &mut Seed(0).rng(Stream::Training)).unwrap();
-    let frame: Vec<f64> = set.resistances_ohm.iter().take(rows * 30).copied().collect();
+    let frame = set.frames().unwrap().frame(0).to_vec();
     let mut coordinates_mm = vec![0.0; rows * model.scale.coordinates_per_row()];
     let mut rng = Seed(0).rng(Stream::Start);
     for quantity in Quantity::ALL {
         // Without noise, single precision has sums in double precision; with noise it has not.
         for noise in [0.0, 1e-2] {
             let scaling = ScalingChoice::Whitening;
-            let mut network = |row| {
-                let set = set.of_row(row);
+            let network = |set: &Dataset| {
                 let choice = InputChoice { quantity, scaling };
-                let inputs = Inputs::fit(choice, set.readings(), noise).unwrap();
-                let outputs = MinMax::fit(set.targets()).unwrap();
+                let inputs = Inputs::fit(choice, set.readings(), noise)?;
+                let outputs = MinMax::fit(set.targets())?;
                 let shape = Shape {
                     inputs: inputs.count(),
                     hidden: 12,
                     outputs: outputs.varying().len(),
                 };
-                DecouplingNetwork::new(inputs, nguyen_widrow(shape, &mut rng), outputs)
+                let mlp = nguyen_widrow(shape, &mut rng);
+                Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
             };
-            let networks: Vec<DecouplingNetwork> = (0..rows).map(&mut network).collect();
-            let mut double = CompiledNetworks::<f64>::each(&networks);
-            let mut single = CompiledNetworks::<f32>::each(&networks);
-            let decoders: [&mut dyn FrameDecoder; 2] = [&mut double, &mut single];
+            let networks = PerRow::fit(&set, RowModel::Each, network).unwrap();
+            let mut double = CompiledNetworks::<f64>::new(&networks, rows);
+            let mut single = CompiledNetworks::<f32>::new(&networks, rows);
+            let decoders: [&mut dyn Decoder; 2] = [&mut double, &mut single];
             for decoder in decoders {
                 assert_eq!(allocations(|| decoder.decode(&frame, &mut coordinates_mm).unwrap()), 0);
             }

@@ -13,8 +13,8 @@ use std::{
 use decoupler::{
     dataset::{FoldUnit, Seed},
     evaluation::{
-        Run, SimulatedSettings,
-        experiments::{Axis, Bottleneck, CrossValidation, Experiment, ExperimentResults, Trial, run_experiments},
+        CrossValidation, Run, SimulatedSettings, Simulation,
+        experiments::{Axis, Bottleneck, Experiment, ExperimentResults, Trial, run_experiments},
     },
     sensor::{ArrayScale, SensorModel},
     training::Method,
@@ -24,10 +24,13 @@ use serde_json::Value;
 /// Of a second at most: a small array, few samples, few epochs.
 fn small(axis: Axis) -> Experiment {
     let mut base = SimulatedSettings {
-        sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
-        samples: 40,
-        validation_samples: 12,
-        test_samples: 20,
+        source: Simulation {
+            sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
+            samples: 40,
+            validation_samples: 12,
+            test_samples: 20,
+            ..Simulation::default()
+        },
         hidden: 3,
         starts: 2,
         ..SimulatedSettings::default()
@@ -117,7 +120,7 @@ fn a_trial_is_the_run_that_its_settings_describe() {
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
             assert_eq!(trial.errors, alone.node_scores().unwrap().network);
-            assert_eq!(trial.baselines, *alone.baselines());
+            assert_eq!(trial.baselines, *alone.baselines().unwrap());
             let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());

@@ -6,7 +6,7 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, SimulatedSettings, Simulation},
     export::{NetworkFile, NetworkFileError},
     sensor::SensorModel,
 };
@@ -16,10 +16,13 @@ use tempfile::TempDir;
 
 fn trained() -> NetworkFile {
     let mut settings = SimulatedSettings {
-        sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
-        samples: 100,
-        validation_samples: 20,
-        test_samples: 20,
+        source: Simulation {
+            sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
+            samples: 100,
+            validation_samples: 20,
+            test_samples: 20,
+            ..Simulation::default()
+        },
         hidden: 5,
         seed: Seed(u64::MAX),
         ..SimulatedSettings::default()
@@ -27,7 +30,7 @@ fn trained() -> NetworkFile {
     settings.training.stopping.epochs = 8;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    NetworkFile::from_run(&run)
+    NetworkFile::from_run(&run).unwrap()
 }
 
 fn place() -> (TempDir, PathBuf) {
@@ -46,7 +49,7 @@ fn what_is_read_is_what_was_written_bit_by_bit() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     // Far beyond the training range on both sides.
     let readings = Array2::from_shape_simple_fn((2000, 18), || 10_f64.powf(rng.random_range(-2.0..6.0)));
-    let bits = |network: &NetworkFile| network.network.decouple(readings.view()).mapv(f64::to_bits);
+    let bits = |network: &NetworkFile| network.network.at(0).decouple(readings.view()).mapv(f64::to_bits);
     assert_eq!(bits(&read), bits(&file));
 }
 
@@ -55,7 +58,7 @@ fn a_training_in_progress_can_be_saved() {
     let (_folder, path) = place();
     let mut run = Run::prepare(SimulatedSettings::default()).unwrap();
     for epochs in 0..2 {
-        let file = NetworkFile::from_run(&run);
+        let file = NetworkFile::from_run(&run).unwrap();
         assert_eq!(
             (file.training.stop_reason, file.training.history.len()),
             (None, epochs + 1)

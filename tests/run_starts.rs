@@ -4,17 +4,20 @@
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{MOST_STARTS, Run, RunError, SimulatedSettings, StartTrainer, best_start},
+    evaluation::{MOST_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, best_start},
     sensor::SensorModel,
     training::{Method, StopReason, StoppingRules, Trainer},
 };
 
 fn settings(starts: usize) -> SimulatedSettings {
     let mut settings = SimulatedSettings {
-        sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
-        samples: 100,
-        validation_samples: 40,
-        test_samples: 20,
+        source: Simulation {
+            sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
+            samples: 100,
+            validation_samples: 40,
+            test_samples: 20,
+            ..Simulation::default()
+        },
         hidden: 4,
         starts,
         seed: Seed(3),
@@ -65,7 +68,10 @@ fn the_first_start_is_the_run_of_one_start_and_the_others_differ() {
 fn the_start_of_lowest_validation_error_leads() {
     for validation_samples in [40, 0] {
         let run = trained(SimulatedSettings {
-            validation_samples,
+            source: Simulation {
+                validation_samples,
+                ..settings(4).source
+            },
             ..settings(4)
         });
         let starts = run.starts();
@@ -76,7 +82,7 @@ fn the_start_of_lowest_validation_error_leads() {
         assert_eq!(starts[number].validation_mse.is_some(), validation_samples > 0);
         assert!(
             run.network()
-                .each()
+                .values()
                 .iter()
                 .map(|network| network.mlp())
                 .eq(run.trainers()[number].best())

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use decoupler::{
     dataset::Seed,
+    decoupling::{DecoderKind, Precision},
     evaluation::{
-        DecoderKind, DecoderSet, Outlook, Precision, Preset, Run, SimulatedSettings, TradePoint, fastest_under,
-        measure_trade, most_accurate_under,
+        DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradePoint, fastest_under, measure_trade,
+        most_accurate_under,
     },
     export::{CheckpointFile, NetworkFile},
     scene::{Loading, Movement, Noise, Rows, Scene},
@@ -18,10 +19,13 @@ use decoupler::{
 /// Known rows of a small array, quick to train.
 fn small() -> SimulatedSettings {
     let mut settings = SimulatedSettings {
-        sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
-        samples: 900,
-        validation_samples: 90,
-        test_samples: 60,
+        source: Simulation {
+            sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
+            samples: 900,
+            validation_samples: 90,
+            test_samples: 60,
+            ..Preset::Best.settings().source
+        },
         hidden: 6,
         ..Preset::Best.settings()
     };
@@ -36,7 +40,7 @@ fn trained(settings: SimulatedSettings) -> Run {
 }
 
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
-    let set = DecoderSet::of_run(run).unwrap();
+    let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
     assert!(report.cost.frame_us > 0.0, "{kind}");
     report.errors.z_percent.unwrap()
@@ -45,7 +49,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 #[test]
 fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
     let run = trained(small());
-    assert_eq!(run.network().each().len(), 3);
+    assert_eq!(run.network().values().len(), 3);
     let errors = run.node_scores().unwrap().network;
     assert!(errors.z_percent.unwrap() < 0.05, "{errors:?}");
     assert_eq!(errors.x_percent, Some(0.0), "what does not vary is known");
@@ -75,7 +79,7 @@ fn rows_that_are_not_known_are_found_out() {
     settings.source.scene.rows = Rows::All;
     settings.training.stopping.epochs = 20;
     let run = trained(settings);
-    assert_eq!(run.network().each().len(), 1);
+    assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
     settings.source.scene.noise = Noise::relative(1e-5);
     let set = DecoderSet::new(&settings, None).unwrap();
@@ -97,13 +101,13 @@ fn one_row_is_all_that_is_drawn_and_modelled() {
     settings.source.scene.rows = Rows::One(2);
     settings.source.samples = 300;
     let run = trained(settings);
-    assert_eq!(run.test().rows(), 1);
+    assert_eq!(run.test().row_count(), 1);
     assert_eq!(run.test().samples(), 60);
-    assert!(run.test().coordinates_mm.iter().step_by(3).all(|&x| x == 10.0));
+    assert!(run.test().targets().iter().step_by(3).all(|&x| x == 10.0));
     let size = settings.source.model_size().unwrap();
     assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
     assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
-    let known = small().model_size().unwrap();
+    let known = small().source.model_size().unwrap();
     assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
     settings.source.scene.movement = Movement::SIDEWAYS;
     assert_eq!(settings.source.model_size().unwrap().unknowns, 12);
@@ -134,7 +138,7 @@ fn known_rows_go_on_from_saved_states_with_the_same_bits() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
-    let file = NetworkFile::from_run(&whole);
+    let file = NetworkFile::from_run(&whole).unwrap();
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let text = std::fs::read_to_string(&path).unwrap();
@@ -154,7 +158,7 @@ fn files_of_older_programs_still_load() {
         .unwrap()
         .resume()
         .unwrap();
-    assert_eq!(run.settings(), &file.settings);
+    assert_eq!(run.settings().simulated().unwrap(), file.settings);
     assert_eq!(run.network(), file.network);
     assert_eq!(run.node_scores().unwrap().network, file.errors);
 }
@@ -177,7 +181,7 @@ fn with_noise_newton_comes_close_to_the_reference() {
         settings.source.scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
-        let limit = run.baselines().reference.unwrap().z_percent.unwrap();
+        let limit = run.baselines().unwrap().reference.unwrap().z_percent.unwrap();
         for kind in [DecoderKind::Newton, DecoderKind::Polish] {
             let ratio = z_percent(&run, kind, Precision::Double) / limit;
             assert!((0.9..1.1).contains(&ratio), "{kind} {loading}: {ratio}");
@@ -200,7 +204,10 @@ fn sideways_movement_is_said_to_be_badly_conditioned() {
 #[test]
 fn a_trade_has_a_point_for_every_choice() {
     let mut settings = SimulatedSettings {
-        samples: 90,
+        source: Simulation {
+            samples: 90,
+            ..small().source
+        },
         seed: Seed(3),
         ..small()
     };

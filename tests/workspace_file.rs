@@ -4,16 +4,19 @@
 use std::{fs, path::Path, sync::Arc};
 
 use decoupler::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, SimulatedSettings, Simulation},
     export::{KeptRun, NetworkFile, Workspace},
 };
 
 fn kept(id: u64, name: &str, hidden: usize) -> KeptRun {
     let mut settings = SimulatedSettings {
+        source: Simulation {
+            samples: 40,
+            validation_samples: 8,
+            test_samples: 8,
+            ..Simulation::default()
+        },
         hidden,
-        samples: 40,
-        validation_samples: 8,
-        test_samples: 8,
         ..SimulatedSettings::default()
     };
     settings.source.sensor.scale = "4x3_2x9".parse().unwrap();
@@ -23,7 +26,7 @@ fn kept(id: u64, name: &str, hidden: usize) -> KeptRun {
     KeptRun {
         id,
         name: name.to_owned(),
-        file: Arc::new(NetworkFile::from_run(&run)),
+        file: Arc::new(NetworkFile::from_run(&run).unwrap()),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use decoupler::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, SimulatedSettings, Simulation},
     training::{StoppingRules, TrainingSettings},
 };
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
@@ -19,7 +19,10 @@ pub(crate) fn print() {
         ..StoppingRules::default()
     };
     let settings = SimulatedSettings {
-        validation_samples: 0,
+        source: Simulation {
+            validation_samples: 0,
+            ..Simulation::default()
+        },
         training: TrainingSettings {
             stopping,
             ..TrainingSettings::default()

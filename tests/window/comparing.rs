@@ -55,7 +55,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
 
     let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
-    let shown = runs.each_ref().map(NetworkFile::from_run);
+    let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
     let check = |driver: &Driver| {
         let [a, b] = shown.each_ref().map(|file| file.errors);
         for (letter, errors) in [("A", a), ("B", b)] {

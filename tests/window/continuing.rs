@@ -162,7 +162,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     save(&mut driver, "Type a path for the network", &network);
     let mut whole = stepped(momentum(1_000_000), driver.epochs());
     whole.stop();
-    let mut expected = NetworkFile::from_run(&whole);
+    let mut expected = NetworkFile::from_run(&whole).unwrap();
     let found = NetworkFile::load(&network).unwrap();
     // Only the time it took differs.
     expected.training.seconds = found.training.seconds;
@@ -183,7 +183,10 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     let folder = tempfile::tempdir().unwrap();
     let [terminal, window] = ["terminal", "window"].map(|name| folder.path().join(name));
     let settings = SimulatedSettings { starts: 3, ..small() };
-    CheckpointFile::from_run(&stepped(settings, 7)).save(&terminal).unwrap();
+    CheckpointFile::from_run(&stepped(settings, 7))
+        .unwrap()
+        .save(&terminal)
+        .unwrap();
     let mut driver = Driver::open();
     give_path(&mut driver, OPEN, &terminal);
     driver.wait("the training", |driver| driver.epochs() == 7);
@@ -199,7 +202,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     while run.step().is_none() {}
     assert_eq!(run.starts(), whole.starts());
     // One that has ended opens as ended, and can be given more epochs.
-    CheckpointFile::from_run(&run).save(&terminal).unwrap();
+    CheckpointFile::from_run(&run).unwrap().save(&terminal).unwrap();
     give_path(&mut driver, OPEN, &terminal);
     driver.wait("the ended training", |driver| {
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
@@ -215,7 +218,10 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
     driver.configure_small();
     driver.train();
     let (table, phase, draft) = (driver.table(), driver.state().phase, driver.state().draft);
-    CheckpointFile::from_run(&stepped(momentum(50), 3)).save(&path).unwrap();
+    CheckpointFile::from_run(&stepped(momentum(50), 3))
+        .unwrap()
+        .save(&path)
+        .unwrap();
     let sound = fs::read_to_string(&path).unwrap();
     let cases = [
         ("is cut off", sound[..sound.len() / 2].to_owned()),

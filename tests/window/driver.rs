@@ -9,7 +9,7 @@ use std::{
 };
 
 use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
-use decoupler::evaluation::{Run, SimulatedSettings, error_rows};
+use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
 use egui_kittest::{
@@ -245,7 +245,10 @@ impl Driver {
         let (small, wanted) = (self.state().draft, small());
         assert_eq!(small, wanted, "typing the settings gives the settings");
         self.wait("the small array's surface", |driver| {
-            driver.state().test().is_some_and(|test| test.sensor == wanted.sensor)
+            driver
+                .state()
+                .test()
+                .is_some_and(|test| test.sensor == wanted.source.sensor)
         });
     }
 
@@ -283,8 +286,11 @@ const ROWS: [&str; 5] = ["training mean", "linear map", "network", "reference", 
 /// The settings of [`Driver::configure_small`].
 pub(crate) fn small() -> SimulatedSettings {
     let mut settings = SimulatedSettings {
+        source: Simulation {
+            samples: 200,
+            ..Simulation::default()
+        },
         hidden: 6,
-        samples: 200,
         ..SimulatedSettings::default()
     };
     settings.source.sensor.scale = "10×6_3×18".parse().unwrap();
@@ -302,7 +308,7 @@ pub(crate) fn trained(settings: SimulatedSettings) -> Run {
 /// The error table that the library gives for `run`, in the window's words.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
-    let rows = error_rows(&run.node_scores().unwrap().network, run.baselines(), None);
+    let rows = error_rows(&run.node_scores().unwrap().network, run.baselines().unwrap(), None);
     let cells = rows.iter().flat_map(|row| {
         let named = columns.iter().zip(row.values());
         named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(value)))

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use decoupler::{
     app::Phase,
-    evaluation::{Outlook, Preset, SimulatedSettings},
+    evaluation::{Outlook, Preset, SimulatedSettings, Simulation},
     export::format_number,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
@@ -46,7 +46,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     let mut settings = small();
     settings.source.scene.rows = Rows::Known;
     let run = trained(settings);
-    assert_eq!(run.network().each().len(), 10);
+    assert_eq!(run.network().values().len(), 10);
     assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
     assert_eq!(driver.table(), table_of(&run));
     assert!(driver.has("Decoupled surface"));
@@ -117,7 +117,11 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
     let paper = SimulatedSettings::default();
     assert_eq!(
         draft,
-        SimulatedSettings { scene, inputs, ..paper },
+        SimulatedSettings {
+            source: Simulation { scene, ..paper.source },
+            inputs,
+            ..paper
+        },
         "and nothing else changed"
     );
     driver.click("Noise on resistance");
@@ -142,7 +146,7 @@ fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
     settings.inputs.scaling = ScalingChoice::Whitening;
     let run = trained(settings);
     assert_eq!(driver.table(), table_of(&run));
-    let limit = run.baselines().reference.unwrap();
+    let limit = run.baselines().unwrap().reference.unwrap();
     assert!(limit.z_mm > 0.0);
     let ratio = run.node_scores().unwrap().network.z_mm / limit.z_mm;
     let said = format!("{} times the limit that noise sets", format_number(ratio));
@@ -234,8 +238,8 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
     driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     let noisy = Preset::Best.settings_in(Noise::relative(0.001));
-    assert_ne!(noisy.samples, best.source.samples);
-    assert_eq!(driver.state().draft.source.samples, noisy.samples);
+    assert_ne!(noisy.source.samples, best.source.samples);
+    assert_eq!(driver.state().draft.source.samples, noisy.source.samples);
     let StoppingRules { epochs, .. } = driver.state().draft.training.stopping;
     assert_eq!(epochs, noisy.training.stopping.epochs);
     driver.enter("Relative noise", "0");
@@ -326,7 +330,7 @@ fn files_written_before_there_were_scenes_still_open() {
     driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
     assert_eq!(driver.state().notice, None);
     let kept = &driver.state().runs.workspace.runs[0].file.settings;
-    assert_eq!((kept.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
+    assert_eq!((kept.source.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
     driver.click_button("Compare");
     driver.wait("its surface", |driver| driver.state().runs.compared[0].is_some());
 }

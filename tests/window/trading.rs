@@ -128,7 +128,7 @@ fn a_click_on_a_point_loads_its_configuration() {
     let draft = driver.state().draft;
     assert_eq!(
         (draft.source.scene, draft.inputs, draft.source.samples),
-        (ridge.scene, ridge.inputs, ridge.samples)
+        (ridge.source.scene, ridge.inputs, ridge.source.samples)
     );
     driver.click_button("Trade-off");
     let (marked, level) = (

@@ -227,7 +227,7 @@ fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
     driver.train();
     let run = driver.state().run.as_ref().unwrap();
     let result = run.result.as_ref().unwrap();
-    let nodes = run.test.frame(&result.decoupled_mm, 0).nodes_mm;
+    let nodes = run.test.frame(result.decoupled_mm.view(), 0).nodes_mm;
     // The best network is the one before the first step, which knows nothing yet.
     assert_eq!(result.best_epoch, 0);
     let (low, high) = (4.0 - 0.08, 5.0 + 0.08);
