@@ -2,7 +2,6 @@ use std::{
     error::Error,
     ffi::OsString,
     io::{Write, stderr},
-    ops::RangeInclusive,
     process::ExitCode,
 };
 
@@ -90,20 +89,6 @@ fn one_line(error: &clap::Error) -> String {
     });
     let line = said.collect::<Vec<_>>().join("; ");
     line.strip_prefix("error: ").unwrap_or(&line).to_owned()
-}
-
-/// A parser of counts in `allowed`.
-pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
-    move |text| {
-        let count = text.parse().ok().filter(|count| allowed.contains(count));
-        count.ok_or_else(|| format!("give a whole number from {} to {}", allowed.start(), allowed.end()))
-    }
-}
-
-/// A parser of seeds.
-pub(super) fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
 }
 
 #[cfg(test)]

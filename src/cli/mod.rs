@@ -8,6 +8,7 @@ mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
+mod parsers;
 mod reproduce;
 mod reproduce_report;
 mod scene_arguments;

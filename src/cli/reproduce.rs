@@ -8,9 +8,9 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
+    parsers::{count, seed},
     reproduce_report::{Reproduced, print_json, print_text},
 };
 use crate::{

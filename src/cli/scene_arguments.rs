@@ -1,6 +1,9 @@
 use clap::Args;
 
-use super::{arguments::count, failure::Failure, training_arguments::number};
+use super::{
+    failure::Failure,
+    parsers::{count, number},
+};
 use crate::{
     evaluation::{DecoderKind, Preset, RunSettings},
     network::{Quantity, ScalingChoice},

@@ -6,8 +6,8 @@ use std::{
 use clap::Args;
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
+    parsers::{count, seed},
     scene_arguments::SceneArguments,
 };
 use crate::{

@@ -4,12 +4,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
+    parsers::{count, number, seed},
     scene_arguments::SceneArguments,
     trade_report::{Limits, print_json, print_text},
-    training_arguments::number,
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},

@@ -4,8 +4,8 @@ use clap::{
 };
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
+    parsers::{count, number, seed},
     scene_arguments::SceneArguments,
 };
 use crate::{
@@ -150,14 +150,6 @@ fn method() -> impl TypedValueParser<Value = Method> {
         let mut methods = Method::all().into_iter();
         methods.find(|method| method.short_name() == name).unwrap_or_default()
     })
-}
-
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

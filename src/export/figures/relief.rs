@@ -8,7 +8,7 @@ use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke},
     colours::{DIM, GRID, INK, lit, viridis},
     plot_axis::share,
-    surfaces::SurfacePanel,
+    surface_panel::SurfacePanel,
 };
 use crate::{
     export::ticks::{multiples, step_for, tick_text},

@@ -1,7 +1,5 @@
 use std::ops::RangeInclusive;
 
-use glam::DVec3;
-
 use super::{
     canvas::{Area, Canvas, Stroke},
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
@@ -11,6 +9,7 @@ use super::{
     plot::Plot,
     plot_axis::{PlotAxis, share},
     relief::Relief,
+    surface_panel::SurfacePanel,
 };
 use crate::surface::Grid;
 
@@ -21,17 +20,6 @@ pub enum SurfaceLook {
     Top,
     /// In space: Fig. 7.
     ThreeD,
-}
-
-/// One surface of the figure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SurfacePanel {
-    /// Stands above it: "Actual".
-    pub title: String,
-    /// Heights on the grid, `x points × y points`, in millimetres.
-    pub values_mm: Vec<f64>,
-    /// The nodes: x, y and z in millimetres; dots on the map.
-    pub nodes_mm: Vec<DVec3>,
 }
 
 /// Surfaces side by side with one scale of heights and colours. Only what lies between the nodes is drawn; beyond them
