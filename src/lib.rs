@@ -14,12 +14,16 @@
 //! | [`decoupling`] | resistances to deformation, every way we know |
 //! | [`evaluation`] | axis errors, tables, a whole run from settings to report |
 //! | [`surface`] | smooth surfaces through the nodes |
-//! | [`export`] | files for other programs |
-//! | [`cli`] | the work without a window |
+//! | [`export`] | files for other programs; `export::figures` draws (feature `figures`) |
+//! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
+//!
+//! All features are on by default. The library alone, without argument parser, progress bars, renderer and window, is
+//! `decoupler = { version = "0.1", default-features = false }`.
 
 #[cfg(feature = "gui")]
 pub mod app;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod dataset;
 pub mod decoupling;
