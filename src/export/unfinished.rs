@@ -1,13 +1,14 @@
 use std::{
     collections::BTreeSet,
     fs::{self, File},
-    io,
+    io::{self, ErrorKind},
     path::{Path, PathBuf},
     process,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
-
-use tempfile::NamedTempFile;
 
 /// Every file in the making. A program that is ended from another thread drops nothing, so it looks here.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -20,49 +21,49 @@ fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 /// A file in the making, removed when dropped.
 #[derive(Debug)]
 pub(super) struct Unfinished {
-    file: NamedTempFile,
-    listed: Listed,
-}
-
-/// An entry of [`ALL`], while it lives.
-#[derive(Debug)]
-struct Listed(PathBuf);
-
-impl Drop for Listed {
-    fn drop(&mut self) {
-        all().remove(&self.0);
-    }
+    file: File,
+    /// In [`ALL`] until the file has found its place.
+    path: PathBuf,
 }
 
 impl Unfinished {
-    /// A nameless-looking file in `folder` with the permissions of any new file: what the umask leaves of 0666.
+    /// Creates a temporary file in `folder`, with the default permissions (0666 minus the umask).
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".decoupler-").suffix(".part");
-        #[cfg(unix)]
-        {
-            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
-            builder.permissions(Permissions::from_mode(0o666));
-        }
-        // The default error repeats the temporary name, which means nothing to the user.
-        let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
         let mut all = all();
-        let file = builder.tempfile_in(folder).map_err(plain)?;
-        all.insert(file.path().to_owned());
-        let listed = Listed(file.path().to_owned());
-        Ok(Self { file, listed })
+        loop {
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            let path = folder.join(format!(".decoupler-{}-{number}.part", process::id()));
+            match File::create_new(&path) {
+                // Another machine or container has a process of the same number, or one was killed.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+                Ok(file) => {
+                    all.insert(path.clone());
+                    return Ok(Self { file, path });
+                }
+            }
+        }
     }
 
     pub(super) fn as_file(&self) -> &File {
-        self.file.as_file()
+        &self.file
     }
 
     /// Puts it in the place of `target`.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
-        let Self { file, listed } = self;
-        let persisted = file.persist(target);
-        drop(listed);
-        persisted.map(drop).map_err(|error| error.error)
+        fs::rename(&self.path, target)?;
+        all().remove(&self.path);
+        Ok(())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        if all().remove(&self.path) {
+            // What cannot be removed stays beside the target; nobody is left to tell.
+            let _ = fs::remove_file(&self.path);
+        }
     }
 }
 
