@@ -34,3 +34,9 @@ pub mod scene;
 pub mod sensor;
 pub mod surface;
 pub mod training;
+
+/// The crates whose types stand in public signatures: vectors in space (`glam::DVec3`) in [`sensor`], [`scene`],
+/// [`dataset`] and [`export`]; arrays (`ndarray::Array2`) in [`dataset`], [`network`], [`decoupling`], [`evaluation`] and
+/// [`export`]; generators of random numbers (`rand::Rng`) wherever something is drawn. Use these to have matching
+/// versions.
+pub use {glam, ndarray, rand};

@@ -34,8 +34,8 @@ enum Command {
     Trade(Box<Trade>),
 }
 
-/// Does what `arguments` (the program's name first) ask for. `window` is what a call without a command opens, in
-/// builds that have one.
+/// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command
+/// it opens `window`, if this build has one.
 pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Option<Window>) -> ExitCode {
     let done = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments.run(window),
@@ -76,7 +76,7 @@ impl Arguments {
     }
 }
 
-/// What the parser says, without its usage text.
+/// The parser's message in one line, without its usage text.
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraphs = text.split("\n\n").map(|paragraph| {

@@ -9,7 +9,7 @@ use crate::{
     export::{AtomicFile, NetworkFile, WriteError, write_coordinates_header, write_numbers},
 };
 
-/// Rows decoded and written together, so that memory does not grow with the file.
+/// Number of lines decoded and written together, so that memory does not grow with the file.
 const BLOCK: usize = 1024;
 
 /// Decouple the resistances of a CSV file with a saved network

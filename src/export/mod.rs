@@ -33,10 +33,13 @@ pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markd
 pub use experiment_words::{describe_conditions, describe_failures};
 pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
-pub use samples::{write_coordinates_header, write_numbers, write_samples, write_samples_header};
+#[cfg(feature = "cli")]
+pub(crate) use samples::{write_coordinates_header, write_numbers};
+pub use samples::{write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
 pub use trade_file::write_trade;
 #[cfg(feature = "figures")]
 pub use trade_plot::trade_plot;
-pub use unfinished::exit_leaving_nothing;
+#[cfg(feature = "cli")]
+pub(crate) use unfinished::exit_leaving_nothing;
 pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

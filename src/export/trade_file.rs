@@ -6,7 +6,7 @@ use crate::evaluation::{Precision, TradeCost, TradeLevel};
 /// the field is empty.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,

@@ -10,7 +10,7 @@ use std::{
     },
 };
 
-/// Every file in the making. A program that is ended from another thread drops nothing, so it looks here.
+/// Paths of all temporary files. A program ended from another thread runs no destructors, so it removes these.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -18,11 +18,11 @@ fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file in the making, removed when dropped.
+/// A temporary file, removed when dropped.
 #[derive(Debug)]
 pub(super) struct Unfinished {
     file: File,
-    /// In [`ALL`] until the file has found its place.
+    /// Listed in [`ALL`] until the file is renamed.
     path: PathBuf,
 }
 
@@ -50,7 +50,7 @@ impl Unfinished {
         &self.file
     }
 
-    /// Puts it in the place of `target`.
+    /// Renames the file to `target`, replacing a file that is there.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
         fs::rename(&self.path, target)?;
         all().remove(&self.path);
@@ -67,8 +67,9 @@ impl Drop for Unfinished {
     }
 }
 
-/// Ends the program with this exit status, from any thread. Files in the making leave nothing.
-pub fn exit_leaving_nothing(status: i32) -> ! {
+/// Ends the program with this exit status, from any thread, after removing all temporary files.
+#[cfg(feature = "cli")]
+pub(crate) fn exit_leaving_nothing(status: i32) -> ! {
     // Held to the end, so that no other thread begins one meanwhile.
     let all = all();
     for path in all.iter() {
@@ -76,4 +77,28 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
         let _ = fs::remove_file(path);
     }
     process::exit(status)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_left_by_another_process_is_neither_taken_nor_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = Unfinished::begin(folder.path()).unwrap();
+        let name = first.path.file_stem().unwrap().to_str().unwrap();
+        let (start, number) = name.rsplit_once('-').unwrap();
+        let number: u64 = number.parse().unwrap();
+        let left = (1..100).map(|later| folder.path().join(format!("{start}-{}.part", number + later)));
+        let left: Vec<_> = left.collect();
+        left.iter().for_each(|path| fs::write(path, "left").unwrap());
+        let second = Unfinished::begin(folder.path()).unwrap();
+        assert!(!left.contains(&second.path));
+        drop((first, second));
+        for path in &left {
+            assert_eq!(fs::read(path).unwrap(), b"left");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), left.len());
+    }
 }

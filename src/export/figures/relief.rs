@@ -15,7 +15,7 @@ use crate::{
     surface::Grid,
 };
 
-/// Where the eye is: turned from the x axis, and above the horizon.
+/// Direction of view: angle from the x axis, and angle above the horizon, in radians.
 const AZIMUTH: f64 = -0.92;
 const ELEVATION: f64 = 0.52;
 /// Height of the box, its longer side being 1.
@@ -25,7 +25,7 @@ const NARROWEST: f64 = 0.6;
 /// Room for ticks and names around the box.
 const MARGIN: [f64; 2] = [36.0, 24.0];
 
-/// Millimetres to places on the canvas.
+/// Projection from millimetres to the canvas.
 pub(super) struct Relief {
     area: Area,
     low: DVec3,

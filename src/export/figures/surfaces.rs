@@ -13,12 +13,12 @@ use super::{
 };
 use crate::surface::Grid;
 
-/// From where surfaces are seen.
+/// View of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceLook {
-    /// As a map: the paper's Figs. 4 and 8.
+    /// From above, as a map: the paper's Figs. 4 and 8.
     Top,
-    /// In space: Fig. 7.
+    /// In three dimensions, without perspective: the paper's Fig. 7.
     ThreeD,
 }
 
@@ -26,22 +26,22 @@ pub enum SurfaceLook {
 /// there are no data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceFigure {
-    /// Where the values are.
+    /// Grid of the values.
     pub grid: Grid,
-    /// From left to right.
+    /// The surfaces from left to right.
     pub panels: Vec<SurfacePanel>,
     /// Heights at the ends of the scale, in millimetres.
     pub range_mm: RangeInclusive<f64>,
-    /// From where.
+    /// View of all surfaces.
     pub look: SurfaceLook,
 }
 
 impl SurfaceFigure {
     const HEIGHT: f64 = 240.0;
-    /// Cells a side at most: more would only make the file larger.
+    /// Maximum number of cells per side: more would only make the file larger.
     const MOST_CELLS: usize = 64;
 
-    /// Draws it, as wide as a page.
+    /// Draws the figure, as wide as a page.
     pub fn draw(&self) -> Picture {
         let mut canvas = Canvas::new(Plot::WIDE_PT, Self::HEIGHT);
         let width = (Plot::WIDE_PT - COLOUR_BAR_WIDTH - 8.0) / self.panels.len().max(1) as f64;
@@ -141,7 +141,7 @@ impl SurfaceFigure {
     }
 }
 
-/// At most so many cells between the first and the last index.
+/// Thins `indices` to at most `most` cells between the first and the last one.
 fn thinned(indices: RangeInclusive<usize>, most: usize) -> Vec<usize> {
     let (first, last) = indices.into_inner();
     let stride = (last - first).div_ceil(most).max(1);
