@@ -24,6 +24,7 @@ pub struct Dataset {
 
 /// Why samples cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum DatasetError {
     /// The number of samples is out of range.
     #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]

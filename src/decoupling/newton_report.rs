@@ -58,6 +58,7 @@ pub struct NewtonReport {
 
 /// Readings or sizes that cannot be solved.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum NewtonError {
     /// A reading is not a resistance.
     #[error("reading {column} is {value} ohm: give finite numbers above 0")]

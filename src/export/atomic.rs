@@ -10,6 +10,7 @@ use super::unfinished::Unfinished;
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// Its folder is missing.
     #[error("cannot write '{}': the folder '{}' does not exist; make it first", .path.display(), .folder.display())]

@@ -41,6 +41,7 @@ pub struct CheckpointFile {
 
 /// Errors of reading or writing a checkpoint.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CheckpointFileError {
     /// The operating system refuses to read it.
     #[error("cannot read '{}': {source}", .path.display())]

@@ -62,6 +62,7 @@ pub struct TrainingRecord {
 
 /// Errors of reading or writing a network file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum NetworkFileError {
     /// The operating system refuses to read it.
     #[error("cannot read '{}': {source}", .path.display())]

@@ -50,6 +50,7 @@ pub struct FoundWorkspace {
 
 /// Errors of loading a workspace. The file is then left unchanged, and must not be written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WorkspaceError {
     /// The operating system refuses to read it.
     #[error("cannot read the run list '{}': {source}; runs of this session are not kept", .path.display())]

@@ -36,6 +36,7 @@ impl PictureFormat {
 
 /// Errors of writing a figure.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PictureError {
     /// The figure cannot be drawn in pixels.
     #[error("the picture cannot be drawn in pixels: {0}; save it as SVG instead")]
