@@ -37,6 +37,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let split = hold_out(set.select(&Vec::from_iter(0..500)), 5, &mut Seed(0).rng(Stream::Split));
     let mut run = Run::on_sets(settings, split, test)?;
     while run.step().is_none() {}
-    println!("one network, last 100 moments: R² {:?}", run.target_table()[2].targets[0].r2);
+    println!(
+        "one network, last 100 moments: R² {:?}",
+        run.target_table()[2].targets[0].r2
+    );
     Ok(())
 }

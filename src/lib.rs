@@ -14,12 +14,16 @@
 //! | [`decoupling`] | resistances to deformation, every way we know |
 //! | [`evaluation`] | axis errors, tables, a whole run from settings to report |
 //! | [`surface`] | smooth surfaces through the nodes |
-//! | [`export`] | files for other programs |
-//! | [`cli`] | the work without a window |
+//! | [`export`] | files for other programs; `export::figures` draws (feature `figures`) |
+//! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
+//!
+//! All features are on by default. The library alone, without argument parser, progress bars, renderer and window, is
+//! `decoupler = { version = "0.1", default-features = false }`.
 
 #[cfg(feature = "gui")]
 pub mod app;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod dataset;
 pub mod decoupling;
@@ -30,3 +34,9 @@ pub mod scene;
 pub mod sensor;
 pub mod surface;
 pub mod training;
+
+/// The crates whose types stand in public signatures: vectors in space (`glam::DVec3`) in [`sensor`], [`scene`],
+/// [`dataset`] and [`export`]; arrays (`ndarray::Array2`) in [`dataset`], [`network`], [`decoupling`], [`evaluation`] and
+/// [`export`]; generators of random numbers (`rand::Rng`) wherever something is drawn. Use these to have matching
+/// versions.
+pub use {glam, ndarray, rand};

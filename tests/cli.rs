@@ -1,5 +1,6 @@
 //! The program in the terminal, run as its users run it.
 
+#![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{

@@ -1,5 +1,6 @@
 //! Trainings in the terminal that are killed, interrupted, resumed, and continued with another method.
 
+#![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{

@@ -1,5 +1,6 @@
 //! Scenes, inputs and decoders in the terminal.
 
+#![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{

@@ -1,4 +1,6 @@
 //! Figures for print: what is drawn is what was given, on every machine alike.
+
+#![cfg(feature = "figures")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use decoupler::{

@@ -21,7 +21,7 @@ fn recording(samples: usize, rows: &[usize], seed: u64) -> Dataset {
     let targets = Array2::from_shape_simple_fn((samples, 2), || rng.random_range(-1.0..1.0));
     let row_wires: Vec<usize> = (0..samples).map(|sample| rows[sample % rows.len()]).collect();
     let readings = Array2::from_shape_fn((samples, 4), |(sample, channel)| {
-        let (x, y, row) = (targets[[sample, 0]], targets[[sample, 1]], row_wires[sample] as f64);
+        let (x, y, row): (f64, f64, f64) = (targets[[sample, 0]], targets[[sample, 1]], row_wires[sample] as f64);
         let clean = [x + 0.3 * y * y, y - 0.2 * x, (x + y).sin(), x * y][channel];
         (1.0 + row) * clean + 1e-3 * rng.random_range(-1.0..1.0)
     });
@@ -58,15 +58,25 @@ fn a_network_learns_what_a_linear_map_cannot() {
     let run = trained(settings(RowModel::Shared), &recording(600, &[0], 0), 500);
     assert!(matches!(run.settings().source, Source::Measured(_)));
     let table = run.target_table();
-    assert_eq!(table.iter().map(|row| row.name).collect::<Vec<_>>(), ["training mean", "linear map", "network"]);
+    assert_eq!(
+        table.iter().map(|row| row.name).collect::<Vec<_>>(),
+        ["training mean", "linear map", "network"]
+    );
     for target in 0..2 {
         let [mean, linear, network] = [0, 1, 2].map(|row| table[row].targets[target].rmse);
         // Uniform targets on [−1, 1] deviate by 1/√3.
         assert!((mean - 1.0 / 3.0_f64.sqrt()).abs() < 0.1, "{mean}");
-        assert!(linear < 0.7 * mean && network < 0.1 * linear, "{target}: {mean} {linear} {network}");
+        assert!(
+            linear < 0.7 * mean && network < 0.1 * linear,
+            "{target}: {mean} {linear} {network}"
+        );
     }
     assert!(table[2].targets.iter().all(|target| target.r2.unwrap() > 0.999));
-    assert_eq!((run.baselines(), run.node_scores()), (None, None), "there are no nodes to judge");
+    assert_eq!(
+        (run.baselines(), run.node_scores()),
+        (None, None),
+        "there are no nodes to judge"
+    );
 }
 
 #[test]
@@ -98,12 +108,23 @@ fn every_fold_is_answered_by_networks_that_have_not_seen_it() {
     // A network that had seen its test group would know the offset that only that group has.
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let offsets: Vec<f64> = (0..20).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| f64::from(u8::from(sample / 20 == channel)));
-    let targets = Array2::from_shape_fn((400, 1), |(sample, _)| offsets[sample / 20] + 1e-3 * rng.random::<f64>());
+    let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| {
+        f64::from(u8::from(sample / 20 == channel))
+    });
+    let targets = Array2::from_shape_fn((400, 1), |(sample, _)| {
+        offsets[sample / 20] + 1e-3 * rng.random::<f64>()
+    });
     let set = Dataset::new(readings, targets, None, (0..400).map(|sample| sample / 20).collect()).unwrap();
     let r2 = |unit| {
-        let validation = CrossValidation { folds: 5, repeats: 1, unit };
-        let validated = validation.run(&settings(RowModel::Shared), &set, 0, || false).unwrap().unwrap();
+        let validation = CrossValidation {
+            folds: 5,
+            repeats: 1,
+            unit,
+        };
+        let validated = validation
+            .run(&settings(RowModel::Shared), &set, 0, || false)
+            .unwrap()
+            .unwrap();
         let table = validated.target_table(&set);
         table[2].targets[0].r2.unwrap()
     };
@@ -126,7 +147,11 @@ fn every_decoder_of_readings_alone_is_measured_and_the_sensors_are_not() {
     for kind in DecoderKind::ALL {
         let report = decoders.measure_targets(kind, Precision::Double, &test).unwrap();
         assert_eq!(report.is_none(), kind.needs_sensor(), "{kind}");
-        assert_eq!(decoders.measure(kind, Precision::Double, &test).unwrap(), None, "{kind} has no nodes");
+        assert_eq!(
+            decoders.measure(kind, Precision::Double, &test).unwrap(),
+            None,
+            "{kind} has no nodes"
+        );
         if let Some(report) = report {
             assert!(report.targets.iter().all(|target| target.rmse.is_finite()), "{kind}");
             let is_better = report.targets[0].rmse < 0.4;
@@ -153,12 +178,29 @@ fn a_measured_training_resumes_with_the_same_bits() {
 fn sets_that_do_not_belong_together_are_named() {
     let set = recording(100, &[0, 1], 6);
     let (training, _) = split(&set, 80);
-    let run = |rows, split: &Split, test| Run::on_sets(settings(rows), split.clone(), test).err().unwrap().to_string();
-    let narrow = Dataset::new(Array2::zeros((4, 3)), Array2::zeros((4, 2)), Some(&[0, 1, 0, 1]), vec![0; 4]).unwrap();
+    let run = |rows, split: &Split, test| {
+        Run::on_sets(settings(rows), split.clone(), test)
+            .err()
+            .unwrap()
+            .to_string()
+    };
+    let narrow = Dataset::new(
+        Array2::zeros((4, 3)),
+        Array2::zeros((4, 2)),
+        Some(&[0, 1, 0, 1]),
+        vec![0; 4],
+    )
+    .unwrap();
     let message = run(RowModel::Shared, &training, narrow);
-    assert!(message.contains("the test set has 3 channels, the training set 4"), "{message}");
+    assert!(
+        message.contains("the test set has 3 channels, the training set 4"),
+        "{message}"
+    );
     let message = run(RowModel::Each, &training, recording(10, &[0], 7));
-    assert!(message.contains("the test set has the row-wires 1, the training set the row-wires 1, 2"), "{message}");
+    assert!(
+        message.contains("the test set has the row-wires 1, the training set the row-wires 1, 2"),
+        "{message}"
+    );
     let one_row = |set: &Dataset| set.of_row(0);
     let lacking = Split {
         training: one_row(&training.training),
@@ -169,9 +211,15 @@ fn sets_that_do_not_belong_together_are_named() {
     let mut simulated: RunSettings = SimulatedSettings::default().into();
     simulated.hidden = 2;
     let nameless = Dataset::new(Array2::zeros((4, 3)), Array2::zeros((4, 2)), None, vec![0; 4]).unwrap();
-    let nameless = Split { training: nameless.clone(), validation: None };
+    let nameless = Split {
+        training: nameless.clone(),
+        validation: None,
+    };
     let test = nameless.training.clone();
-    assert!(matches!(Run::on_sets(simulated, nameless, test), Err(RunError::NoRowWires)));
+    assert!(matches!(
+        Run::on_sets(simulated, nameless, test),
+        Err(RunError::NoRowWires)
+    ));
 }
 
 #[test]

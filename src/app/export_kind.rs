@@ -25,6 +25,7 @@ pub enum ExportKind {
 
 /// Why a file is not written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// The network file.
     #[error(transparent)]

@@ -6,6 +6,7 @@ use super::{DecouplerWindow, DialogKind};
 
 /// Why the window cannot open.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// Nothing to open it on.
     #[error("there is no display to open a window on; `decoupler train --help` does the same work in a terminal")]

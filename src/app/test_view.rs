@@ -109,6 +109,7 @@ fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
 
 /// Why there is nothing to draw.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TestViewError {
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]

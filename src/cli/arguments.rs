@@ -2,7 +2,6 @@ use std::{
     error::Error,
     ffi::OsString,
     io::{Write, stderr},
-    ops::RangeInclusive,
     process::ExitCode,
 };
 
@@ -35,8 +34,8 @@ enum Command {
     Trade(Box<Trade>),
 }
 
-/// Does what `arguments` (the program's name first) ask for. `window` is what a call without a command opens, in
-/// builds that have one.
+/// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command
+/// it opens `window`, if this build has one.
 pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Option<Window>) -> ExitCode {
     let done = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments.run(window),
@@ -77,7 +76,7 @@ impl Arguments {
     }
 }
 
-/// What the parser says, without its usage text.
+/// The parser's message in one line, without its usage text.
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraphs = text.split("\n\n").map(|paragraph| {
@@ -90,20 +89,6 @@ fn one_line(error: &clap::Error) -> String {
     });
     let line = said.collect::<Vec<_>>().join("; ");
     line.strip_prefix("error: ").unwrap_or(&line).to_owned()
-}
-
-/// A parser of counts in `allowed`.
-pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
-    move |text| {
-        let count = text.parse().ok().filter(|count| allowed.contains(count));
-        count.ok_or_else(|| format!("give a whole number from {} to {}", allowed.start(), allowed.end()))
-    }
-}
-
-/// A parser of seeds.
-pub(super) fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
 }
 
 #[cfg(test)]

@@ -12,22 +12,22 @@ use crate::{
     export::{CheckpointFile, CheckpointFileError},
 };
 
-/// Saving takes at most this share of the time.
+/// Saving takes at most one part in this many of the time.
 const LARGEST_SHARE: u32 = 20;
 
 #[derive(Args)]
 pub(super) struct CheckpointArguments {
-    /// File in which the training is saved now and then and at its end, so that it can go on from there
+    /// File in which the training is saved at intervals and at its end, so that it can be resumed
     #[arg(long, value_name = "FILE")]
     pub(super) checkpoint: Option<PathBuf>,
-    /// Go on from the file given by --checkpoint, with the same bits as if never interrupted
+    /// Resume the training saved in --checkpoint, with bit-identical results
     ///
     /// All settings come from the file. --epochs, --goal, --max-fail and --min-gradient change when to stop; another
-    /// --method (or --set) goes on from the present weights with that method. What is given beside them must be as in
+    /// --method (or --set) goes on from the present weights with that method. All other arguments must be as in
     /// the file.
     #[arg(long, requires = "checkpoint")]
     pub(super) resume: bool,
-    /// Seconds between two savings
+    /// Seconds between two checkpoints
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "checkpoint")]
     checkpoint_interval: f64,
 }
@@ -39,7 +39,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
 }
 
-/// The file in which a training is saved.
+/// The file in which a training is saved, and when it is next saved.
 pub(super) struct Checkpointing {
     path: PathBuf,
     interval: Duration,
@@ -48,7 +48,7 @@ pub(super) struct Checkpointing {
 }
 
 impl CheckpointArguments {
-    /// What is to be saved where; nothing is ever overwritten but what is gone on from.
+    /// The checkpoints asked for. An existing file is overwritten only if its training is resumed.
     pub(super) fn checkpointing(&self) -> Result<Option<Checkpointing>, Failure> {
         let Some(path) = &self.checkpoint else { return Ok(None) };
         if !self.resume && path.symlink_metadata().is_ok() {
@@ -67,7 +67,7 @@ impl CheckpointArguments {
 }
 
 impl Checkpointing {
-    /// Saves `run` if it is time. A failure is told once and tried again: the training is worth more.
+    /// Saves `run` if it is due. A failure is reported once and the next attempt is made as usual: training goes on.
     pub(super) fn save_if_due(&mut self, run: &Run) {
         let begun = Instant::now();
         if begun < self.next {

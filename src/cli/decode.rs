@@ -10,7 +10,7 @@ use crate::{
     scene::RowModel,
 };
 
-/// Rows decoded and written together, so that memory does not grow with the file.
+/// Number of lines decoded and written together, so that memory does not grow with the file.
 const BLOCK: usize = 1024;
 
 /// Decouple the resistances of a CSV file with a saved network

@@ -16,7 +16,7 @@ use crate::{
     training::SettingError,
 };
 
-/// Why a command did not do its work.
+/// Reasons for which a command fails.
 #[derive(Debug, Error)]
 pub(super) enum Failure {
     #[error("{0}")]
@@ -71,9 +71,9 @@ pub(super) enum Failure {
 /// A training that Ctrl-C has stopped.
 #[derive(Debug)]
 pub(super) struct Interruption {
-    /// After this epoch.
+    /// Last epoch that was completed.
     pub(super) epoch: usize,
-    /// The command that goes on from there.
+    /// Command that resumes the training.
     pub(super) resume: Option<String>,
 }
 
@@ -103,7 +103,7 @@ impl From<ExperimentError> for Failure {
 }
 
 impl Failure {
-    /// The exit status that says so.
+    /// Exit status of the program.
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) => 2,
@@ -114,7 +114,7 @@ impl Failure {
         }
     }
 
-    /// Whether only the reader of our output went away, which is its right.
+    /// Returns true if the reader of the output has closed it, which is no failure.
     pub(super) fn is_broken_pipe(&self) -> bool {
         match self {
             Self::Output(error) | Self::Write(WriteError::Io { source: error, .. }) => {

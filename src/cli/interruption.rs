@@ -5,16 +5,16 @@ use std::{
 
 use crate::export::exit_leaving_nothing;
 
-/// The exit status of a command that Ctrl-C has ended: 128 and the number of the signal, as shells have it.
+/// Exit status of a command ended by Ctrl-C: 128 plus the number of the signal, as in shells.
 pub(super) const STATUS: u8 = 130;
 
-/// Whether the command at work looks at [`REQUESTED`] by itself.
+/// True while the running command checks [`REQUESTED`] itself.
 static GRACEFUL: AtomicBool = AtomicBool::new(false);
-/// Whether Ctrl-C was pressed while it did.
+/// True once Ctrl-C was pressed while [`GRACEFUL`] was set.
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 
-/// From here on Ctrl-C ends the program without leaving files in the making, at once unless a [`Graceful`] part is at
-/// work.
+/// Installs the Ctrl-C handler: it ends the program without leaving temporary files, at once unless a [`Graceful`] part
+/// is running.
 pub(super) fn install() {
     // Where interruptions are ignored, as by a script that runs us in the background, they stay so.
     let _ = ctrlc::try_set_handler(|| {
@@ -28,7 +28,7 @@ pub(super) fn install() {
     });
 }
 
-/// While it lives, the first Ctrl-C only requests an end; the second one ends at once.
+/// Guard: while it lives, the first Ctrl-C only requests an end; the second one ends the program at once.
 pub(super) struct Graceful(());
 
 impl Graceful {

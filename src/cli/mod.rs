@@ -1,13 +1,14 @@
-//! The work without a window: `decoupler train`, `decode`, `simulate`, `reproduce` and `trade`.
+//! The work in a terminal: `decoupler train`, `decode`, `simulate`, `reproduce` and `trade`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
-//! with one line on standard error. Ctrl-C ends it with status 130; `train` then first keeps what it has.
+//! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
 mod arguments;
 mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
+mod parsers;
 mod reproduce;
 mod reproduce_report;
 mod scene_arguments;

@@ -8,9 +8,9 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
+    parsers::{count, seed},
     reproduce_report::{Reproduced, print_json, print_text},
 };
 use crate::{
@@ -56,17 +56,17 @@ pub(super) struct Reproduce {
     /// Array scales of Table 3 [default: 10x6_3x18,10x8_4x24,10x10_5x30]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     arrays: Vec<ArrayScale>,
-    /// What Table 2 deals to folds: samples, as the paper, or whole snapshots, so that nothing of a test sample's
-    /// moment is known
+    /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, so that no training sample
+    /// is of the same moment as a test sample
     #[arg(long, value_enum, default_value = "sample")]
     folds: Unit,
-    /// Folds of Table 2
+    /// Number of folds of Table 2
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
     k: usize,
-    /// How often Table 2 deals the folds anew, for each seed
+    /// Times that the samples of Table 2 are shuffled into new folds, for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
-    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; made if it is not there
+    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; created if missing
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
@@ -91,7 +91,7 @@ enum Unit {
     Snapshot,
 }
 
-/// Help that states the default of each table.
+/// Help text that states the default of each table.
 fn defaults_help(what: &str, value: fn(&Experiment) -> usize) -> String {
     let of = |table: PaperTable| format!("{} in Table {}", value(&table.experiment()), table.number());
     let defaults = PaperTable::ALL.map(of).join(", ");
@@ -202,7 +202,7 @@ impl Reproduce {
     }
 }
 
-/// The files of a table: its cells, every trial, all of it for reading, and the figure in both forms.
+/// Paths of the files of a table: its cells, its trials, the table in Markdown, and the figure as SVG and PNG.
 fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
     let number = table.number();
     [
@@ -215,7 +215,7 @@ fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
     .map(|name| folder.join(name))
 }
 
-/// Makes the folder and sees that everything can be written, before the work.
+/// Creates the folder and checks that every file can be written, before the work begins.
 fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
         path: folder.to_owned(),

@@ -15,14 +15,14 @@ use crate::{
     sensor::Geometry,
 };
 
-/// A table of the paper, redone.
+/// A reproduced table of the paper.
 pub(super) struct Reproduced {
     pub(super) table: PaperTable,
     pub(super) results: ExperimentResults,
     pub(super) verdicts: Vec<Verdict>,
 }
 
-/// What `reproduce --json` prints.
+/// The object printed by `reproduce --json`.
 #[derive(Serialize)]
 struct Report<'a> {
     seconds: f64,

@@ -1,6 +1,9 @@
 use clap::Args;
 
-use super::{arguments::count, failure::Failure, training_arguments::number};
+use super::{
+    failure::Failure,
+    parsers::{count, number},
+};
 use crate::{
     decoupling::DecoderKind,
     evaluation::{Preset, SimulatedSettings},
@@ -8,14 +11,14 @@ use crate::{
     scene::{Loading, Movement, Noise, NoisySets, Rows},
 };
 
-// What is read, what moves, how it is loaded, what disturbs it, and how it is decoded. Whatever is not given is as the
-// preset has it.
+// Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the value of the
+// preset.
 #[derive(Args)]
 pub(super) struct SceneArguments {
-    /// Where all settings begin, whatever is given beside it: as the paper, or what measurement found best [default: paper]
+    /// Settings that other arguments start from: those of the paper, or the best ones measured [default: paper]
     #[arg(long, value_name = "paper|best")]
     pub(super) preset: Option<Preset>,
-    /// Rows read: all by one network that is not told which; known, one network each; or the number of one
+    /// all: one network for every row; known: one network per row; N: only row N
     #[arg(long, value_name = "all|known|N")]
     rows: Option<Rows>,
     /// Axes along which nodes move
@@ -25,25 +28,25 @@ pub(super) struct SceneArguments {
     /// :cylinder, :edge)
     #[arg(long, value_name = "random|smooth:MM|indenter")]
     loading: Option<Loading>,
-    /// What the network is given of a resistance
+    /// Quantity that the network reads
     #[arg(long, value_name = "resistance|conductance|log")]
     inputs: Option<Quantity>,
-    /// How inputs are scaled: each by its range, or as principal components with regard to noise
+    /// Scaling of the inputs: each to its range, or whitened principal components
     #[arg(long, value_name = "minmax|whiten")]
     scaling: Option<ScalingChoice>,
-    /// Noise of each reading (standard deviation), in proportion to it
+    /// Noise of each reading (standard deviation), relative to the reading
     #[arg(long, value_name = "REL", value_parser = number, value_delimiter = ',')]
     pub(super) noise: Vec<f64>,
     /// Noise of each reading (standard deviation) in ohm
     #[arg(long, value_name = "OHM", value_parser = number)]
     noise_ohm: Option<f64>,
-    /// Bits of the converter that reads resistances
+    /// Resolution of the analogue-to-digital converter, in bits
     #[arg(long, value_name = "N", value_parser = count(1..=Noise::MOST_BITS as usize))]
     adc_bits: Option<usize>,
-    /// Gain error common to the readings of a moment (standard deviation)
+    /// Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative)
     #[arg(long, value_name = "REL", value_parser = number)]
     drift: Option<f64>,
-    /// Which samples noise disturbs [default: both]
+    /// Samples to which noise is added [default: both]
     #[arg(long, value_name = "both|training|test", value_parser = noisy_sets)]
     noise_in: Option<NoisySets>,
     /// Decoders to use, separated by commas: mean, ridge, network, rbf, newton, polish
@@ -76,7 +79,7 @@ impl SceneArguments {
         self.applied(preset.settings_in(noise), relative_noise)
     }
 
-    /// The one noise of commands that take no several.
+    /// Checks that at most one noise is given, for commands that do not take several.
     pub(super) fn check_one_noise(&self) -> Result<(), Failure> {
         if self.noise.len() > 1 {
             let message = "--noise: give one number here; trade takes several";
@@ -85,7 +88,7 @@ impl SceneArguments {
         Ok(())
     }
 
-    /// `present` with what is given of the noise.
+    /// `present` with the given parts of the noise.
     fn noise(&self, present: Noise, relative: Option<f64>) -> Noise {
         let bits = self.adc_bits.and_then(|bits| u8::try_from(bits).ok());
         Noise {
@@ -97,7 +100,7 @@ impl SceneArguments {
         }
     }
 
-    /// `settings` with the scene and inputs given.
+    /// `settings` with the given scene and inputs.
     fn applied(
         &self,
         mut settings: SimulatedSettings,
@@ -116,7 +119,7 @@ impl SceneArguments {
         Ok(settings)
     }
 
-    /// What of the scene is given and is not as in `saved`.
+    /// Names the first given part of the scene that differs from `saved`.
     pub(super) fn difference(&self, saved: &SimulatedSettings) -> Result<Option<&'static str>, Failure> {
         let mut asked = *saved;
         if let Some(preset) = self.preset {
@@ -136,7 +139,7 @@ impl SceneArguments {
         Ok(differs.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what))
     }
 
-    /// The decoders to use: those given, or all.
+    /// The given decoders, or all.
     pub(super) fn decoders(&self) -> Vec<DecoderKind> {
         if self.decoder.is_empty() {
             DecoderKind::ALL.to_vec()

@@ -6,8 +6,8 @@ use std::{
 use clap::Args;
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
+    parsers::{count, seed},
     scene_arguments::SceneArguments,
 };
 use crate::{
@@ -18,7 +18,7 @@ use crate::{
     sensor::{ArrayScale, SensorModel},
 };
 
-/// Snapshots drawn and written together, so that memory does not grow with the number of samples.
+/// Number of snapshots drawn and written together, so that memory does not grow with the number of samples.
 const BLOCK: usize = 64;
 
 /// Draw samples of an array and write them as CSV
@@ -36,7 +36,7 @@ pub(super) struct Simulate {
     /// Samples, rounded up to whole snapshots
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
     samples: usize,
-    /// From which everything random follows
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
     #[command(flatten)]
@@ -86,7 +86,7 @@ impl Simulate {
         Ok(())
     }
 
-    /// The decoder asked for, trained if need be.
+    /// The given decoder, with its networks trained; none if none is given.
     fn decoder(&self, settings: &SimulatedSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
         self.scene.check_one_noise()?;
         let kind = match self.scene.decoder[..] {

@@ -5,10 +5,10 @@ use crate::{
     export::format_number,
 };
 
-/// Columns of the plot.
+/// Width of the plot in characters.
 const WIDTH: usize = 64;
 
-/// Writes how the results of several starts spread: a table, and a box plot of Z % over a strip of the starts.
+/// Writes the spread of the results of several starts: a table, and a box plot of Z % above a strip of the starts.
 pub(super) fn write_starts(starts: &[StartRecord], out: &mut impl Write) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
@@ -25,7 +25,7 @@ pub(super) fn write_starts(starts: &[StartRecord], out: &mut impl Write) -> io::
         (error, Spread::of(starts.iter().map(StartRecord::deciding_mse))),
     ];
     write!(out, "{:<16}", "")?;
-    for heading in ["smallest", "a quarter", "median", "three q.", "largest"] {
+    for heading in ["smallest", "quartile 1", "median", "quartile 3", "largest"] {
         write!(out, "{heading:>11}")?;
     }
     writeln!(out)?;
@@ -56,22 +56,22 @@ pub(super) fn write_starts(starts: &[StartRecord], out: &mut impl Write) -> io::
 
 /// A box plot and the strip below it.
 fn plot(spread: &Spread, values: &[f64], kept: f64) -> [String; 2] {
-    let place = |value: f64| {
+    let column = |value: f64| {
         let share = (value - spread.smallest) / (spread.largest - spread.smallest);
         (share * (WIDTH - 1) as f64).round() as usize
     };
-    let (lower, upper) = (place(spread.lower_quartile), place(spread.upper_quartile));
+    let (lower, upper) = (column(spread.lower_quartile), column(spread.upper_quartile));
     let mut plot: Vec<char> = (0..WIDTH)
         .map(|column| if (lower..=upper).contains(&column) { '=' } else { '-' })
         .collect();
     plot[lower] = '[';
     plot[upper] = ']';
-    plot[place(spread.median)] = '|';
+    plot[column(spread.median)] = '|';
     let mut strip = vec![' '; WIDTH];
     for value in values {
-        strip[place(*value)] = 'o';
+        strip[column(*value)] = 'o';
     }
-    strip[place(kept)] = '*';
+    strip[column(kept)] = '*';
     [plot, strip].map(|line| line.into_iter().collect())
 }
 

@@ -4,12 +4,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
+    parsers::{count, number, seed},
     scene_arguments::SceneArguments,
     trade_report::{Limits, print_json, print_text},
-    training_arguments::number,
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
@@ -35,16 +34,16 @@ pub(super) struct Trade {
     /// Hidden nodes of the networks
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Vec<usize>,
-    /// Most epochs [default: those of the preset]
+    /// Maximum number of epochs [default: those of the preset]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     epochs: Option<usize>,
     /// Training samples [default: those of the preset]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
     samples: Option<usize>,
-    /// Samples for the errors
+    /// Test samples, on which the errors are measured
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
     test_samples: usize,
-    /// From which everything random follows
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
     /// Also tell the fastest decoder whose Z error is at most this many percent

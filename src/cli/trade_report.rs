@@ -13,20 +13,20 @@ use crate::{
     sensor::ArrayScale,
 };
 
-/// What choices are asked for.
+/// Limits for which the best decoder is to be found.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     pub(super) percent: Option<f64>,
     pub(super) microseconds: Option<f64>,
 }
 
-/// Whether each point is on the front of decoding time, and on that of training time.
+/// For each point, true if it is on the Pareto front of decoding time and on that of training time.
 fn fronts(level: &TradeLevel) -> Vec<(bool, bool)> {
     let decoding = level.front(TradeCost::Decoding).into_iter();
     decoding.zip(level.front(TradeCost::Training)).collect()
 }
 
-/// The command that trains this choice.
+/// Command that trains the network of `point`.
 fn command(point: &TradePoint) -> String {
     let settings = &point.settings;
     // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
@@ -90,7 +90,7 @@ struct PointReport {
     z_mm: f64,
     frame_us: f64,
     training_s: f64,
-    /// rms of m/R − 1; none where the answer has no resistance.
+    /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     reference_z_percent: Option<f64>,
     reference_z_mm: f64,
@@ -103,12 +103,12 @@ struct PointReport {
 #[derive(Serialize)]
 struct Choice {
     limit: f64,
-    /// None where nothing is good enough.
+    /// Index of the point; none if no point is within the limit.
     point: Option<usize>,
     command: Option<String>,
 }
 
-/// The choices asked for: with their limit, the place of the point.
+/// The fastest and the most accurate point within `limits`, for those given.
 fn choices(level: &TradeLevel, limits: Limits) -> [Option<Choice>; 2] {
     let choice = |limit: Option<f64>, choose: fn(&[TradePoint], f64) -> Option<&TradePoint>| {
         let limit = limit?;

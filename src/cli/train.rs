@@ -112,7 +112,7 @@ impl Train {
         Ok(run)
     }
 
-    /// Steps to the end, or to the first epoch after Ctrl-C; the bar shows itself only where standard error is a
+    /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
     /// terminal.
     fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
         let bar = self.progress_bar(run);
@@ -160,7 +160,7 @@ impl Train {
         bar
     }
 
-    /// The command that goes on from here.
+    /// Command that resumes the training.
     fn resume_command(&self, checkpoint: &Path) -> String {
         let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
         if let Some(path) = &self.out {
@@ -173,7 +173,7 @@ impl Train {
     }
 }
 
-/// The epoch of the start that is furthest.
+/// Largest epoch among the restarts.
 fn furthest(run: &Run) -> usize {
     let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
     epochs.max().unwrap_or(0)
@@ -190,7 +190,7 @@ fn show(run: &Run, bar: &ProgressBar) {
     bar.set_message(format!("mse {mse}{starts}"));
 }
 
-/// Whether two paths lead to the same file, new or old.
+/// Returns true if two paths lead to the same file, existing or not.
 fn is_same(one: &Path, other: &Path) -> bool {
     let place = |path: &Path| {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -201,7 +201,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     place(one).is_some() && place(one) == place(other)
 }
 
-/// A path as a shell takes it.
+/// Quotes a path for a POSIX shell.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);

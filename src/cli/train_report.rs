@@ -19,7 +19,7 @@ use crate::{
     training::{Stage, StopReason},
 };
 
-/// What `train --json` prints.
+/// The object printed by `train --json`.
 #[derive(Serialize)]
 struct Report<'a> {
     array: ArrayScale,
@@ -57,7 +57,7 @@ struct Decoder {
     z_percent: Option<f64>,
     z_mm: f64,
     frame_us: f64,
-    /// rms of m/R − 1; none where the answer has no resistance.
+    /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
 }
@@ -151,7 +151,7 @@ fn decoder(report: &DecoderReport) -> Decoder {
     }
 }
 
-/// The condition number of the worst row; none where some pattern is not seen at all.
+/// Condition number of the worst row; none if the Jacobian is singular.
 fn condition(outlook: Option<&Outlook>) -> Option<f64> {
     let condition = outlook?.worst_row.condition();
     Some(condition).filter(|condition| condition.is_finite())
@@ -219,7 +219,7 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
     Ok(())
 }
 
-/// What the scene is, what it came to, and what stands in the way.
+/// Writes the scene, the size of its equations and of the network, and warnings.
 fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     let SimulatedSettings { source, inputs, .. } = &file.settings;
     let scene = &source.scene;
@@ -260,7 +260,7 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     }
     let outlook = Outlook::of(source).ok();
     match condition(outlook.as_ref()) {
-        Some(condition) => writeln!(out, "; condition of the worst row {condition:.1e}")?,
+        Some(condition) => writeln!(out, "; condition number of the worst row {condition:.1e}")?,
         None => writeln!(out)?,
     }
     for warning in warnings(outlook.as_ref()) {
@@ -269,7 +269,7 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// What each decoder is worth, and how far it is from the reference.
+/// Writes the errors of each decoder and their ratio to the reference.
 fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &mut impl Write) -> io::Result<()> {
     if decoders.is_empty() {
         return Ok(());
@@ -299,7 +299,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     }
     writeln!(
         out,
-        "The residual is how far the readings are from those of the answer (relative, rms): it needs no ground truth."
+        "The residual is the relative difference (rms) of the readings from those of the answer: it needs no ground truth."
     )
 }
 

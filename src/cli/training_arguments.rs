@@ -4,8 +4,8 @@ use clap::{
 };
 
 use super::{
-    arguments::{count, seed},
     failure::Failure,
+    parsers::{count, number, seed},
     scene_arguments::SceneArguments,
 };
 use crate::{
@@ -16,7 +16,7 @@ use crate::{
     training::{Method, StoppingRules, TrainingSettings},
 };
 
-// What to train. Whatever is not given is the default, or what a checkpoint says.
+// The run to train. Arguments that are not given have their default or the checkpoint's value.
 #[derive(Args)]
 pub(super) struct TrainingArguments {
     #[command(flatten)]
@@ -35,34 +35,34 @@ pub(super) struct TrainingArguments {
     method: Option<Method>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
-    /// Most epochs [default: 1000]
+    /// Maximum number of epochs [default: 1000]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     epochs: Option<usize>,
-    /// Training error (mse, scaled) that is good enough [default: 0]
+    /// Training error (mse, scaled) at which training ends [default: 0]
     #[arg(long, value_name = "MSE", value_parser = number)]
     goal: Option<f64>,
-    /// How often the validation error may rise before it falls again [default: 6]
+    /// Consecutive epochs in which the validation error may rise before training ends [default: 6]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     max_fail: Option<usize>,
-    /// Length of the gradient below which training ends [default: 1e-7]
+    /// Norm of the gradient below which training ends [default: 1e-7]
     #[arg(long, value_name = "LENGTH", value_parser = number)]
     min_gradient: Option<f64>,
     /// Training samples; this and the next two are rounded up to whole snapshots of all rows [default: 1000]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
     samples: Option<usize>,
-    /// Samples for the errors that are printed [default: 100]
+    /// Test samples, on which the printed errors are measured [default: 100]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
     test_samples: Option<usize>,
-    /// Samples that choose the best weights and end the training; 0 for none [default: 200]
+    /// Validation samples, which select the best weights and end the training; 0 for none [default: 200]
     #[arg(long, value_name = "N", value_parser = count(0..=LARGEST_SAMPLES))]
     validation_samples: Option<usize>,
-    /// From which everything random follows [default: 0]
+    /// Seed of all random numbers [default: 0]
     #[arg(long, value_parser = seed)]
     seed: Option<u64>,
 }
 
 impl TrainingArguments {
-    /// The settings of a new run.
+    /// Settings of a new run.
     pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.scene.check_one_noise()?;
         let default = self.scene.settings()?;
@@ -83,12 +83,12 @@ impl TrainingArguments {
         })
     }
 
-    /// The sensor given.
+    /// The sensor, if an array scale is given.
     pub(super) fn sensor(&self) -> Option<SensorModel> {
         self.array.map(SensorModel::new)
     }
 
-    /// How a run of the settings `saved` is to go on.
+    /// Training settings with which a run of the settings `saved` is resumed.
     pub(super) fn training_from(&self, saved: &SimulatedSettings) -> Result<TrainingSettings, Failure> {
         let same = |argument: &str, given: Option<String>, saved: String| match given {
             Some(given) if given != saved => Err(Failure::Arguments(format!(
@@ -121,7 +121,7 @@ impl TrainingArguments {
         self.training(saved.training)
     }
 
-    /// The method and stopping rules given, the others as in `present`.
+    /// The given method and stopping rules; those not given are as in `present`.
     fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
         let mut method = self.method.unwrap_or(present.method);
         for (name, value) in &self.set {
@@ -160,21 +160,13 @@ fn method() -> impl TypedValueParser<Value = Method> {
     })
 }
 
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
-}
-
 fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example mu=0.01")?;
     let value = value.trim().parse().map_err(|_| format!("'{value}' is not a number"))?;
     Ok((name.trim().to_owned(), value))
 }
 
-/// How a setting is named in the terminal.
+/// Name of a setting in the terminal.
 fn dashed(name: &str) -> String {
     name.replace(' ', "-")
 }

@@ -45,6 +45,7 @@ pub struct Reading {
 
 /// What is wrong with a file of resistances. Lines and columns are counted from 1.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// Nothing to read.
     #[error("there are no rows of resistances in it")]

@@ -44,6 +44,7 @@ impl Outlook {
 
 /// Why there is no outlook.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutlookError {
     /// An impossible scene.
     #[error(transparent)]

@@ -12,6 +12,7 @@ use crate::{
 
 /// Why a run cannot be prepared.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RunError {
     /// A number out of range.
     #[error(transparent)]

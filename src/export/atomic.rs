@@ -8,8 +8,9 @@ use thiserror::Error;
 
 use super::unfinished::Unfinished;
 
-/// Why a file cannot be written.
+/// Errors of writing a file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// Its folder is missing.
     #[error("cannot write '{}': the folder '{}' does not exist; make it first", .path.display(), .folder.display())]
@@ -19,25 +20,25 @@ pub enum WriteError {
         /// Its folder.
         folder: PathBuf,
     },
-    /// A folder stands in its place.
+    /// The path is a folder.
     #[error("cannot write '{}': it is a folder; give the name of a file", .0.display())]
     Folder(PathBuf),
     /// The file there is write-protected.
     #[error("cannot write '{}': it is read-only; give another name", .0.display())]
     ReadOnly(PathBuf),
-    /// The system refuses.
+    /// The operating system refuses.
     #[error("cannot write '{}': {source}", .path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
 }
 
 impl WriteError {
-    /// The system's refusal to write `path`.
-    pub fn io(path: &Path, source: io::Error) -> Self {
+    /// Wraps the operating system's error about `path`.
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         Self::Io {
             path: path.to_owned(),
             source,
@@ -45,7 +46,7 @@ impl WriteError {
     }
 }
 
-/// A file in the making: it is written beside its target and takes the target's place in one step, so that nobody
+/// A file that is written under a temporary name beside its target and then renamed over it, so that nobody
 /// ever sees half of it. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub struct AtomicFile {
@@ -61,7 +62,7 @@ enum Sink {
     Through(File),
 }
 
-/// Where a path leads.
+/// Kind of file that a path leads to.
 enum Place {
     /// A file, new or old, in an existing folder.
     File {
@@ -111,10 +112,10 @@ impl Place {
 }
 
 impl AtomicFile {
-    /// Begins the file at `path`, whose folder must exist.
+    /// Creates the temporary file for `path`, whose folder must exist.
     ///
     /// # Errors
-    /// The path is not one that can be written.
+    /// The path cannot be written.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
         let error = |source| WriteError::io(path, source);
         let sink = match Place::of(path)? {
@@ -137,10 +138,10 @@ impl AtomicFile {
         })
     }
 
-    /// Puts the file in its place.
+    /// Renames the temporary file to its target.
     ///
     /// # Errors
-    /// What the system said; the old file, if there was one, is untouched then.
+    /// Any error of the operating system; a file that was there before is then unchanged.
     pub fn commit(self) -> Result<(), WriteError> {
         let error = |source| WriteError::io(&self.path, source);
         match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
@@ -179,20 +180,20 @@ impl Write for Sink {
     }
 }
 
-/// Writes the file at `path` whole or not at all.
+/// Writes the file at `path` atomically: whole or not at all.
 ///
 /// # Errors
-/// The path is not one that can be written, or `write` failed.
+/// The path cannot be written, or `write` failed.
 pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
     let mut file = AtomicFile::create(path)?;
     write(&mut file).map_err(|source| WriteError::io(path, source))?;
     file.commit()
 }
 
-/// Finds out whether `path` can be written, before the work whose result goes there. Leaves no trace.
+/// Checks that `path` can be written, before the work whose result goes there. Leaves no trace.
 ///
 /// # Errors
-/// It cannot.
+/// The path cannot be written.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     match Place::of(path)? {
         // Opening and closing a pipe would tell its reader that nothing comes.

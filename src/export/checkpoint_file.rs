@@ -20,52 +20,53 @@ use crate::{
 
 const FORMAT: &str = "decoupler checkpoint";
 const VERSION: u64 = 2;
-/// The oldest version that is read: of the paper's scene.
+/// Oldest version that can be read, which had the paper's scene only.
 const OLDEST_VERSION: u64 = 1;
-/// How the file begins, whatever became of the rest.
+/// First bytes of every checkpoint, also of a damaged one.
 const BEGINNING: &[u8] = br#"{"format":"decoupler checkpoint","#;
 
-/// A run at some epoch, saved to go on from there with the same bits as if it had never been interrupted.
+/// A run saved at some epoch. A resumed run gives bit-identical results.
 ///
-/// Its file is JSON. The samples are not in it, for they follow from the settings. A checksum (CRC-32) tells whether
-/// so much as a digit has changed.
+/// The file is JSON. It does not contain the samples, which follow from the settings. A checksum (CRC-32) detects
+/// changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckpointFile {
-    /// Program and version that wrote it.
+    /// Program and version that wrote the file.
     pub program: String,
-    /// What was asked for, with the method and the stopping rules of that epoch.
+    /// Settings of the run, with the method and stopping rules of that epoch.
     pub settings: SimulatedSettings,
-    /// Each start; where rows are known, each with its rows one after another.
+    /// State of every trainer: by start, then, if rows are known, by row.
     pub starts: Vec<TrainerState>,
 }
 
-/// Why a checkpoint cannot be read or written.
+/// Errors of reading or writing a checkpoint.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CheckpointFileError {
-    /// The system refuses to read it.
+    /// The operating system refuses to read it.
     #[error("cannot read '{}': {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// Something else.
+    /// The file is not a checkpoint.
     #[error("'{}' is not a checkpoint: {reason}; choose one that train --checkpoint or the window saved", .path.display())]
     NotOurs {
         /// The file.
         path: PathBuf,
-        /// What it is instead.
+        /// What the file is instead.
         reason: String,
     },
-    /// It ends too early.
+    /// The file ends too early.
     #[error("'{}' is cut off at line {line}, column {column}; copy it again, or begin anew", .path.display())]
     CutOff {
         /// The file.
         path: PathBuf,
-        /// Line of the end, from 1.
+        /// Line of the end, counted from 1.
         line: usize,
-        /// Column of the end, from 1.
+        /// Column of the end, counted from 1.
         column: usize,
     },
     /// Written in a format unknown to this version.
@@ -73,28 +74,28 @@ pub enum CheckpointFileError {
     Version {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the file.
         version: String,
-        /// What wrote it.
+        /// Program that wrote the file.
         program: String,
     },
-    /// Something in it has changed, or is not possible.
+    /// The checksum does not match, or a value is impossible.
     #[error("'{}' is damaged: {flaw}; copy it again, or begin anew", .path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the defect.
         flaw: String,
     },
     /// A run on measured samples, which cannot be drawn again.
     #[error("a training on measured samples has no checkpoint file; keep its states and resume it on the same sets")]
     Measured,
-    /// A run that could not be read back.
+    /// The run has values that could not be read back.
     #[error("'{}' is not saved: the training has numbers that no file can hold ({flaw})", .path.display())]
     Unsound {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the defect.
         flaw: String,
     },
     /// The file cannot be written.
@@ -102,7 +103,7 @@ pub enum CheckpointFileError {
     Write(#[from] WriteError),
 }
 
-/// The file as it stands. `crc32` is that of the text of `run`, as hexadecimal digits.
+/// Layout of the file. `crc32` is that of the text of `run`, as hexadecimal digits.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document<'a> {
@@ -122,7 +123,7 @@ struct RunDocument {
 }
 
 impl CheckpointFile {
-    /// `run` as it stands.
+    /// Takes the present state of `run`.
     ///
     /// # Errors
     /// [`CheckpointFileError::Measured`] if the samples were measured.
@@ -134,10 +135,10 @@ impl CheckpointFile {
         })
     }
 
-    /// The run, to go on from this epoch: draws its samples and takes up every start.
+    /// Resumes the run from this epoch: draws its samples again and restores every trainer.
     ///
     /// # Errors
-    /// Settings that are impossible, or states that do not fit them or each other.
+    /// The settings are impossible, or the states do not fit them or each other.
     pub fn resume(self) -> Result<Run, RunError> {
         Run::resume(self.settings, self.starts)
     }
@@ -145,7 +146,7 @@ impl CheckpointFile {
     /// Writes the file whole or not at all.
     ///
     /// # Errors
-    /// A run with numbers that JSON does not know, or a path that cannot be written.
+    /// The run has numbers that JSON cannot hold, or the path cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CheckpointFileError> {
         let unsound = |error: serde_json::Error| CheckpointFileError::Unsound {
             path: path.to_owned(),
@@ -172,10 +173,10 @@ impl CheckpointFile {
         Ok(())
     }
 
-    /// Reads a file.
+    /// Reads the file at `path`.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, CheckpointFileError> {
         let bytes = fs::read(path).map_err(|source| CheckpointFileError::Read {
             path: path.to_owned(),

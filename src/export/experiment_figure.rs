@@ -14,8 +14,8 @@ use crate::{
     network::HiddenSuggestions,
 };
 
-/// Draws what is known of an experiment: a heat map of the median Z error over two axes, the errors of every repeat of
-/// a cross-validation (the paper's Fig. 5), or else the Z error along the axis beside the published one.
+/// Draws the results so far of an experiment: a heat map of the median Z error over two axes, the errors of every
+/// repeat of a cross-validation (the paper's Fig. 5), or else the Z error along the axis beside the published one.
 pub fn draw_experiment(results: &ExperimentResults) -> Picture {
     if results.experiment.second_axis.is_some() {
         heat_map(results).draw()
@@ -105,7 +105,7 @@ fn along_the_axis(results: &ExperimentResults) -> Plot {
     }
 }
 
-/// Eq. (12) and (13).
+/// The ranges suggested by Eq. (12) and (13).
 fn suggestions(results: &ExperimentResults) -> Vec<Span> {
     let scale = results.experiment.base.source.sensor.scale;
     let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
@@ -123,7 +123,7 @@ fn suggestions(results: &ExperimentResults) -> Vec<Span> {
 type PublishedError = fn(&CellSummary) -> Option<f64>;
 type TrialError = fn(&Errors) -> Option<f64>;
 
-/// On one logarithmic axis; an error of exactly 0, as of Y where it is constant, is left out.
+/// The error of every trial on a logarithmic axis. Errors of exactly 0, as of Y where it is constant, are left out.
 fn repeats(results: &ExperimentResults) -> Plot {
     const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Red];
     let errors: [(&str, Marker, PublishedError, TrialError); 3] = [

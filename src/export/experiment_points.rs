@@ -5,10 +5,10 @@ use crate::evaluation::{
     experiments::{Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure, Trial},
 };
 
-/// A cell in a chart: where it stands and what it came to.
+/// Position and errors of a cell in a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellPoint {
-    /// On the axis: the number itself, or the place in the list.
+    /// Position on the axis: the value itself, or its index in the list.
     pub x: f64,
     pub published: Option<f64>,
     /// Median, least, largest.
@@ -63,7 +63,7 @@ pub fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Erro
         .collect()
 }
 
-/// What the trials of a cross-validation are counted by.
+/// Name of what the trials of a cross-validation are counted by.
 pub fn repeat_name(results: &ExperimentResults) -> &'static str {
     match results.experiment.seeds {
         1 => "repeat",

@@ -13,12 +13,12 @@ pub struct ExperimentTable {
     pub headings: Vec<&'static str>,
     /// Cells of the experiment, row by row.
     pub rows: Vec<Vec<String>>,
-    /// The numbers behind the texts, to order by; of an axis, the place of the value in its list.
+    /// Sort keys of the rows: the numbers behind the texts; for an axis, the index of the value in its list.
     pub values: Vec<Vec<Option<f64>>>,
 }
 
 impl ExperimentTable {
-    /// What is known so far.
+    /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
         let summaries = results.summaries();
         let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
@@ -78,7 +78,7 @@ impl ExperimentTable {
         figures
     }
 
-    /// What the last columns mean, for below the table.
+    /// Explanation of the last columns, to be shown below the table.
     pub const NOTE: &'static str = "Medians, least and largest over seeds (and repeats). mean: always answering the \
          training mean; linear: best affine map on resistance; bound: what so few hidden nodes can carry, the \
          least-squares best answer of any network with them; epochs: mean of the starts; training: one network, all \
@@ -89,7 +89,7 @@ impl ExperimentTable {
 /// none the field is empty.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_cells(results: &ExperimentResults, writer: &mut dyn Write) -> io::Result<()> {
     write!(writer, "array,hidden,samples,method,epochs,starts,trials")?;
     for axis in ["z", "x", "y"] {
@@ -140,7 +140,7 @@ pub fn write_cells(results: &ExperimentResults, writer: &mut dyn Write) -> io::R
 /// Writes every trial as CSV, in the manner of [`write_cells`]; repeats are counted from 1.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_trials(results: &ExperimentResults, writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,
@@ -182,7 +182,7 @@ pub fn write_trials(results: &ExperimentResults, writer: &mut dyn Write) -> io::
 /// Writes table and verdicts as Markdown under `title`, with `conditions` between.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_experiment_markdown(
     title: &str,
     conditions: &str,

@@ -1,4 +1,4 @@
-//! What stands around the table of an experiment, in words.
+//! Sentences beside the table of an experiment.
 
 use crate::{
     evaluation::{
@@ -8,7 +8,7 @@ use crate::{
     network::HiddenSuggestions,
 };
 
-/// How an experiment is carried out, for its reader.
+/// Describes the conditions of an experiment in one or two sentences.
 pub fn describe_conditions(experiment: &Experiment) -> String {
     let base = &experiment.base;
     let mut said = vec![base.training.method.name().to_owned()];
@@ -51,7 +51,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     conditions
 }
 
-/// What could not be carried out, a sentence each.
+/// Describes every failed trial in a sentence.
 pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
     let of_cell = |cell| {
         let label = results.cell_labels(cell).join(", ");

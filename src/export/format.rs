@@ -1,9 +1,9 @@
 use std::time::Duration;
 
-/// What stands where there is no number.
+/// Text in place of a missing number.
 const NO_NUMBER: &str = "–";
 
-/// A number for reading, with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from
+/// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from
 /// 100000; a dash for none, NaN and infinity.
 pub fn format_number(value: impl Into<Option<f64>>) -> String {
     let Some(value) = value.into().filter(|value| value.is_finite()) else {
@@ -24,7 +24,7 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
     format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
-/// [`format_number`] with the percent sign.
+/// Formats a number as [`format_number`] does, with a percent sign.
 pub fn format_percent(value: impl Into<Option<f64>>) -> String {
     match format_number(value) {
         text if text == NO_NUMBER => text,
@@ -32,7 +32,7 @@ pub fn format_percent(value: impl Into<Option<f64>>) -> String {
     }
 }
 
-/// A time for reading: `0.23 ms`, `340 ms`, `12.3 s`, `4 min 5 s`, `1 h 2 min`.
+/// Formats a duration: `0.23 ms`, `340 ms`, `12.3 s`, `4 min 5 s`, `1 h 2 min`.
 pub fn format_duration(duration: Duration) -> String {
     let seconds = duration.as_secs_f64();
     let whole = seconds.round() as u64;

@@ -1,7 +1,7 @@
 use serde::Deserialize;
 use serde_json::error::Category;
 
-/// What tells whether a JSON file is ours, read before the rest, which other versions may write otherwise.
+/// The fields that identify a JSON file of ours, read before the rest, which differs between versions.
 #[derive(Deserialize)]
 pub(super) struct Heading {
     pub(super) format: serde_json::Value,
@@ -11,11 +11,11 @@ pub(super) struct Heading {
     program: serde_json::Value,
 }
 
-/// Why a file has no heading of ours.
+/// Reasons for which a file has no heading of ours.
 pub(super) enum NoHeading {
-    /// Nothing that JSON can be, with line and column.
+    /// Not JSON; the parser's message, with line and column.
     NotJson(String),
-    /// JSON that ends too early, after this line and column, from 1.
+    /// JSON that ends too early, at this line and column, counted from 1.
     CutOff { line: usize, column: usize },
     /// JSON of another program.
     Other,

@@ -20,55 +20,56 @@ use crate::{
 
 const FORMAT: &str = "decoupler network";
 const VERSION: u64 = 2;
-/// The oldest version that is read: one network, of the paper's scene.
+/// Oldest version that can be read, which had one network and the paper's scene only.
 const OLDEST_VERSION: u64 = 1;
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
-/// A network with all that is known of it: what was asked for, how the training went, and what the network is worth.
-/// Its file is JSON; reading it gives a network that answers with the same bits.
+/// A trained network with its settings, the record of its training, and its errors.
+/// The file is JSON; a network that is read back gives bit-identical results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkFile {
-    /// Program and version that wrote it.
+    /// Program and version that wrote the file.
     pub program: String,
-    /// What was asked for: sensor, scene, samples, method, stopping, seed.
+    /// Settings of the run: sensor, scene, samples, method, stopping rules, seed.
     pub settings: SimulatedSettings,
-    /// The best network of the training, or of each row-wire.
+    /// Best network of the training, or best network of each row-wire.
     pub network: Networks,
-    /// How the training went.
+    /// Record of the training.
     pub training: TrainingRecord,
-    /// What the network is worth on the test set.
+    /// Errors of the network on the test set.
     pub errors: Errors,
-    /// What stands beside it.
+    /// Errors of the baselines on the same test set.
     pub baselines: Baselines,
 }
 
-/// How a training went.
+/// Record of a training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingRecord {
-    /// Why it ended; `None` while it runs.
+    /// Reason for which training ended; `None` while it runs.
     pub stop_reason: Option<StopReason>,
-    /// The epoch of the best network.
+    /// Epoch of the best network.
     pub best_epoch: usize,
-    /// Seconds spent in training on one thread, the networks of all rows together.
+    /// Training time on one thread in seconds, summed over the networks of all rows.
     pub seconds: f64,
-    /// Every epoch, the start first.
+    /// Record of every epoch, from the initial weights on.
     pub history: Vec<EpochRecord>,
-    /// The methods it went through, the first one first.
+    /// Training methods in the order in which they were used.
     pub stages: Vec<Stage>,
-    /// All starts of the run, of which the best one is the network's. Empty in files of programs that knew one start
+    /// All starts of the run, of which the best gave the network. Empty in files of versions that had one start
     /// only.
     pub starts: Vec<StartRecord>,
 }
 
-/// Why a network file cannot be read or written.
+/// Errors of reading or writing a network file.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum NetworkFileError {
-    /// The system refuses to read it.
+    /// The operating system refuses to read it.
     #[error("cannot read '{}': {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// Not JSON.
@@ -76,7 +77,7 @@ pub enum NetworkFileError {
     NotJson {
         /// The file.
         path: PathBuf,
-        /// What JSON cannot be, with line and column.
+        /// The parser's message, with line and column.
         reason: String,
     },
     /// JSON that ends too early.
@@ -84,12 +85,12 @@ pub enum NetworkFileError {
     CutOff {
         /// The file.
         path: PathBuf,
-        /// Line of the end, from 1.
+        /// Line of the end, counted from 1.
         line: usize,
-        /// Column of the end, from 1.
+        /// Column of the end, counted from 1.
         column: usize,
     },
-    /// JSON of another kind.
+    /// JSON of another program.
     #[error("'{}' is not a network file: it has no field \"format\": \"{FORMAT}\"; choose one that Decoupler saved", .path.display())]
     NotOurs {
         /// The file.
@@ -100,9 +101,9 @@ pub enum NetworkFileError {
     Version {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the file.
         version: String,
-        /// What wrote it.
+        /// Program that wrote the file.
         program: String,
     },
     /// A field that is missing, of the wrong kind, or does not fit the others.
@@ -110,18 +111,18 @@ pub enum NetworkFileError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with the field or with line and column.
+        /// Description of the defect, with the field or with line and column.
         flaw: String,
     },
     /// A network of measured samples: the file tells of a simulated sensor.
     #[error("a network of measured samples has no network file; write the networks themselves instead")]
     Measured,
-    /// A network that could not be read back.
+    /// The network has values that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
     Unsound {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with the field.
+        /// Description of the defect, with the field.
         flaw: String,
     },
     /// The file cannot be written.
@@ -129,7 +130,7 @@ pub enum NetworkFileError {
     Write(#[from] WriteError),
 }
 
-/// The file as it stands.
+/// Layout of the file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -158,7 +159,7 @@ struct TrainingDocument {
 }
 
 impl NetworkFile {
-    /// The best network of `run` so far, and what is known of it.
+    /// Takes the best network of `run` so far, with its record and errors.
     ///
     /// # Errors
     /// [`NetworkFileError::Measured`] if the samples were measured.
@@ -186,7 +187,7 @@ impl NetworkFile {
     /// Writes the file whole or not at all.
     ///
     /// # Errors
-    /// A network that is not sound, or a path that cannot be written.
+    /// The network has values that could not be read back, or the path cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), NetworkFileError> {
         if let Some(flaw) = flaw(self) {
             let path = path.to_owned();
@@ -200,10 +201,10 @@ impl NetworkFile {
         Ok(())
     }
 
-    /// Reads a file.
+    /// Reads the file at `path`.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, NetworkFileError> {
         let bytes = fs::read(path).map_err(|source| NetworkFileError::Read {
             path: path.to_owned(),
@@ -212,7 +213,7 @@ impl NetworkFile {
         Self::parse(path, &bytes)
     }
 
-    /// What is wrong with it, so that it could not be read back, if anything is.
+    /// Describes the first defect that would keep the file from being read back.
     pub fn flaw(&self) -> Option<String> {
         flaw(self)
     }

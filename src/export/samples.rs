@@ -8,7 +8,7 @@ use crate::{dataset::Dataset, sensor::ArrayScale};
 /// line.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut dyn Write) -> io::Result<()> {
     write!(writer, "snapshot,row,")?;
     for column in 1..=scale.columns() {
@@ -29,7 +29,7 @@ pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut 
 /// `first_snapshot`; the row-wire is empty where it is not known.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_samples(
     set: &Dataset,
     decoded_mm: Option<&Array2<f64>>,
@@ -53,8 +53,8 @@ pub fn write_samples(
 /// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, and ends the line.
 ///
 /// # Errors
-/// What `writer` said.
-pub fn write_coordinates_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
+/// Any error of `writer`.
+pub(crate) fn write_coordinates_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     write_names("", nodes, writer)
 }
 
@@ -69,8 +69,8 @@ fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result
 /// Writes a line of numbers so that reading gives the same bits.
 ///
 /// # Errors
-/// What `writer` said.
-pub fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
+/// Any error of `writer`.
+pub(crate) fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
     let mut separator = "";
     for number in numbers {
         write!(writer, "{separator}{number:?}")?;

@@ -7,8 +7,8 @@ use crate::{
     sensor::ArrayScale,
 };
 
-/// What is wrong with the parts of a network file, and where. The same is asked before writing and after reading, so
-/// that what was written can be read.
+/// Describes the first defect of a network file and its field. Checked before writing and after reading, so
+/// that every file that is written can be read.
 pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     let NetworkFile {
         program: _,
@@ -49,7 +49,7 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     settings_flaw(settings).or_else(|| flaws.into_iter().flatten().next())
 }
 
-/// What is impossible about the settings in a file, and where.
+/// Describes the first impossible value of the settings in a file, and its field.
 pub(super) fn settings_flaw(settings: &SimulatedSettings) -> Option<String> {
     let at = |field: &str, flaw: &dyn Display| format!("{field}: {flaw}");
     let checks = [

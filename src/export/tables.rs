@@ -6,7 +6,7 @@ use crate::{evaluation::ErrorRow, training::EpochRecord};
 /// field is empty.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_errors(rows: &[ErrorRow], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(writer, "decoupler,{}", ErrorRow::COLUMNS.join(","))?;
     for row in rows {
@@ -22,7 +22,7 @@ pub fn write_errors(rows: &[ErrorRow], writer: &mut dyn Write) -> io::Result<()>
 /// Writes the errors of every epoch as CSV, in the manner of [`write_errors`].
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,

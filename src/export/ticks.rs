@@ -1,4 +1,4 @@
-//! Round numbers for axes. Free of the toolkit.
+//! Round numbers for axes.
 
 use std::ops::RangeInclusive;
 

@@ -1,18 +1,15 @@
-//! Speed against accuracy for other programs: a table of all points, and the picture of one level of noise.
-
 use std::io::{self, Write};
 
-use super::figures::{Hue, Marker, Plot, PlotAxis, PlotPoint, Series};
 use crate::{
-    decoupling::{ColourKey, DecoderKind, Precision},
-    evaluation::{Preset, TradeCost, TradeLevel, TradePoint},
+    decoupling::Precision,
+    evaluation::{TradeCost, TradeLevel},
 };
 
 /// Writes every point of every level as CSV. Numbers are written so that reading gives the same bits; where there is none
 /// the field is empty.
 ///
 /// # Errors
-/// What `writer` said.
+/// Any error of `writer`.
 pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,
@@ -57,84 +54,4 @@ pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<
         }
     }
     Ok(())
-}
-
-/// The picture of one level of noise: the points of each decoder, the front, and the limit that physics sets.
-pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
-    let place = |point: &TradePoint| {
-        let (x, y) = cost.of(point);
-        PlotPoint { x, y, bar: None }
-    };
-    let series = |name: String, hue, marker: Option<Marker>, points: Vec<PlotPoint>| Series {
-        name,
-        hue,
-        has_line: marker.is_none(),
-        is_dashed: false,
-        marker,
-        points,
-    };
-    let chosen = level.points.iter().zip(level.front(cost));
-    let mut front: Vec<PlotPoint> = chosen
-        .filter(|(_, is_chosen)| *is_chosen)
-        .map(|(point, _)| place(point))
-        .collect();
-    front.sort_by(|a, b| a.x.total_cmp(&b.x));
-    let mut all = vec![series("no other is better".to_owned(), Hue::Grey, None, front)];
-    for kind in DecoderKind::ALL {
-        for (preset, marker) in [(Preset::Paper, Marker::Ring), (Preset::Best, Marker::Disc)] {
-            let points = level.points.iter();
-            let points = points.filter(|point| point.report.kind == kind && point.preset == preset);
-            let name = format!("{kind}, {preset} preset");
-            all.push(series(
-                name,
-                hue(kind.colour()),
-                Some(marker),
-                points.map(place).collect(),
-            ));
-        }
-    }
-    let limit = level.points.first().and_then(|point| point.reference.z_percent);
-    let costs = level
-        .points
-        .iter()
-        .map(|point| cost.of(point).0)
-        .filter(|x| x.is_finite() && *x > 0.0);
-    let ends = [costs.clone().reduce(f64::min), costs.reduce(f64::max)];
-    let ends = ends.into_iter().flatten().filter_map(|x| {
-        Some(PlotPoint {
-            x,
-            y: limit?,
-            bar: None,
-        })
-    });
-    all.push(Series {
-        is_dashed: true,
-        ..series(
-            "limit of physics".to_owned(),
-            Hue::Grey,
-            None,
-            ends.filter(|end| end.y > 0.0).collect(),
-        )
-    });
-    all.retain(|series| !series.points.is_empty());
-    Plot {
-        x: PlotAxis::logarithmic(cost.name()),
-        y: PlotAxis::logarithmic("Z error (%)"),
-        series: all,
-        spans: Vec::new(),
-        width_pt: Plot::WIDE_PT,
-    }
-}
-
-/// The colour of a decoder in print.
-fn hue(colour: ColourKey) -> Hue {
-    match colour {
-        ColourKey::Grey => Hue::Grey,
-        ColourKey::Violet => Hue::Violet,
-        ColourKey::Blue => Hue::Blue,
-        ColourKey::Orange => Hue::Orange,
-        ColourKey::Red => Hue::Red,
-        ColourKey::Green => Hue::Green,
-        ColourKey::Cyan => Hue::Cyan,
-    }
 }

@@ -19,21 +19,21 @@ use super::{
 const FORMAT: &str = "decoupler workspace";
 const VERSION: u64 = 1;
 
-/// What is kept from session to session: the finished trainings, and which two are compared.
+/// Contents of the workspace file, kept between sessions: the finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Workspace {
-    /// In the order in which they were finished.
+    /// The runs in the order in which they were finished.
     pub runs: Vec<KeptRun>,
-    /// [`KeptRun::id`] of the two.
+    /// [`KeptRun::id`] of the two runs that are compared.
     pub pinned: [Option<u64>; 2],
 }
 
 /// A finished training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeptRun {
-    /// No other run of the workspace has it.
+    /// Number of the run, unique in the workspace.
     pub id: u64,
-    /// What the user calls it.
+    /// Name given by the user.
     pub name: String,
     /// Settings, network, training record and errors.
     pub file: Arc<NetworkFile>,
@@ -42,21 +42,22 @@ pub struct KeptRun {
 /// A workspace as it was found.
 #[derive(Debug)]
 pub struct FoundWorkspace {
-    /// What could be read.
+    /// The part of the file that could be read.
     pub workspace: Workspace,
-    /// What could not, and where it is kept; in a sentence.
+    /// A sentence about what could not be read, and where the old file is kept.
     pub warning: Option<String>,
 }
 
-/// Why a workspace cannot be taken up. The file is left as it is then, and must not be written.
+/// Errors of loading a workspace. The file is then left unchanged, and must not be written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum WorkspaceError {
-    /// The system refuses to read it.
+    /// The operating system refuses to read it.
     #[error("cannot read the run list '{}': {source}; runs of this session are not kept", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// A newer program wrote it.
@@ -64,17 +65,17 @@ pub enum WorkspaceError {
     Newer {
         /// The file.
         path: PathBuf,
-        /// Who wrote it.
+        /// Program that wrote the file.
         program: String,
     },
-    /// It is damaged, and a copy cannot be put aside.
+    /// The file is damaged, and cannot be copied.
     #[error("the run list '{}' is damaged ({flaw}) and cannot be put aside: {source}; runs of this session are not kept", .path.display())]
     Aside {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the defect.
         flaw: String,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
 }
@@ -130,11 +131,11 @@ impl Workspace {
         })
     }
 
-    /// Takes up the workspace at `path`; an empty one where there is no file. A damaged file, or one with damaged runs,
-    /// is put aside beside its place, and what can be read is taken up.
+    /// Loads the workspace at `path`; an empty one if there is no file. A damaged file, or one with damaged runs,
+    /// is first copied under another name beside it, and the part that can be read is loaded.
     ///
     /// # Errors
-    /// The file can be neither read nor put aside.
+    /// The file can be neither read nor copied.
     pub fn load(path: &Path) -> Result<FoundWorkspace, WorkspaceError> {
         let bytes = match fs::read(path) {
             Ok(bytes) => bytes,
@@ -187,7 +188,7 @@ impl Workspace {
         })
     }
 
-    /// The runs that can be read, and what is wrong with the others.
+    /// Splits the runs into those that can be read and the defects of the others.
     fn parse(path: &Path, bytes: &[u8]) -> Result<(Self, Vec<String>), String> {
         let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
             NoHeading::NotJson(reason) => reason,
@@ -217,7 +218,7 @@ impl Workspace {
     }
 }
 
-/// Copies the file beside its place, under a name that is not taken yet.
+/// Copies the file to its folder under a name that is not taken yet.
 fn put_aside(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {

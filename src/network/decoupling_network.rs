@@ -15,6 +15,7 @@ pub struct DecouplingNetwork {
 
 /// Parts that do not make a network.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// The scaling has limits that are missing, not finite, or out of order.
     #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]

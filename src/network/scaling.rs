@@ -15,6 +15,7 @@ pub struct MinMax {
 
 /// Why channels cannot be scaled.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ScalingError {
     /// No samples.
     #[error("there are no samples to scale")]

@@ -39,6 +39,7 @@ pub struct Scene {
 
 /// A scene that cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The largest compression is out of range.
     #[error("the largest compression is {} %: it must be above 0 and below 100 % of the height", 100.0 * .0)]

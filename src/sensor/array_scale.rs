@@ -20,6 +20,7 @@ pub struct ArrayScale {
 
 /// Why a text or four numbers are not an array scale.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum ArrayScaleError {
     /// The text does not have the form `M1×M2_M3×M4`.
     #[error("'{0}' is not an array scale: write M1xM2_M3xM4, for example 10x10_5x30")]

@@ -32,6 +32,7 @@ pub struct Geometry {
 
 /// A geometry that no sensor can have.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum GeometryError {
     /// A length is NaN or infinite.
     #[error("{what} is {value}: give a finite length in millimetres")]

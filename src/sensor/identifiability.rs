@@ -39,6 +39,7 @@ pub struct RowPair {
 
 /// Why the singular values are not known.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum IdentifiabilityError {
     /// The model has no resistance for the deformation.
     #[error(transparent)]

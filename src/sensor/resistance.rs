@@ -23,6 +23,7 @@ pub struct SensorModel {
 
 /// Why the model cannot answer.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum SensorError {
     /// The geometry is impossible.
     #[error(transparent)]

@@ -22,6 +22,7 @@ impl fmt::Display for Axis {
 
 /// Why no surface can be laid through the nodes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// An axis without coordinates.
     #[error("a surface needs at least one {axis} coordinate, and none was given")]

@@ -31,6 +31,7 @@ pub struct TrainerState {
 
 /// Why a training cannot be resumed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ResumeError {
     /// A setting is out of range.
     #[error(transparent)]

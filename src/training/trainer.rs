@@ -43,6 +43,7 @@ pub struct Problem {
 
 /// Why training cannot begin.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TrainingError {
     /// A setting is out of range.
     #[error(transparent)]

@@ -35,6 +35,7 @@ pub struct AxisForm {
 
 /// A value that cannot be understood.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ListError {
     /// Not a number.
     #[error("{name}: '{text}' is not a whole number; write a list such as {example}")]

@@ -14,6 +14,7 @@ pub struct Form {
 
 /// Why a form is no experiment yet.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum FormError {
     /// A value that cannot be understood.
     #[error(transparent)]

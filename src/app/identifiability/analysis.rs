@@ -60,6 +60,7 @@ pub struct Analysis {
 
 /// Why nothing can be told.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum AnalysisError {
     /// An impossible scene.
     #[error(transparent)]

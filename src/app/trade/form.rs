@@ -52,6 +52,7 @@ pub enum Thoroughness {
 
 /// Why a form is no measurement yet.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum TradeFormError {
     /// Something that is no number.
     #[error("{what}: '{text}' is not a number; write a list such as {example}")]

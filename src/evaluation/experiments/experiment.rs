@@ -41,6 +41,7 @@ pub struct Cell {
 
 /// Why an experiment cannot be run.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ExperimentError {
     /// An axis has no values.
     #[error("there are no values for {0}: give at least one")]

@@ -12,12 +12,12 @@ pub(super) const TEXT: f64 = 8.0;
 /// The average width of a character of this size: enough to leave room for a text.
 pub(super) const CHARACTER: f64 = 0.56 * TEXT;
 
-/// How far blocks reach under their neighbours, in points: one pixel in print.
+/// Overlap of neighbouring blocks in points: one pixel in print.
 const OVERLAP: f64 = 0.25;
 
 pub(super) type At = [f64; 2];
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke {
     pub colour: Rgb,
@@ -42,7 +42,7 @@ impl Stroke {
     }
 }
 
-/// Which part of a text stands at its place.
+/// Part of a text that is at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -187,7 +187,7 @@ impl Canvas {
         ));
     }
 
-    /// What `draw` draws is cut off at the edges of `area`.
+    /// Clips everything that `draw` draws to `area`.
     pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
         self.clips += 1;
         let clip = self.clips;
@@ -211,7 +211,7 @@ impl Canvas {
     }
 }
 
-/// To a hundredth of a point, without zeros that say nothing.
+/// Formats a length to a hundredth of a point, without trailing zeros.
 fn number(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -11,7 +11,7 @@ use super::{
 const STEPS: usize = 64;
 const WIDTH: f64 = 9.0;
 
-/// What the bar takes with its numbers and name, in points.
+/// Width of the bar with its numbers and name, in points.
 pub(super) const COLOUR_BAR_WIDTH: f64 = 54.0;
 
 /// Draws the bar of the places in `range` on `axis` from `top` down, `height` high.

@@ -16,7 +16,7 @@ pub(super) const MISSING: Rgb = [0xf3, 0xf5, 0xf8];
 pub enum Hue {
     /// The network's own result.
     Blue,
-    /// What it is compared with.
+    /// The results that it is compared with.
     Red,
     /// A second comparison.
     Green,

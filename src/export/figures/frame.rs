@@ -8,7 +8,7 @@ use super::{
     plot_axis::{PlotAxis, share},
 };
 
-/// Where the values of both axes stand on the canvas.
+/// Position of both axes on the canvas.
 pub(super) struct Frame<'a> {
     pub area: Area,
     pub x: (&'a PlotAxis, RangeInclusive<f64>),
@@ -24,7 +24,7 @@ impl Frame<'_> {
         self.area.bottom() - self.area.height * share(place, &self.y.1)
     }
 
-    /// Where a point stands, if it has a place.
+    /// Position of a point on the canvas; `None` if an axis has no place for it.
     pub fn at(&self, x: f64, y: f64) -> Option<At> {
         Some([self.x_at(self.x.0.place(x)?), self.y_at(self.y.0.place(y)?)])
     }

@@ -12,9 +12,9 @@ use crate::export::format_number;
 /// Values over two axes as colours, with the number in each cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// What the columns are.
+    /// Name of the columns' quantity.
     pub x_name: String,
-    /// What the rows are.
+    /// Name of the rows' quantity.
     pub y_name: String,
     /// Value of each column, in words.
     pub columns: Vec<String>,
@@ -22,7 +22,7 @@ pub struct HeatMap {
     pub rows: Vec<String>,
     /// Rows × columns; NaN where there is none.
     pub values: Array2<f64>,
-    /// What the values are, and how colours are spread over them.
+    /// Name of the values, and the scale of the colours.
     pub value_axis: PlotAxis,
 }
 
@@ -30,7 +30,7 @@ impl HeatMap {
     const WIDTH: f64 = 360.0;
     const ROW: f64 = 24.0;
 
-    /// Draws it.
+    /// Draws the figure.
     pub fn draw(&self) -> Picture {
         let longest = |names: &[String]| names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let (rows, columns) = self.values.dim();

@@ -14,6 +14,7 @@ mod picture;
 mod plot;
 mod plot_axis;
 mod relief;
+mod surface_panel;
 mod surfaces;
 
 pub use colours::Hue;
@@ -22,4 +23,5 @@ pub use nodes::node_plot;
 pub use picture::{Picture, PictureError, PictureFormat};
 pub use plot::{Marker, Plot, PlotPoint, Series, Span};
 pub use plot_axis::{AxisScale, PlotAxis};
-pub use surfaces::{SurfaceFigure, SurfaceLook, SurfacePanel};
+pub use surface_panel::SurfacePanel;
+pub use surfaces::{SurfaceFigure, SurfaceLook};

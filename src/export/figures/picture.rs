@@ -15,7 +15,7 @@ pub struct Picture {
     svg: String,
 }
 
-/// In which form a figure is written.
+/// File format of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PictureFormat {
     /// Lines and text, sharp at any size.
@@ -34,13 +34,14 @@ impl PictureFormat {
     }
 }
 
-/// Why a figure is not written.
+/// Errors of writing a figure.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PictureError {
-    /// The pixels cannot be made.
+    /// The figure cannot be drawn in pixels.
     #[error("the picture cannot be drawn in pixels: {0}; save it as SVG instead")]
     Pixels(String),
-    /// A name that tells no format.
+    /// The name of the file tells no format.
     #[error("cannot write '{}': give a name that ends in .png or .svg", .0.display())]
     Name(PathBuf),
     /// The file.
@@ -49,10 +50,10 @@ pub enum PictureError {
 }
 
 impl PictureFormat {
-    /// As the name of the file ends.
+    /// The format that the extension of `path` names.
     ///
     /// # Errors
-    /// It ends neither in .svg nor in .png.
+    /// The name ends neither in .svg nor in .png.
     pub fn of_path(path: &Path) -> Result<Self, PictureError> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let formats = [Self::Svg, Self::Png].into_iter();
@@ -61,7 +62,7 @@ impl PictureFormat {
     }
 }
 
-/// What journals ask for at least.
+/// The minimum that journals ask for.
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
@@ -93,10 +94,10 @@ impl Picture {
         pixels.encode_png().map_err(|error| failed(error.to_string()))
     }
 
-    /// Writes the figure whole or not at all.
+    /// Writes the figure atomically.
     ///
     /// # Errors
-    /// The path is not one that can be written.
+    /// The path cannot be written.
     pub fn save(&self, format: PictureFormat, path: &Path) -> Result<(), PictureError> {
         let png;
         let bytes = match format {

@@ -30,7 +30,7 @@ pub struct Series {
     pub hue: Hue,
     /// A line from point to point.
     pub has_line: bool,
-    /// Whether the line is dashed.
+    /// True for a dashed line.
     pub is_dashed: bool,
     /// At each point.
     pub marker: Option<Marker>,
@@ -49,7 +49,7 @@ pub struct PlotPoint {
     pub bar: Option<[f64; 2]>,
 }
 
-/// What stands at a point.
+/// Symbol at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     /// A hollow square.
@@ -83,7 +83,7 @@ impl Plot {
     const BOTTOM: f64 = 36.0;
     const RIGHT: f64 = 12.0;
 
-    /// Draws it.
+    /// Draws the figure.
     pub fn draw(&self) -> Picture {
         let mut canvas = Canvas::new(self.width_pt, Self::HEIGHT);
         let area = Area {

@@ -2,28 +2,28 @@ use std::ops::RangeInclusive;
 
 use crate::export::ticks::{multiples, step_for, tick_text};
 
-/// How values are spaced along an axis.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisScale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm; what is not positive is left out.
+    /// Logarithmic; values that are not positive are left out.
     Logarithmic,
 }
 
 /// An axis of a plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlotAxis {
-    /// What it shows, with the unit.
+    /// Name of the quantity, with its unit.
     pub name: String,
-    /// How values are spaced.
+    /// Linear or logarithmic.
     pub scale: AxisScale,
     /// Values with names of their own, in place of round numbers.
     pub named: Vec<(f64, String)>,
 }
 
 impl PlotAxis {
-    /// An evenly spaced axis.
+    /// A linear axis.
     pub fn linear(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -40,7 +40,7 @@ impl PlotAxis {
         }
     }
 
-    /// Where a value stands; `None` if it has no place.
+    /// Position of a value on the axis; `None` if it has none.
     pub(super) fn place(&self, value: f64) -> Option<f64> {
         let place = match self.scale {
             AxisScale::Linear => value,
@@ -80,7 +80,7 @@ impl PlotAxis {
     }
 }
 
-/// Where a place stands in its range, from 0 to 1.
+/// Position of `place` in its range, from 0 to 1.
 pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
     (place - range.start()) / (range.end() - range.start())
 }

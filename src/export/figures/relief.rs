@@ -8,14 +8,14 @@ use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke},
     colours::{DIM, GRID, INK, lit, viridis},
     plot_axis::share,
-    surfaces::SurfacePanel,
+    surface_panel::SurfacePanel,
 };
 use crate::{
     export::ticks::{multiples, step_for, tick_text},
     surface::Grid,
 };
 
-/// Where the eye is: turned from the x axis, and above the horizon.
+/// Direction of view: angle from the x axis, and angle above the horizon, in radians.
 const AZIMUTH: f64 = -0.92;
 const ELEVATION: f64 = 0.52;
 /// Height of the box, its longer side being 1.
@@ -25,7 +25,7 @@ const NARROWEST: f64 = 0.6;
 /// Room for ticks and names around the box.
 const MARGIN: [f64; 2] = [36.0, 24.0];
 
-/// Millimetres to places on the canvas.
+/// Projection from millimetres to the canvas.
 pub(super) struct Relief {
     area: Area,
     low: DVec3,

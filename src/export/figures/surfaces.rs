@@ -1,7 +1,5 @@
 use std::ops::RangeInclusive;
 
-use glam::DVec3;
-
 use super::{
     canvas::{Area, Canvas, Stroke},
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
@@ -11,49 +9,39 @@ use super::{
     plot::Plot,
     plot_axis::{PlotAxis, share},
     relief::Relief,
+    surface_panel::SurfacePanel,
 };
 use crate::surface::Grid;
 
-/// From where surfaces are seen.
+/// View of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceLook {
-    /// As a map: the paper's Figs. 4 and 8.
+    /// From above, as a map: the paper's Figs. 4 and 8.
     Top,
-    /// In space: Fig. 7.
+    /// In three dimensions, without perspective: the paper's Fig. 7.
     ThreeD,
-}
-
-/// One surface of the figure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SurfacePanel {
-    /// Stands above it: "Actual".
-    pub title: String,
-    /// Heights on the grid, `x points × y points`, in millimetres.
-    pub values_mm: Vec<f64>,
-    /// The nodes: x, y and z in millimetres; dots on the map.
-    pub nodes_mm: Vec<DVec3>,
 }
 
 /// Surfaces side by side with one scale of heights and colours. Only what lies between the nodes is drawn; beyond them
 /// there are no data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceFigure {
-    /// Where the values are.
+    /// Grid of the values.
     pub grid: Grid,
-    /// From left to right.
+    /// The surfaces from left to right.
     pub panels: Vec<SurfacePanel>,
     /// Heights at the ends of the scale, in millimetres.
     pub range_mm: RangeInclusive<f64>,
-    /// From where.
+    /// View of all surfaces.
     pub look: SurfaceLook,
 }
 
 impl SurfaceFigure {
     const HEIGHT: f64 = 240.0;
-    /// Cells a side at most: more would only make the file larger.
+    /// Maximum number of cells per side: more would only make the file larger.
     const MOST_CELLS: usize = 64;
 
-    /// Draws it, as wide as a page.
+    /// Draws the figure, as wide as a page.
     pub fn draw(&self) -> Picture {
         let mut canvas = Canvas::new(Plot::WIDE_PT, Self::HEIGHT);
         let width = (Plot::WIDE_PT - COLOUR_BAR_WIDTH - 8.0) / self.panels.len().max(1) as f64;
@@ -153,7 +141,7 @@ impl SurfaceFigure {
     }
 }
 
-/// At most so many cells between the first and the last index.
+/// Thins `indices` to at most `most` cells between the first and the last one.
 fn thinned(indices: RangeInclusive<usize>, most: usize) -> Vec<usize> {
     let (first, last) = indices.into_inner();
     let stride = (last - first).div_ceil(most).max(1);
