@@ -1,16 +1,15 @@
 use std::{
     collections::BTreeSet,
     fs::{self, File},
-    io::{self, ErrorKind},
+    io,
     path::{Path, PathBuf},
     process,
-    sync::{
-        Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
-/// Paths of all temporary files. A program ended from another thread runs no destructors, so it removes these.
+use tempfile::NamedTempFile;
+
+/// Paths of all files in the making. A program that is ended from another thread drops nothing, so it looks here.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -18,58 +17,57 @@ fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A temporary file, removed when dropped.
+/// A file in the making, removed when dropped.
 #[derive(Debug)]
 pub(super) struct Unfinished {
-    file: File,
-    /// Listed in [`ALL`] until the file is renamed.
-    path: PathBuf,
+    file: NamedTempFile,
+    listed: Listed,
+}
+
+/// An entry of [`ALL`], while it lives.
+#[derive(Debug)]
+struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        all().remove(&self.0);
+    }
 }
 
 impl Unfinished {
-    /// Creates a temporary file in `folder`, with the default permissions (0666 minus the umask).
+    /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask).
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
-        static NUMBER: AtomicU64 = AtomicU64::new(0);
-        let mut all = all();
-        loop {
-            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-            let path = folder.join(format!(".decoupler-{}-{number}.part", process::id()));
-            match File::create_new(&path) {
-                // Another machine or container has a process of the same number, or one was killed.
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(error),
-                Ok(file) => {
-                    all.insert(path.clone());
-                    return Ok(Self { file, path });
-                }
-            }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".decoupler-").suffix(".part");
+        #[cfg(unix)]
+        {
+            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
+            builder.permissions(Permissions::from_mode(0o666));
         }
+        // The default error repeats the temporary name, which means nothing to the user.
+        let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+        let mut all = all();
+        let file = builder.tempfile_in(folder).map_err(plain)?;
+        all.insert(file.path().to_owned());
+        let listed = Listed(file.path().to_owned());
+        Ok(Self { file, listed })
     }
 
     pub(super) fn as_file(&self) -> &File {
-        &self.file
+        self.file.as_file()
     }
 
-    /// Renames the file to `target`, replacing a file that is there.
+    /// Puts it in the place of `target`.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
-        fs::rename(&self.path, target)?;
-        all().remove(&self.path);
-        Ok(())
+        let Self { file, listed } = self;
+        let persisted = file.persist(target);
+        drop(listed);
+        persisted.map(drop).map_err(|error| error.error)
     }
 }
 
-impl Drop for Unfinished {
-    fn drop(&mut self) {
-        if all().remove(&self.path) {
-            // What cannot be removed stays beside the target; nobody is left to tell.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-/// Ends the program with this exit status, from any thread, after removing all temporary files.
-#[cfg(feature = "cli")]
-pub(crate) fn exit_leaving_nothing(status: i32) -> ! {
+/// Ends the program with this exit status, from any thread. Files in the making leave nothing.
+pub fn exit_leaving_nothing(status: i32) -> ! {
     // Held to the end, so that no other thread begins one meanwhile.
     let all = all();
     for path in all.iter() {
@@ -77,28 +75,4 @@ pub(crate) fn exit_leaving_nothing(status: i32) -> ! {
         let _ = fs::remove_file(path);
     }
     process::exit(status)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_left_by_another_process_is_neither_taken_nor_changed() {
-        let folder = tempfile::tempdir().unwrap();
-        let first = Unfinished::begin(folder.path()).unwrap();
-        let name = first.path.file_stem().unwrap().to_str().unwrap();
-        let (start, number) = name.rsplit_once('-').unwrap();
-        let number: u64 = number.parse().unwrap();
-        let left = (1..100).map(|later| folder.path().join(format!("{start}-{}.part", number + later)));
-        let left: Vec<_> = left.collect();
-        left.iter().for_each(|path| fs::write(path, "left").unwrap());
-        let second = Unfinished::begin(folder.path()).unwrap();
-        assert!(!left.contains(&second.path));
-        drop((first, second));
-        for path in &left {
-            assert_eq!(fs::read(path).unwrap(), b"left");
-        }
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), left.len());
-    }
 }
