@@ -45,7 +45,7 @@ pub(super) struct SceneArguments {
     /// Which samples noise disturbs [default: both]
     #[arg(long, value_name = "both|training|test", value_parser = noisy_sets)]
     noise_in: Option<NoisySets>,
-    /// Decoders to use, separated by commas: mean, ridge, network, rbf, newton, polish
+    /// Decoders to use, separated by commas: mean, ridge, network, rbf, fuzzy, newton, polish
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) decoder: Vec<DecoderKind>,
 }

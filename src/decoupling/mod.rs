@@ -5,6 +5,7 @@
 //! | [`TrainingMean`] | knows nothing: the baseline |
 //! | [`RidgeMap`] | affine, with a penalty chosen by cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
+//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
 //! | [`NewtonDecoder`] | solves Eq. (2) |
 //! | [`PolishedDecoder`] | any of them, then a few of Newton's steps |
@@ -14,6 +15,7 @@
 //! [`Decoupler`] is the older interface of networks and baselines to rows without order.
 
 mod box_posterior;
+mod clusters;
 mod compiled_network;
 mod equation_decoders;
 mod frame;
@@ -28,6 +30,7 @@ mod residual;
 mod ridge_map;
 mod row_prior;
 mod row_problem;
+mod takagi_sugeno;
 mod training_mean;
 
 pub use compiled_network::CompiledNetworks;
@@ -41,6 +44,7 @@ pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
 pub use real::Real;
 pub use residual::resistance_residual;
 pub use ridge_map::RidgeMap;
+pub use takagi_sugeno::TakagiSugeno;
 pub use training_mean::TrainingMean;
 
 use ndarray::{Array2, ArrayView2};

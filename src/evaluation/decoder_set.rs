@@ -11,7 +11,7 @@ use crate::{
     dataset::{Dataset, Stream},
     decoupling::{
         FrameDecoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder, RadialBasisNetwork,
-        RadialBasisSettings, RidgeMap, TrainingMean, decode_set, fit_rows, resistance_residual,
+        RadialBasisSettings, RidgeMap, TakagiSugeno, TrainingMean, decode_set, fit_rows, resistance_residual,
     },
     network::Networks,
 };
@@ -27,6 +27,8 @@ pub enum DecoderKind {
     Network,
     /// Gaussians around centres.
     RadialBasis,
+    /// Fuzzy rules with affine consequents.
+    Fuzzy,
     /// Newton's method on Eq. (2); with noise and prior where the scene has noise.
     Newton,
     /// The network, then at most [`DecoderSet::POLISH_STEPS`] of Newton's steps.
@@ -35,16 +37,17 @@ pub enum DecoderKind {
 
 /// A word that is none of the decoders.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a decoder: give mean, ridge, network, rbf, newton or polish")]
+#[error("'{0}' is not a decoder: give mean, ridge, network, rbf, fuzzy, newton or polish")]
 pub struct DecoderKindError(String);
 
 impl DecoderKind {
     /// All of them, in the order offered.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Mean,
         Self::Ridge,
         Self::Network,
         Self::RadialBasis,
+        Self::Fuzzy,
         Self::Newton,
         Self::Polish,
     ];
@@ -62,6 +65,7 @@ impl fmt::Display for DecoderKind {
             Self::Ridge => "ridge",
             Self::Network => "network",
             Self::RadialBasis => "rbf",
+            Self::Fuzzy => "fuzzy",
             Self::Newton => "newton",
             Self::Polish => "polish",
         })
@@ -186,6 +190,11 @@ impl DecoderSet {
                 let fit =
                     |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, noise, settings_of_basis, &mut rng);
                 Some(Box::new(fit_rows(training, known, fit)?) as Box<dyn FrameDecoder>)
+            }
+            DecoderKind::Fuzzy => {
+                let quantity = settings.inputs.quantity;
+                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, noise, &mut rng);
+                Some(Box::new(fit_rows(training, known, fit)?))
             }
             DecoderKind::Network => networks.map(|networks| match precision {
                 Precision::Double => compiled::<f64>(networks, rows.len()),

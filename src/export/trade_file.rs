@@ -124,6 +124,7 @@ fn hue(kind: DecoderKind) -> Hue {
         DecoderKind::Ridge => Hue::Violet,
         DecoderKind::Network => Hue::Blue,
         DecoderKind::RadialBasis => Hue::Orange,
+        DecoderKind::Fuzzy => Hue::Teal,
         DecoderKind::Newton => Hue::Red,
         DecoderKind::Polish => Hue::Green,
     }

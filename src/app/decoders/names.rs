@@ -8,6 +8,7 @@ pub fn decoder_name(kind: DecoderKind, precision: Precision) -> &'static str {
         (DecoderKind::Network, Precision::Double) => "Network",
         (DecoderKind::Network, Precision::Single) => "Network f32",
         (DecoderKind::RadialBasis, _) => "Radial basis",
+        (DecoderKind::Fuzzy, _) => "Fuzzy",
         (DecoderKind::Newton, _) => "Newton",
         (DecoderKind::Polish, _) => "Network + Newton",
     }

@@ -119,6 +119,9 @@ fn meaning(kind: DecoderKind) -> &'static str {
         DecoderKind::Ridge => "The best affine map of the inputs chosen on the left, ridge-regularised",
         DecoderKind::Network => "The trained network, computed with so many bits",
         DecoderKind::RadialBasis => "A radial-basis network: Gaussians around centres among the training samples",
+        DecoderKind::Fuzzy => {
+            "A Takagi-Sugeno system: fuzzy rules with affine consequents, as many as a cross-validation chooses"
+        }
         DecoderKind::Newton => {
             "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior"
         }

@@ -33,6 +33,7 @@ pub fn colour(kind: DecoderKind, palette: &Palette) -> Color32 {
         DecoderKind::Ridge => palette.text,
         DecoderKind::Network => palette.accent,
         DecoderKind::RadialBasis => palette.test_series,
+        DecoderKind::Fuzzy => palette.further_series,
         DecoderKind::Newton => palette.bad,
         DecoderKind::Polish => palette.good,
     }

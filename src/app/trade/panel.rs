@@ -116,6 +116,7 @@ fn meaning(kind: DecoderKind) -> &'static str {
         DecoderKind::Ridge => "The best affine map of the inputs, ridge-regularised",
         DecoderKind::Network => "The trained network, in 64 and in 32 bits",
         DecoderKind::RadialBasis => "Gaussians around centres, fitted by least squares",
+        DecoderKind::Fuzzy => "Fuzzy rules with affine consequents, fitted by least squares",
         DecoderKind::Newton => {
             "Newton's method on the resistance model; with prior and noise where the scene has noise"
         }

@@ -24,6 +24,8 @@ pub enum Hue {
     Orange,
     /// A fourth.
     Violet,
+    /// A fifth.
+    Teal,
     /// References and bounds.
     Grey,
 }
@@ -36,6 +38,7 @@ impl Hue {
             Self::Green => [0x1a, 0x7f, 0x4b],
             Self::Orange => [0xa8, 0x64, 0x00],
             Self::Violet => [0x7a, 0x3e, 0xb1],
+            Self::Teal => [0x0e, 0x8a, 0x96],
             Self::Grey => DIM,
         }
     }
