@@ -65,9 +65,10 @@ impl Antecedents {
     /// Normalised firing strengths (samples × rules) of the inputs `x` (samples × inputs).
     pub fn firing_strengths(&self, x: ArrayView2<'_, f64>) -> Array2<f64> {
         let (slopes, offsets) = self.logarithms(x.ncols());
-        let mut strengths = x.dot(&slopes.t()) + &offsets;
+        // A product of one input is made column by column.
+        let mut strengths = (x.dot(&slopes.t()) + &offsets).as_standard_layout().into_owned();
         for mut row in strengths.rows_mut() {
-            normalise(row.as_slice_mut().expect("a product is made in standard layout"));
+            normalise(row.as_slice_mut().expect("rows of a standard array are contiguous"));
         }
         strengths
     }

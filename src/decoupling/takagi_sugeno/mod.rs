@@ -7,7 +7,7 @@ mod selection;
 use ndarray::{Array2, Axis};
 use rand::Rng;
 
-use self::antecedents::normalise;
+use self::antecedents::{Antecedents, normalise};
 use super::frame::RowMap;
 use crate::{
     dataset::Dataset,
@@ -19,7 +19,12 @@ use crate::{
 ///
 /// The antecedents are Gaussian memberships on whitened readings, centred on clusters of the training samples; the
 /// consequents of all rules are found together by least squares with a small ridge penalty. A cross-validation chooses the
-/// number of rules, the width of the memberships, how many inputs they look at, and the penalty.
+/// number of rules, how many inputs their memberships look at, and the penalty.
+///
+/// In 30 dimensions distances hardly differ, so memberships look at the leading 3 or 10 principal components only, and are
+/// four times as wide as their centres are apart. Measured on the simulated 10×10_5×30 array with 12 rules, the held-out
+/// error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and that of one map
+/// for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never clearly better.
 #[derive(Clone, Debug)]
 pub struct TakagiSugeno {
     quantity: Quantity,
@@ -62,7 +67,7 @@ impl TakagiSugeno {
     }
 
     /// Folds the scalings into the rules.
-    fn new(inputs: &Inputs, antecedents: &antecedents::Antecedents, scaled: &Array2<f64>, outputs: &MinMax) -> Self {
+    fn new(inputs: &Inputs, antecedents: &Antecedents, scaled: &Array2<f64>, outputs: &MinMax) -> Self {
         let (centre, to_inputs) = inputs.affine();
         let (channels, n, rules) = (centre.len(), inputs.count(), antecedents.rules());
         let (slopes, offsets) = antecedents.logarithms(n);
@@ -142,5 +147,192 @@ fn add_products(sums: &mut [f64], values: &[f64], factor: f64, matrix: &[f64]) {
         for (sum, weight) in sums.iter_mut().zip(row) {
             *sum += value * weight;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        decoupling::{RadialBasisNetwork, RadialBasisSettings},
+        scene::{Rows, Scene},
+        sensor::SensorModel,
+    };
+
+    /// A training set and a test set of the known first row-wire, or of all of them.
+    fn sets(array: &str, samples: usize, rows: Rows) -> (Dataset, Dataset) {
+        let model = SensorModel::new(array.parse().unwrap());
+        let scene = Scene {
+            rows,
+            ..Scene::default()
+        };
+        let draw = |samples, stream| Dataset::simulate(&model, &scene, samples, &mut Seed(0).rng(stream)).unwrap();
+        (draw(samples, Stream::Training), draw(100, Stream::Test))
+    }
+
+    fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
+        TakagiSugeno::fit(set, quantity, 0.0, &mut Seed(0).rng(Stream::Expectation)).unwrap()
+    }
+
+    fn squared_error(decoder: &mut dyn RowMap, test: &Dataset) -> f64 {
+        let mut answer = vec![0.0; test.coordinates_mm.ncols()];
+        let samples = test.resistances_ohm.rows().into_iter().zip(test.coordinates_mm.rows());
+        let of_sample = |(readings, truth): (ndarray::ArrayView1<'_, f64>, ndarray::ArrayView1<'_, f64>)| {
+            decoder.map(&readings.to_vec(), &mut answer);
+            answer.iter().zip(truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+        };
+        samples.map(of_sample).sum()
+    }
+
+    #[test]
+    fn it_is_better_than_a_radial_basis_network_on_new_samples() {
+        for (rows, quantity) in [(Rows::Known, Quantity::Conductance), (Rows::All, Quantity::Resistance)] {
+            let (training, test) = sets("10x6_3x18", 1500, rows);
+            let (training, test) = if rows == Rows::Known {
+                (training.of_row(0), test.of_row(0))
+            } else {
+                (training, test)
+            };
+            let choice = InputChoice {
+                quantity,
+                ..InputChoice::BEST
+            };
+            let settings = RadialBasisSettings::default();
+            let mut rng = Seed(0).rng(Stream::Expectation);
+            let mut basis = RadialBasisNetwork::fit(&training, choice, 0.0, settings, &mut rng).unwrap();
+            let mut fuzzy = fit(&training, quantity);
+            let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
+            assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
+        }
+    }
+
+    #[test]
+    fn the_folded_rules_give_what_the_scaled_ones_do() {
+        let (training, test) = sets("10x6_3x18", 600, Rows::All);
+        let scaling = ScalingChoice::Whitening;
+        let choice = InputChoice {
+            quantity: Quantity::LogResistance,
+            scaling,
+        };
+        let inputs = Inputs::fit(choice, training.resistances_ohm.view(), 1e-4).unwrap();
+        let outputs = MinMax::fit(training.coordinates_mm.view()).unwrap();
+        let x = inputs.of(training.resistances_ohm.view());
+        let y = outputs.scale(training.coordinates_mm.view());
+        let mut rng = Seed(0).rng(Stream::Expectation);
+        let (centres, distance) = Antecedents::clusters(x.view(), 3, 8, &mut rng);
+        let antecedents = Antecedents::new(centres, distance);
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6);
+        let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
+        assert_eq!(folded.rules(), 8);
+        // Rule by rule in the scaled inputs and targets.
+        let x = inputs.of(test.resistances_ohm.view());
+        let strengths = antecedents.firing_strengths(x.view());
+        let expected = Array2::from_shape_fn((test.samples(), y.ncols()), |(s, t)| {
+            let affine = |rule: usize| {
+                let of_input = |k: usize| if k < x.ncols() { x[[s, k]] } else { 1.0 };
+                let term = |k: usize| scaled[[rule * (x.ncols() + 1) + k, t]] * of_input(k);
+                (0..=x.ncols()).map(term).sum::<f64>()
+            };
+            (0..8).map(|rule| strengths[[s, rule]] * affine(rule)).sum()
+        });
+        let expected = outputs.restore(expected.view());
+        let mut answer = [0.0; 18];
+        for (readings, expected) in test.resistances_ohm.rows().into_iter().zip(expected.rows()) {
+            folded.map(&readings.to_vec(), &mut answer);
+            for (ours, expected) in answer.iter().zip(expected) {
+                assert!((ours - expected).abs() < 1e-9, "{ours} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn extremes_are_fitted_with_finite_answers() {
+        let (usual, _) = sets("1x4_2x12", 40, Rows::All);
+        let one = usual.select(&[0]);
+        let duplicates = usual.select(&[0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1]);
+        let two_hundred: Vec<usize> = (0..200).map(|sample| sample % 3).collect();
+        let many_duplicates = usual.select(&two_hundred);
+        let mut constant_targets = usual.clone();
+        constant_targets.coordinates_mm.fill(3.0);
+        let mut constant_inputs = usual.clone();
+        constant_inputs.resistances_ohm.fill(100.0);
+        let scaled = |factor: f64| {
+            let mut set = usual.clone();
+            set.coordinates_mm *= factor;
+            set
+        };
+        let cases = [
+            ("one sample", one, 1.0),
+            ("duplicates", duplicates, 1.0),
+            ("three samples many times", many_duplicates, 1.0),
+            ("constant targets", constant_targets, 1.0),
+            ("constant inputs", constant_inputs, 1.0),
+            ("tiny targets", scaled(1e-6), 1e-6),
+            ("huge targets", scaled(1e6), 1e6),
+        ];
+        for (name, set, size) in cases {
+            let mut decoder = fit(&set, Quantity::Conductance);
+            let mut answer = [f64::NAN; 12];
+            for readings in set.resistances_ohm.rows() {
+                decoder.map(&readings.to_vec(), &mut answer);
+                assert!(
+                    answer.iter().all(|value| value.abs() < 100.0 * size),
+                    "{name}: {answer:?}"
+                );
+            }
+            for far in [1e-308, 1e-3, 1e9, 1e308] {
+                decoder.map(&[far; 12], &mut answer);
+                assert!(
+                    answer.iter().all(|value| value.is_finite()),
+                    "{name}, {far} ohm: {answer:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn more_rules_than_samples_are_as_many_as_samples() {
+        let (set, _) = sets("1x4_2x12", 5, Rows::All);
+        let x = set.resistances_ohm;
+        let mut rng = Seed(0).rng(Stream::Expectation);
+        let (centres, distance) = Antecedents::clusters(x.view(), 10, 16, &mut rng);
+        assert_eq!(centres.dim(), (5, 10));
+        let antecedents = Antecedents::new(centres, distance);
+        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0);
+        assert!(consequents.iter().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn what_cannot_be_scaled_is_refused() {
+        let (mut set, _) = sets("1x4_2x12", 5, Rows::All);
+        set.coordinates_mm[[3, 2]] = f64::NAN;
+        let mut rng = Seed(0).rng(Stream::Expectation);
+        let error = TakagiSugeno::fit(&set, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                ScalingError::NotFinite {
+                    sample: 3,
+                    channel: 2,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+        let none = set.select(&[]);
+        let error = TakagiSugeno::fit(&none, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        assert_eq!(error, ScalingError::Empty);
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_rules() {
+        let (training, test) = sets("10x6_3x18", 600, Rows::All);
+        let (mut first, mut second) = (
+            fit(&training, Quantity::Resistance),
+            fit(&training, Quantity::Resistance),
+        );
+        assert!(first.rules() > 1);
+        assert_eq!(squared_error(&mut first, &test), squared_error(&mut second, &test));
     }
 }

@@ -16,7 +16,7 @@ const COMPONENTS: [usize; 2] = [3, 10];
 /// Width of the memberships in proportion to the root mean square distance between centres.
 const RELATIVE_WIDTH: f64 = 4.0;
 /// Penalties in ascending order, in proportion to the mean of the diagonal of the normal equations.
-const RIDGES: [f64; 3] = [1e-10, 1e-7, 1e-3];
+const RIDGES: [f64; 5] = [1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
 /// Regressors of the largest system tried.
 const MOST_REGRESSORS: usize = 512;
 /// Regressors of the largest system in proportion to the samples: a fold must leave enough for its fit.
@@ -101,4 +101,36 @@ fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>) -> (f64, f64) {
         best = (error, ridge);
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::normal::standard_normal,
+    };
+
+    fn chosen_rules(curved: bool, seed: u64) -> usize {
+        let mut rng = Seed(seed).rng(Stream::Training);
+        let x = Array2::from_shape_simple_fn((300, 3), || standard_normal(&mut rng));
+        let y = Array2::from_shape_fn((300, 1), |(s, _)| {
+            let affine = 0.4 * x[[s, 0]] - 0.2 * x[[s, 2]] + 0.1;
+            let bend = if curved { (2.0 * x[[s, 1]]).sin() } else { 0.0 };
+            affine + bend + 0.05 * standard_normal(&mut rng)
+        });
+        choose(x.view(), y.view(), &mut Seed(seed).rng(Stream::Expectation))
+            .0
+            .rules()
+    }
+
+    #[test]
+    fn an_affine_target_with_noise_has_one_rule_and_a_curved_one_several() {
+        for seed in 0..5 {
+            assert_eq!(chosen_rules(false, seed), 1, "affine, seed {seed}");
+            assert!(chosen_rules(true, seed) > 2, "curved, seed {seed}");
+        }
+    }
 }
