@@ -4,7 +4,7 @@
 
 use decoupler::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::{CompiledNetworks, Decoder, TakagiSugeno},
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
     },
@@ -55,6 +55,19 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
             }
         }
     }
+}
+
+#[test]
+fn a_frame_is_decoded_by_fuzzy_rules_without_allocating() {
+    let model = SensorModel::new("10x6_3x18".parse().unwrap());
+    let mut rng = Seed(0).rng(Stream::Training);
+    let set = Dataset::simulate(&model, &Scene::default(), 600, &mut rng).unwrap();
+    let fit = |set: &Dataset| TakagiSugeno::fit(set, Quantity::Conductance, 0.0, &mut rng);
+    let mut decoder = PerRow::fit(&set, RowModel::Shared, fit).unwrap();
+    assert!(decoder.at(0).rules() > 1);
+    let frame = set.frames().unwrap().frame(0).to_vec();
+    let mut coordinates_mm = vec![0.0; 180];
+    assert_eq!(allocations(|| decoder.decode(&frame, &mut coordinates_mm).unwrap()), 0);
 }
 
 #[test]

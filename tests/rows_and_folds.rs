@@ -48,9 +48,14 @@ fn experiment(rows: Rows, folds: usize, unit: FoldUnit) -> Experiment {
 
 fn finished(experiment: Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
-    run_experiments(&[experiment], 1.try_into().unwrap(), || false, |finished| {
-        results.record(finished.cell, finished.outcome);
-    })
+    run_experiments(
+        &[experiment],
+        1.try_into().unwrap(),
+        || false,
+        |finished| {
+            results.record(finished.cell, finished.outcome);
+        },
+    )
     .unwrap();
     results
 }
@@ -59,8 +64,20 @@ fn finished(experiment: Experiment) -> ExperimentResults {
 fn folds_are_counted_by_the_rows_read() {
     // 24 samples of one row-wire are 24 snapshots; of four row-wires they are 6.
     let cases = [
-        ("single samples of one row-wire", Rows::One(2), 24, FoldUnit::Sample, true),
-        ("as many snapshots as samples", Rows::One(2), 24, FoldUnit::Snapshot, true),
+        (
+            "single samples of one row-wire",
+            Rows::One(2),
+            24,
+            FoldUnit::Sample,
+            true,
+        ),
+        (
+            "as many snapshots as samples",
+            Rows::One(2),
+            24,
+            FoldUnit::Snapshot,
+            true,
+        ),
         ("one more than there are", Rows::One(2), 25, FoldUnit::Snapshot, false),
         ("single samples of known rows", Rows::Known, 6, FoldUnit::Sample, true),
         ("whole snapshots of all rows", Rows::All, 6, FoldUnit::Snapshot, true),
@@ -85,7 +102,8 @@ fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
 
 fn noisy_test(scene: &Scene, model: &SensorModel) -> Dataset {
     let mut set = Dataset::simulate(model, scene, 80, &mut Seed(1).rng(Stream::Test)).unwrap();
-    set.disturb(model, &scene.noise, &mut Seed(1).rng(Stream::TestNoise)).unwrap();
+    set.disturb(model, &scene.noise, &mut Seed(1).rng(Stream::TestNoise))
+        .unwrap();
     set
 }
 
@@ -106,7 +124,10 @@ fn the_reference_takes_each_sample_at_its_own_row_wire() {
     let odd: Vec<usize> = (0..80).filter(|sample| sample % 3 != 0).collect();
     let even: Vec<usize> = (0..80).rev().filter(|sample| sample % 3 == 0).collect();
     let parts = [&odd, &even].map(|part| reference(&set.select(part)) * part.len() as f64);
-    assert!((parts.iter().sum::<f64>() / 80.0 - whole).abs() < 1e-12 * whole, "{parts:?} {whole}");
+    assert!(
+        (parts.iter().sum::<f64>() / 80.0 - whole).abs() < 1e-12 * whole,
+        "{parts:?} {whole}"
+    );
 }
 
 #[test]

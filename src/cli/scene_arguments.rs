@@ -49,7 +49,7 @@ pub(super) struct SceneArguments {
     /// Samples to which noise is added [default: both]
     #[arg(long, value_name = "both|training|test", value_parser = noisy_sets)]
     noise_in: Option<NoisySets>,
-    /// Decoders to use, separated by commas: mean, ridge, network, rbf, newton, polish
+    /// Decoders to use, separated by commas: mean, ridge, network, rbf, fuzzy, newton, polish
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) decoder: Vec<DecoderKind>,
 }

@@ -13,6 +13,8 @@ pub enum DecoderKind {
     Network,
     /// Gaussians around centres.
     RadialBasis,
+    /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
+    Fuzzy,
     /// Newton's method on Eq. (2); with noise and prior where the scene has noise.
     Newton,
     /// The network, then at most [`DecoderKind::POLISH_STEPS`] of Newton's steps.
@@ -76,11 +78,12 @@ enum Needs {
 
 impl DecoderKind {
     /// All of them, in the order offered.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Mean,
         Self::Ridge,
         Self::Network,
         Self::RadialBasis,
+        Self::Fuzzy,
         Self::Newton,
         Self::Polish,
     ];
@@ -116,6 +119,13 @@ impl DecoderKind {
                 name: "Radial basis",
                 meaning: "A radial-basis network: Gaussians around centres among the training samples, fitted by least squares",
                 colour: ColourKey::Orange,
+                needs: Needs::Nothing,
+            },
+            Self::Fuzzy => Entry {
+                word: "fuzzy",
+                name: "Fuzzy rules",
+                meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, as many as a cross-validation chooses",
+                colour: ColourKey::Cyan,
                 needs: Needs::Nothing,
             },
             Self::Newton => Entry {

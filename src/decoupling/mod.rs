@@ -6,6 +6,8 @@
 //! | [`TrainingMean`] | knows nothing: the baseline |
 //! | [`AffineMap`] | an affine map, by least squares or with a ridge penalty chosen by cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
+//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
+//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
 //! | [`NewtonDecoder`] | solves Eq. (2) |
 //! | [`PolishedDecoder`] | another decoder's answer, then a few Newton steps |
@@ -17,6 +19,7 @@
 
 mod affine_map;
 mod box_posterior;
+mod clusters;
 mod compiled_network;
 mod decoder;
 mod equation_decoders;
@@ -32,6 +35,7 @@ mod residual;
 mod ridge;
 mod row_prior;
 mod row_problem;
+mod takagi_sugeno;
 mod training_mean;
 
 pub use affine_map::AffineMap;
@@ -45,4 +49,5 @@ pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
 pub use real::Real;
 pub use residual::resistance_residual;
+pub use takagi_sugeno::TakagiSugeno;
 pub use training_mean::TrainingMean;

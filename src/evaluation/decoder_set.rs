@@ -9,7 +9,7 @@ use crate::{
     dataset::{Dataset, PerRow, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior,
-        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, TrainingMean, decode_set,
+        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean, decode_set,
         resistance_residual,
     },
     network::Networks,
@@ -117,6 +117,11 @@ impl DecoderSet {
                 let basis = RadialBasisSettings::default();
                 let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, noise, basis, &mut rng);
                 Box::new(PerRow::fit(training, row_model, fit)?) as Box<dyn Decoder>
+            }
+            DecoderKind::Fuzzy => {
+                let quantity = settings.inputs.quantity;
+                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, noise, &mut rng);
+                Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::Network => return Ok(self.network(precision)),
             DecoderKind::Newton | DecoderKind::Polish => {

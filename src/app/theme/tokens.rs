@@ -41,6 +41,8 @@ pub struct Palette {
     pub validation_series: Color32,
     /// Curve of the test set.
     pub test_series: Color32,
+    /// A series that is none of the sets.
+    pub further_series: Color32,
     /// The diverging map from most negative to most positive; its middle is the panel.
     pub error_stops: [Color32; 5],
 }
@@ -66,6 +68,7 @@ impl Palette {
         training_series: Color32::from_rgb(0x5b, 0x9d, 0xff),
         validation_series: Color32::from_rgb(0x4c, 0xc3, 0x8a),
         test_series: Color32::from_rgb(0xf0, 0xa8, 0x3c),
+        further_series: Color32::from_rgb(0xb9, 0x8c, 0xf0),
         error_stops: [
             Color32::from_rgb(0x9a, 0xd8, 0xff),
             Color32::from_rgb(0x2f, 0x7f, 0xd0),
@@ -95,6 +98,7 @@ impl Palette {
         training_series: Color32::from_rgb(0x1f, 0x6f, 0xeb),
         validation_series: Color32::from_rgb(0x1a, 0x7f, 0x4b),
         test_series: Color32::from_rgb(0xa8, 0x64, 0x00),
+        further_series: Color32::from_rgb(0x7a, 0x3e, 0xb1),
         error_stops: [
             Color32::from_rgb(0x0b, 0x3d, 0x91),
             Color32::from_rgb(0x5b, 0x9b, 0xe6),

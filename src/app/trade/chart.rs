@@ -35,7 +35,7 @@ pub fn colour(kind: DecoderKind, palette: &Palette) -> Color32 {
         ColourKey::Orange => palette.test_series,
         ColourKey::Red => palette.bad,
         ColourKey::Green => palette.good,
-        ColourKey::Cyan => palette.warning,
+        ColourKey::Cyan => palette.further_series,
     }
 }
 
