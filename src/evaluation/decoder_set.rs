@@ -169,7 +169,7 @@ impl DecoderSet {
             sensor, scene, seed, ..
         } = settings;
         let known = scene.rows.are_known();
-        let noise = unseen_noise(settings);
+        let noise = unseen_noise(settings)?;
         let mut rng = seed.rng(Stream::Expectation);
         let networks = networks.as_ref();
         Ok(match kind {

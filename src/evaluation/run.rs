@@ -163,7 +163,7 @@ impl Run {
         let baselines = Baselines {
             mean: score(&TrainingMean::fit(&training)),
             linear: score(&LinearMap::fit(&training)?),
-            reference: Some(reference(&settings, &test)?),
+            reference: reference(&settings, &test)?,
         };
         let tasks: Vec<Task> = if networks == 1 {
             vec![Task::new(&settings, &training, validation.as_ref(), &test)?]
@@ -326,8 +326,8 @@ impl Run {
     }
 }
 
-/// The errors of the Bayesian reference on `test`.
-pub(super) fn reference(settings: &RunSettings, test: &Dataset) -> Result<Errors, RunError> {
+/// The errors of the Bayesian reference on `test`; `None` where rounding hides it.
+pub(super) fn reference(settings: &RunSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
     let RunSettings {
         sensor, scene, seed, ..
     } = settings;

@@ -41,8 +41,8 @@ pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<
                 Some(report.frame_us),
                 Some(point.training_seconds),
                 Some(report.residual),
-                point.reference.z_percent,
-                Some(point.reference.z_mm),
+                point.reference.and_then(|errors| errors.z_percent),
+                point.reference.map(|errors| errors.z_mm),
             ];
             for number in numbers {
                 match number.filter(|number| number.is_finite()) {
@@ -85,7 +85,7 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
             all.push(series(name, hue(kind), Some(marker), points.map(place).collect()));
         }
     }
-    let limit = level.points.first().and_then(|point| point.reference.z_percent);
+    let limit = level.points.first().and_then(|point| point.reference?.z_percent);
     let costs = level
         .points
         .iter()
