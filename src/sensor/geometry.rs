@@ -36,7 +36,7 @@ pub enum GeometryError {
     /// A length is NaN or infinite.
     #[error("{what} is {value}: give a finite length in millimetres")]
     NotFinite {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -44,7 +44,7 @@ pub enum GeometryError {
     /// A length that must be positive is not.
     #[error("{what} is {value} mm: it must be above 0")]
     NotPositive {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// Its value.
         value: f64,

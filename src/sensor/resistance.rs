@@ -120,7 +120,7 @@ impl SensorModel {
         Ok(())
     }
 
-    /// As [`Self::row_resistances_into`], in a new vector of M4 resistances in ohm.
+    /// Row-column resistances in ohm as by [`Self::row_resistances_into`], in a new vector (M4).
     ///
     /// # Errors
     /// A resistance that is not a positive finite number.
