@@ -93,7 +93,7 @@ struct PointReport {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     reference_z_percent: Option<f64>,
-    reference_z_mm: f64,
+    reference_z_mm: Option<f64>,
     to_reference: Option<f64>,
     on_decoding_front: bool,
     on_training_front: bool,
@@ -141,8 +141,8 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
         frame_us: point.report.cost.frame_us,
         training_s: point.training_seconds,
         residual: Some(point.report.residual).filter(|residual| residual.is_finite()),
-        reference_z_percent: point.reference.z_percent,
-        reference_z_mm: point.reference.z_mm,
+        reference_z_percent: point.reference.and_then(|errors| errors.z_percent),
+        reference_z_mm: point.reference.map(|errors| errors.z_mm),
         to_reference: point.to_reference(),
         on_decoding_front,
         on_training_front,
@@ -190,8 +190,7 @@ fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mu
 
 fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::Result<()> {
     write!(out, "\nNoise {}", level.noise)?;
-    if let Some(point) = level.points.first() {
-        let reference = point.reference;
+    if let Some(reference) = level.points.first().and_then(|point| point.reference) {
         let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));
         write!(out, ", reference {percent} % ({mm} mm)")?;
     }

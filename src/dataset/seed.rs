@@ -3,45 +3,47 @@ use std::fmt;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 
-/// The one number from which everything random in a run follows.
+/// Seed of everything random in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Seed(pub u64);
 
-/// What randomness is for. Each use has a stream of its own, so that, say, more training samples change neither the
-/// test set nor the start of the network.
+/// Purpose of random numbers. Each purpose has a stream of its own, so that, say, more training samples change neither
+/// the test set nor the initial weights of the network.
+///
+/// The number of a stream is part of every data set drawn from it: never change one, and give new purposes new numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
     /// Deformations of the training (and validation) set.
-    Training,
+    Training = 0,
     /// Deformations of the test set.
-    Test,
+    Test = 1,
     /// Initial weights of the network.
-    Start,
-    /// Which samples are held out for validation.
-    Split,
-    /// Which samples are in which fold of a cross-validation.
-    Folds,
-    /// What disturbs the readings of the training (and validation) set.
-    TrainingNoise,
-    /// What disturbs the readings of the test set.
-    TestNoise,
-    /// Draws that estimate an expectation, such as the spread of a scene.
-    Expectation,
+    Start = 2,
+    /// Choice of the samples held out for validation.
+    Split = 3,
+    /// Assignment of snapshots to the folds of a cross-validation.
+    Folds = 4,
+    /// Noise of the training (and validation) set.
+    TrainingNoise = 5,
+    /// Noise of the test set.
+    TestNoise = 6,
+    /// Draws that estimate an expectation, such as the mean and covariance of a scene.
+    Expectation = 7,
 }
 
-/// Streams from here on are those of the starts after the first.
+/// Stream of the random initialisations after the first: this number plus the number of the initialisation.
 const FURTHER_STARTS: u64 = 1 << 32;
 
 impl Seed {
-    /// The generator of one use.
+    /// Random number generator of one purpose.
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.0);
         rng.set_stream(stream as u64);
         rng
     }
 
-    /// The generator of the initial weights of start number `start`, from 0. Start 0 has that of [`Stream::Start`].
+    /// Random number generator of the initial weights of start `start`, counted from 0. Start 0 uses [`Stream::Start`].
     pub fn start_rng(self, start: usize) -> ChaCha8Rng {
         let mut rng = self.rng(Stream::Start);
         if start > 0 {
@@ -54,5 +56,46 @@ impl Seed {
 impl fmt::Display for Seed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+
+    use super::*;
+
+    /// Literal values, so that no data set changes unnoticed: a stream that is renumbered draws other numbers.
+    #[test]
+    fn every_stream_keeps_its_numbers() {
+        let streams = [
+            Stream::Training,
+            Stream::Test,
+            Stream::Start,
+            Stream::Split,
+            Stream::Folds,
+            Stream::TrainingNoise,
+            Stream::TestNoise,
+            Stream::Expectation,
+        ];
+        let first = streams.map(|stream| Seed(0).rng(stream).next_u64());
+        let expected: [u64; 8] = [
+            13_080_132_717_333_068_652,
+            13_937_087_304_575_520_531,
+            6_128_383_831_660_698_443,
+            722_560_577_158_678_697,
+            15_789_455_820_715_750_791,
+            3_283_172_953_191_924_410,
+            2_864_297_967_017_666_925,
+            10_210_632_076_967_111_328,
+        ];
+        assert_eq!(first, expected);
+        let starts = [0, 1, 2].map(|start| Seed(0).start_rng(start).next_u64());
+        let expected: [u64; 3] = [
+            6_128_383_831_660_698_443,
+            17_511_776_552_961_250_555,
+            13_920_962_125_768_239_384,
+        ];
+        assert_eq!(starts, expected);
     }
 }

@@ -5,8 +5,8 @@ use faer::{
 
 use super::row_problem::Range;
 
-/// A Gaussian cut to a box, `p(u) ∝ exp(−½ uᵀ Λ u + bᵀ u)` for u within its ranges: what is known of uniform unknowns
-/// after a linear reading with Gaussian noise.
+/// A Gaussian cut to a box, `p(u) ∝ exp(−½ uᵀ Λ u + bᵀ u)` for u within its ranges: the posterior of uniform unknowns after
+/// a linear reading with Gaussian noise.
 ///
 /// Its moments have no closed form in several dimensions. They are found by expectation propagation (Minka 2001;
 /// Cunningham, Hennig and Lacoste-Julien 2011 for boxes): each range is replaced by a Gaussian factor such that the
@@ -28,9 +28,17 @@ pub(crate) struct Marginal {
     pub(crate) variance: f64,
 }
 
-/// Most rounds over all unknowns.
+/// The marginals of all unknowns.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Marginals {
+    pub(crate) of_unknowns: Vec<Marginal>,
+    /// False if the factors still moved after the last round.
+    pub(crate) converged: bool,
+}
+
+/// Largest number of rounds over all unknowns.
 const ROUNDS: usize = 40;
-/// Change of a mean, relative to the range, below which the factors are taken as found.
+/// Change of a mean, relative to the range, below which the factors have converged.
 const TOLERANCE: f64 = 1e-7;
 
 impl BoxPosterior {
@@ -43,14 +51,14 @@ impl BoxPosterior {
     }
 
     /// The marginals; `None` if Λ is so ill-conditioned that rounding hides the answer.
-    pub(crate) fn marginals(&self) -> Option<Vec<Marginal>> {
+    pub(crate) fn marginals(&self) -> Option<Marginals> {
         let n = self.linear.len();
         // Begins with the moments of each range by itself.
         let mut site_precision: Vec<f64> = self.ranges.iter().map(|r| 12.0 / (r.width() * r.width())).collect();
         let mut site_linear: Vec<f64> = (0..n).map(|i| site_precision[i] * self.ranges[i].middle()).collect();
         let mut marginals = vec![Marginal::default(); n];
         let mut last = vec![f64::INFINITY; n];
-        for round in 0..ROUNDS {
+        for _ in 0..ROUNDS {
             let (mut covariance, mut mean) = self.gaussian(&site_precision, &site_linear)?;
             for i in 0..n {
                 let variance = covariance[(i, i)];
@@ -84,14 +92,20 @@ impl BoxPosterior {
             if largest.is_nan() {
                 return None;
             }
-            if largest < TOLERANCE || round + 1 == ROUNDS {
-                break;
+            if largest < TOLERANCE {
+                return Some(Marginals {
+                    of_unknowns: marginals,
+                    converged: true,
+                });
             }
             for (last, marginal) in last.iter_mut().zip(&marginals) {
                 *last = marginal.mean;
             }
         }
-        Some(marginals)
+        Some(Marginals {
+            of_unknowns: marginals,
+            converged: false,
+        })
     }
 
     /// Covariance and mean with these factors.
@@ -182,7 +196,7 @@ mod tests {
         for (mean, deviation) in [(0.5, 0.01), (0.2, 0.3), (-0.5, 0.4), (1.3, 0.2), (0.4, 50.0)] {
             let precision = 1.0 / (deviation * deviation);
             let posterior = BoxPosterior::new(Mat::from_fn(1, 1, |_, _| precision), vec![precision * mean], vec![UNIT]);
-            let ours = posterior.marginals().unwrap()[0];
+            let ours = posterior.marginals().unwrap().of_unknowns[0];
             let (alpha, beta) = (-mean / deviation, (1.0 - mean) / deviation);
             let mass = normal_cdf(beta) - normal_cdf(alpha);
             let ratio = (density(alpha) - density(beta)) / mass;
@@ -210,7 +224,10 @@ mod tests {
             lowest: -100.0,
             highest: 100.0,
         };
-        let marginals = BoxPosterior::new(precision, linear, vec![wide; 2]).marginals().unwrap();
+        let marginals = BoxPosterior::new(precision, linear, vec![wide; 2])
+            .marginals()
+            .unwrap()
+            .of_unknowns;
         for (ours, truth) in marginals.iter().zip(truth) {
             assert!((ours.mean - truth).abs() < 1e-4);
             assert!((ours.variance * (400.0 * 400.0 - 250.0 * 250.0) / 400.0 - 1.0).abs() < 1e-3);
@@ -233,7 +250,10 @@ mod tests {
             let linear = (0..n)
                 .map(|i| (0..4).map(|k| a[(k, i)] * y[k]).sum::<f64>() / (noise * noise))
                 .collect();
-            let marginals = BoxPosterior::new(precision, linear, vec![UNIT; n]).marginals().unwrap();
+            let marginals = BoxPosterior::new(precision, linear, vec![UNIT; n])
+                .marginals()
+                .unwrap()
+                .of_unknowns;
             let (mut total, mut first, mut second) = (0.0, [0.0; 3], [0.0; 3]);
             for _ in 0..400_000 {
                 let u: [f64; 3] = std::array::from_fn(|_| rng.random());

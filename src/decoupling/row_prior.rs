@@ -7,7 +7,7 @@ use crate::{
     sensor::SensorModel,
 };
 
-/// What a scene says of a row-wire's unknowns before anything is read.
+/// Prior distribution of a row-wire's unknowns in a scene.
 #[derive(Clone, Debug)]
 pub(crate) enum RowPrior {
     /// Uniform within their ranges, independent of each other: random nodes.
@@ -45,7 +45,8 @@ impl RowPrior {
         draws.iter().map(|values| Self::gaussian(values, &ranges)).collect()
     }
 
-    /// From draws × unknowns, row by row.
+    /// From draws × unknowns, row by row. Reckons in widths of the ranges, so that ranges of any length, and of unlike
+    /// lengths, give a matrix that can be inverted.
     fn gaussian(values: &[f64], ranges: &[Range]) -> Self {
         let n = ranges.len();
         let draws = values.chunks_exact(n);
@@ -54,29 +55,67 @@ impl RowPrior {
         for draw in draws.clone() {
             mean.iter_mut()
                 .zip(draw)
-                .for_each(|(mean, value)| *mean += value / count);
+                .zip(ranges)
+                .for_each(|((mean, value), range)| *mean += value / range.width() / count);
         }
         let mut covariance: Mat<f64> = Mat::zeros(n, n);
         for draw in draws {
             for i in 0..n {
                 for j in 0..n {
-                    covariance[(i, j)] += (draw[i] - mean[i]) * (draw[j] - mean[j]) / count;
+                    let apart = |i: usize| draw[i] / ranges[i].width() - mean[i];
+                    covariance[(i, j)] += apart(i) * apart(j) / count;
                 }
             }
         }
-        for (i, range) in ranges.iter().enumerate() {
-            covariance[(i, i)] += (SMALLEST_SPREAD * range.width()).powi(2);
+        for i in 0..n {
+            covariance[(i, i)] += SMALLEST_SPREAD * SMALLEST_SPREAD;
         }
-        match covariance.llt(Side::Lower) {
-            Ok(factor) => {
-                let precision = factor.inverse();
-                let linear = (0..n)
-                    .map(|i| (0..n).map(|j| precision[(i, j)] * mean[j]).sum())
-                    .collect();
-                Self::Gaussian { precision, linear }
-            }
-            // The diagonal added above makes it positive definite; a uniform prior is valid all the same.
-            Err(_) => Self::Uniform,
-        }
+        let factor = covariance.llt(Side::Lower);
+        let factor =
+            factor.expect("entries are at most 1 and the diagonal was raised by 1e-6, far above their rounding");
+        let inverse = factor.inverse();
+        let linear = (0..n)
+            .map(|i| (0..n).map(|j| inverse[(i, j)] * mean[j]).sum::<f64>() / ranges[i].width())
+            .collect();
+        let precision = Mat::from_fn(n, n, |i, j| inverse[(i, j)] / ranges[i].width() / ranges[j].width());
+        Self::Gaussian { precision, linear }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Movement,
+    };
+
+    fn prior(largest_shift_mm: f64) -> RowPrior {
+        let model = SensorModel::new("3x4_2x12".parse().unwrap());
+        let scene = Scene {
+            loading: "smooth:4".parse().unwrap(),
+            movement: Movement::Xyz { largest_shift_mm },
+            ..Scene::default()
+        };
+        RowPrior::of_rows(&model, &scene, &[1], &mut Seed(0).rng(Stream::Expectation)).remove(0)
+    }
+
+    /// The prior of shifts is proportional to them, down to lengths whose squares underflow.
+    #[test]
+    fn no_length_is_too_short_for_a_prior_of_its_own() {
+        let RowPrior::Gaussian { precision, linear } = prior(0.25) else {
+            panic!("a smooth field is not uniform")
+        };
+        let RowPrior::Gaussian {
+            precision: short,
+            linear: short_linear,
+        } = prior(0.25 * 1e-170)
+        else {
+            panic!("the prior was given up")
+        };
+        // Unknowns 2 and 5 are z of two nodes, 0 is x: in proportion 1e-170.
+        assert!((short[(2, 5)] / precision[(2, 5)] - 1.0).abs() < 1e-9);
+        assert!((short[(0, 2)] / precision[(0, 2)] / 1e170 - 1.0).abs() < 1e-9);
+        assert!((short_linear[2] / linear[2] - 1.0).abs() < 1e-9);
     }
 }

@@ -102,13 +102,13 @@ impl RowProblem {
         self.readings_ohm.len()
     }
 
-    /// What is to be solved: the readings of row-wire `row`.
+    /// Sets the readings of row-wire `row`, for which the equations are to be solved.
     pub(crate) fn read(&mut self, row: usize, readings_ohm: &[f64]) {
         self.row = row;
         self.readings_ohm.copy_from_slice(readings_ohm);
     }
 
-    /// Evaluates residuals and derivatives at `unknowns_mm`; gives the rms residual.
+    /// Evaluates residuals and derivatives at `unknowns_mm`; returns the rms residual.
     pub(crate) fn evaluate(&mut self, unknowns_mm: &[f64]) -> f64 {
         let axes = self.axes.indices();
         for (displacement, values) in self
@@ -139,6 +139,21 @@ impl RowProblem {
     /// ∂ρ_k/∂u in 1/mm.
     pub(crate) fn derivative(&self, reading: usize, unknown: usize) -> f64 {
         self.readings_ohm[reading] / self.model.resistivity_ohm_per_mm * self.conductance.derivatives(unknown)[reading]
+    }
+
+    /// R_k = g/s_k of the last evaluation, in ohm.
+    pub(crate) fn resistance_ohm(&self, reading: usize) -> f64 {
+        self.model.resistivity_ohm_per_mm / self.conductance.sums()[reading]
+    }
+
+    /// Σ_k ∂ ln s_k/∂u in 1/mm, which is −Σ_k ∂ ln R_k/∂u.
+    pub(crate) fn log_conductance_slope(&self, unknown: usize) -> f64 {
+        let pairs = self
+            .conductance
+            .derivatives(unknown)
+            .iter()
+            .zip(self.conductance.sums());
+        pairs.map(|(derivative, sum)| derivative / sum).sum()
     }
 
     /// The unknowns behind absolute coordinates (3·M2) of nodes on the present row-wire.

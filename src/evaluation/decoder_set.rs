@@ -102,7 +102,7 @@ impl DecoderSet {
     /// Samples that cannot be scaled, or a sensor without resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
         let Self { settings, training, .. } = self;
-        let (row_model, noise) = (settings.source.row_model(), unseen_noise(&settings.source));
+        let (row_model, noise) = (settings.source.row_model(), unseen_noise(&settings.source)?);
         let mut rng = settings.seed.rng(Stream::Expectation);
         Ok(Some(match kind {
             DecoderKind::Mean => {

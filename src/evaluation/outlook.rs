@@ -1,20 +1,22 @@
 use super::Simulation;
 use crate::{
-    scene::Rows,
+    scene::{RelativeNoise, Rows},
     sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
 };
 
-/// What can be hoped for in a scene, before anything is trained.
+/// Conditioning of a scene and the warnings that follow, known before anything is trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Of the worst conditioned row-wire of those read, its nodes half way down.
+    /// Analysis of the worst conditioned row-wire of those read, its nodes half way down.
     pub worst_row: Identifiability,
-    /// What stands in the way, and what to change.
+    /// Standard deviation of a reading of that row relative to it, from all sources of the scene.
+    pub noise: f64,
+    /// Obstacles to decoupling, and what to change.
     pub warnings: Vec<IdentifiabilityWarning>,
 }
 
 impl Outlook {
-    /// Looks at every row-wire that the simulated scene reads.
+    /// Analyses every row-wire that the simulated scene reads.
     ///
     /// # Errors
     /// An impossible sensor or scene, or singular values that do not converge.
@@ -37,12 +39,17 @@ impl Outlook {
         } else {
             None
         };
-        let warnings = worst_row.warnings(scene.noise.relative, stroke_mm / 12.0_f64.sqrt(), alike);
-        Ok(Self { worst_row, warnings })
+        let noise = RelativeNoise::of(scene.noise, sensor, &[worst_row.row], 0.5 * stroke_mm);
+        let noise = noise.map_err(IdentifiabilityError::from)?.total();
+        Ok(Self {
+            warnings: worst_row.warnings(noise, stroke_mm / 12.0_f64.sqrt(), alike),
+            worst_row,
+            noise,
+        })
     }
 }
 
-/// Why there is no outlook.
+/// Error of an outlook.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutlookError {
@@ -52,4 +59,41 @@ pub enum OutlookError {
     /// An impossible sensor.
     #[error(transparent)]
     Identifiability(#[from] IdentifiabilityError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Noise, Scene};
+
+    fn is_hopeless(noise: Noise) -> bool {
+        let simulation = Simulation {
+            scene: Scene {
+                noise,
+                ..Scene::default()
+            },
+            ..Simulation::default()
+        };
+        let warnings = Outlook::of(&simulation).unwrap().warnings;
+        warnings
+            .iter()
+            .any(|warning| matches!(warning, IdentifiabilityWarning::Hopeless { .. }))
+    }
+
+    #[test]
+    fn every_kind_of_noise_is_warned_of() {
+        let of = |relative, additive_ohm, converter_bits, drift| Noise {
+            relative,
+            additive_ohm,
+            converter_bits,
+            drift,
+            ..Noise::default()
+        };
+        assert!(!is_hopeless(of(1e-4, 0.0, None, 0.0)));
+        assert!(is_hopeless(of(1.0, 0.0, None, 0.0)));
+        // Resistances are below 100 ohm; 1 bit rounds to steps as large as the largest.
+        assert!(is_hopeless(of(0.0, 1e3, None, 0.0)));
+        assert!(is_hopeless(of(0.0, 0.0, Some(1), 0.0)));
+        assert!(is_hopeless(of(0.0, 0.0, None, 1.0)));
+    }
 }

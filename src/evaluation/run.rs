@@ -132,7 +132,7 @@ impl Run {
                 Some(Baselines {
                     mean: errors(&mean),
                     linear: errors(&linear),
-                    reference: Some(reference(&simulated, &test)?),
+                    reference: reference(&simulated, &test)?,
                 })
             }
             None => None,
@@ -326,8 +326,8 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     }
 }
 
-/// The errors of the Bayesian reference on `test`.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Errors, RunError> {
+/// The errors of the Bayesian reference on `test`; `None` where rounding hides it.
+pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);
     Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)

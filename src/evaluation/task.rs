@@ -1,8 +1,8 @@
-use super::{RunError, RunSettings, Source};
+use super::{RunError, RunSettings, Simulation, Source};
 use crate::{
     dataset::{Dataset, PerRow, Split},
     network::{Inputs, MinMax, Shape},
-    scene::{NoisySets, RowModel},
+    scene::{NoisySets, RelativeNoise, RowModel},
     training::{Examples, Problem},
 };
 
@@ -21,7 +21,7 @@ impl Task {
         validation: Option<&Dataset>,
         test: &Dataset,
     ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(settings.inputs, training.readings(), unseen_noise(&settings.source))?;
+        let inputs = Inputs::fit(settings.inputs, training.readings(), unseen_noise(&settings.source)?)?;
         let outputs = MinMax::fit(training.targets())?;
         let examples = |set: &Dataset| {
             let scaled = inputs.of(set.readings());
@@ -66,15 +66,64 @@ pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Re
     }
 }
 
-/// The relative noise that readings have and the training set lacks, with which whitening reckons.
-pub(super) fn unseen_noise(source: &Source) -> f64 {
+/// The noise level assumed by whitening: the relative noise that readings have and the training set lacks, from all
+/// sources of the scene, for nodes half way down. At most 1, where it is as large as the reading.
+///
+/// Whitening takes the error of each reading as independent: an error common to all of them hides less than this says.
+pub(super) fn unseen_noise(source: &Source) -> Result<f64, RunError> {
     let Source::Simulated(simulation) = source else {
-        return 0.0;
+        return Ok(0.0);
     };
-    let noise = simulation.scene.noise;
-    if noise.sets == NoisySets::Test {
-        noise.relative
-    } else {
-        0.0
+    let Simulation { sensor, scene, .. } = simulation;
+    if scene.noise.sets != NoisySets::Test {
+        return Ok(0.0);
+    }
+    let rows = scene.rows.read(sensor.scale.rows())?;
+    let noise = RelativeNoise::of(scene.noise, sensor, &rows, 0.5 * simulation.stroke_mm())?;
+    Ok(noise.total().min(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{evaluation::SimulatedSettings, network::InputChoice, scene::Noise};
+
+    fn inputs(noise: Noise) -> Inputs {
+        let mut settings = SimulatedSettings {
+            inputs: InputChoice::BEST,
+            ..SimulatedSettings::default()
+        };
+        settings.source.samples = 40;
+        settings.source.scene.noise = Noise {
+            sets: NoisySets::Test,
+            ..noise
+        };
+        let (split, test) = settings.draw().unwrap();
+        let task = Task::new(&settings.into(), &split.training, None, &test).unwrap();
+        task.scaling.0
+    }
+
+    #[test]
+    fn whitening_allows_for_every_kind_of_noise_that_the_training_set_lacks() {
+        let clean = inputs(Noise::default());
+        let noises = [
+            Noise::relative(1e-2),
+            Noise {
+                additive_ohm: 1.0,
+                ..Noise::default()
+            },
+            Noise {
+                converter_bits: Some(6),
+                ..Noise::default()
+            },
+            Noise {
+                drift: 1e-2,
+                ..Noise::default()
+            },
+        ];
+        for noise in noises {
+            let sum = |inputs: &Inputs| inputs.affine().1.iter().map(|value| value.abs()).sum::<f64>();
+            assert!(sum(&inputs(noise)) < 0.9 * sum(&clean), "{noise:?}");
+        }
     }
 }

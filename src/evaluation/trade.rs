@@ -12,8 +12,8 @@ pub struct TradePoint {
     pub report: DecoderReport,
     /// Time of training or fitting in seconds, of all rows together, as if one after another.
     pub training_seconds: f64,
-    /// The limit that physics sets in this scene.
-    pub reference: Errors,
+    /// Errors of the Bayesian reference in this scene; `None` where rounding hides it.
+    pub reference: Option<Errors>,
 }
 
 impl TradePoint {
@@ -27,9 +27,9 @@ impl TradePoint {
         self.report.kind.needs_network().then_some(self.settings.hidden)
     }
 
-    /// Its error in proportion to the reference; `None` without noise, where the reference is 0.
+    /// Its error in proportion to the reference; `None` without a reference, or without noise, where it is 0.
     pub fn to_reference(&self) -> Option<f64> {
-        let limit = self.reference.z_mm;
+        let limit = self.reference?.z_mm;
         (limit > 0.0).then(|| self.report.errors.z_mm / limit)
     }
 

@@ -41,8 +41,8 @@ pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<
                 Some(report.cost.frame_us),
                 Some(point.training_seconds),
                 Some(report.residual),
-                point.reference.z_percent,
-                Some(point.reference.z_mm),
+                point.reference.and_then(|errors| errors.z_percent),
+                point.reference.map(|errors| errors.z_mm),
             ];
             for number in numbers {
                 match number.filter(|number| number.is_finite()) {

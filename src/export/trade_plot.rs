@@ -38,7 +38,7 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
             ));
         }
     }
-    let limit = level.points.first().and_then(|point| point.reference.z_percent);
+    let limit = level.points.first().and_then(|point| point.reference?.z_percent);
     let costs = level
         .points
         .iter()

@@ -3,7 +3,7 @@ use ndarray::Array2;
 
 use crate::sensor::{ArrayScale, SensorModel};
 
-/// How far each upper node is displaced at one moment, in millimetres; z counts downwards.
+/// Displacement of each upper node at one moment, in millimetres; z counts downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deformation {
     /// Row-wires × nodes on a row-wire, in standard (row-major) layout.

@@ -1,16 +1,18 @@
-//! The scene: what happens to the sensor. Nothing that does not vary in the scene is modelled further on.
+//! The scene: rows read, movement, loading and noise. Nothing that does not vary in the scene is modelled further on.
 
 mod deformation;
 mod loading;
 mod movement;
 mod noise;
 pub(crate) mod normal;
+mod relative_noise;
 mod rows;
 
 pub use deformation::Deformation;
 pub use loading::{DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
-pub use noise::{Noise, NoiseSource, NoisySets, RelativeSpread};
+pub use noise::{Noise, NoiseSource, NoisySets};
+pub use relative_noise::RelativeNoise;
 pub use rows::{RowModel, Rows};
 
 use serde::{Deserialize, Serialize};
@@ -18,21 +20,21 @@ use thiserror::Error;
 
 use crate::sensor::{ArrayScale, Geometry, SensorModel};
 
-/// What is read, what moves, how it is loaded, and what disturbs the readings. The default is the paper's.
+/// Rows read, movement, loading and noise of the readings. The default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// Which row-wires are read, and whether a decoder knows which.
+    /// Row-wires read, and whether a decoder knows which one it reads.
     #[serde(default)]
     pub rows: Rows,
-    /// How nodes move.
+    /// Movement of the nodes.
     #[serde(default)]
     pub movement: Movement,
-    /// How the surface is loaded.
+    /// Loading of the surface.
     pub loading: Loading,
     /// The largest compression as a fraction of the height, in (0, 1).
     pub largest_compression: f64,
-    /// What disturbs the readings.
+    /// Noise of the readings.
     #[serde(default)]
     pub noise: Noise,
 }
@@ -47,7 +49,7 @@ pub enum SceneError {
     /// The array has no such row-wire.
     #[error("row {row} does not exist: the array has rows 1 to {rows}")]
     Row {
-        /// What was asked for, from 1.
+        /// Row asked for, from 1.
         row: usize,
         /// Row-wires of the array.
         rows: usize,
@@ -73,7 +75,7 @@ pub enum SceneError {
     #[error("the correlation length is {0} mm: it must be above 0 and finite")]
     CorrelationLength(f64),
     /// The indenter's spread is impossible.
-    #[error("the surface comes back around the indenter within {0} mm: this must be above 0 and finite")]
+    #[error("the decay length of the surface around the indenter is {0} mm: it must be above 0 and finite")]
     Spread(f64),
     /// The indenter's radius is impossible.
     #[error("the indenter's radius is from {} to {} mm: give two lengths above 0 in order", .0.smallest, .0.largest)]
@@ -84,7 +86,7 @@ pub enum SceneError {
     /// Noise out of range.
     #[error("the {what} is {value}: give from 0 to {largest}")]
     Noise {
-        /// Which kind.
+        /// Kind of noise.
         what: &'static str,
         /// Its value.
         value: f64,

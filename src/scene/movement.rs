@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::SceneError;
 use crate::sensor::Axes;
 
-/// How nodes move: what is unknown of each of them.
+/// Movement of the nodes, which sets the unknowns of each of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Movement {
@@ -45,7 +45,7 @@ impl Movement {
     /// Sideways too, by up to a fifth of a millimetre: a tenth of the assumed node pitch.
     pub const SIDEWAYS: Self = Self::Xyz { largest_shift_mm: 0.2 };
 
-    /// Which coordinates are unknown.
+    /// The unknown coordinates.
     pub fn axes(self) -> Axes {
         match self {
             Self::Z => Axes::Z,

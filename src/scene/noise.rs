@@ -1,11 +1,11 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{SceneError, normal::standard_normal};
+use super::{RelativeNoise, SceneError, normal::standard_normal};
 use crate::sensor::{SensorError, SensorModel};
 use glam::DVec3;
 
-/// What disturbs a reading. Everything is Gaussian but the converter, which rounds.
+/// Noise of the readings. Everything is Gaussian but the converter, which rounds.
 ///
 /// reading = round(R · (1 + drift · η) · (1 + relative · ε₁) + additive · ε₂), with ε drawn for each resistance and η once
 /// for each snapshot.
@@ -18,13 +18,13 @@ pub struct Noise {
     pub additive_ohm: f64,
     /// Bits of the converter that digitises readings; `None` for one without steps.
     pub converter_bits: Option<u8>,
-    /// Standard deviation of the gain, common to all resistances of a snapshot, as temperature changes it.
+    /// Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative).
     pub drift: f64,
-    /// Which sets are disturbed.
+    /// Data sets whose readings have noise.
     pub sets: NoisySets,
 }
 
-/// Which sets are disturbed.
+/// Data sets whose readings have noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoisySets {
@@ -35,15 +35,6 @@ pub enum NoisySets {
     Training,
     /// Test only: a network trained on clean readings meets noise.
     Test,
-}
-
-/// The spread of a reading in proportion to the reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelativeSpread {
-    /// Of each resistance by itself (standard deviation).
-    pub own: f64,
-    /// Common to all resistances of a row (standard deviation).
-    pub common: f64,
 }
 
 /// The steps of a converter: it reads from 0 to twice the largest resistance at rest, and clips beyond.
@@ -65,12 +56,12 @@ impl Noise {
         }
     }
 
-    /// Whether readings are left as they are.
+    /// True if no reading is changed.
     pub fn is_none(&self) -> bool {
         self.relative == 0.0 && self.additive_ohm == 0.0 && self.drift == 0.0 && self.converter_bits.is_none()
     }
 
-    /// What disturbs the training set.
+    /// Noise of the training set.
     pub fn in_training(self) -> Self {
         if self.sets == NoisySets::Test {
             Self::default()
@@ -79,7 +70,7 @@ impl Noise {
         }
     }
 
-    /// What disturbs the test set.
+    /// Noise of the test set.
     pub fn in_test(self) -> Self {
         if self.sets == NoisySets::Training {
             Self::default()
@@ -175,12 +166,13 @@ impl NoiseSource {
         }
     }
 
-    /// The spread of a reading of `resistance_ohm`, in proportion to it; rounding to steps spreads by step/√12.
-    pub fn spread(&self, resistance_ohm: f64) -> RelativeSpread {
+    /// The noise of a reading of `resistance_ohm` relative to it, with own part
+    /// √(relative² + (additive² + step²/12)/R²); step/√12 is the standard deviation of rounding to steps.
+    pub fn relative_to(&self, resistance_ohm: f64) -> RelativeNoise {
         let step_ohm = self.converter.map_or(0.0, |converter| converter.step_ohm);
-        let additive2 = self.noise.additive_ohm.powi(2) + step_ohm * step_ohm / 12.0;
-        RelativeSpread {
-            own: (self.noise.relative.powi(2) + additive2 / (resistance_ohm * resistance_ohm)).sqrt(),
+        let additive_ohm = libm::hypot(self.noise.additive_ohm, step_ohm / 12.0_f64.sqrt());
+        RelativeNoise {
+            own: libm::hypot(self.noise.relative, additive_ohm / resistance_ohm),
             common: self.noise.drift,
         }
     }
@@ -216,7 +208,7 @@ mod tests {
         let (mean, deviation) = spread(&disturbed(noise, 100.0, 100_000));
         assert!((mean - 100.0).abs() < 0.02, "{mean}");
         let expected = noise.source(&SensorModel::new("10x6_3x18".parse().unwrap())).unwrap();
-        assert!((deviation / (100.0 * expected.spread(100.0).own) - 1.0).abs() < 0.01);
+        assert!((deviation / (100.0 * expected.relative_to(100.0).own) - 1.0).abs() < 0.01);
         assert!((deviation - (1.0 + 0.25_f64).sqrt()).abs() < 0.02, "{deviation}");
     }
 

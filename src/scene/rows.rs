@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::SceneError;
 
-/// Which row-wires are read, and whether a decoder knows which one it reads.
+/// Row-wires read, and whether a decoder knows which one it reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rows {

@@ -18,7 +18,7 @@ pub struct ArrayScale {
     columns: usize,
 }
 
-/// Why a text or four numbers are not an array scale.
+/// Error of a text or four numbers that are not an array scale.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ArrayScaleError {
@@ -28,7 +28,7 @@ pub enum ArrayScaleError {
     /// A count is zero or too large.
     #[error("the number of {what} is {count}: it must be from 1 to {LARGEST_COUNT}")]
     Count {
-        /// Which of the four counts.
+        /// Name of the count.
         what: &'static str,
         /// Its value.
         count: usize,
@@ -107,7 +107,7 @@ impl ArrayScale {
         3 * self.nodes_per_row
     }
 
-    /// What to tell a user whose array departs from the paper's rule M4 = 3·M2.
+    /// Note to the user of an array that departs from the paper's rule M4 = 3·M2.
     pub fn note(self) -> Option<String> {
         let equations = self.columns;
         let coordinates = self.coordinates_per_row();

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-/// Along which axes the nodes of the row-wires move: how many unknowns a node has.
+/// Axes along which the nodes of the row-wires move, which set the number of unknowns of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axes {
@@ -17,7 +17,7 @@ impl Axes {
         self.indices().len()
     }
 
-    /// Which of x, y, z (0, 1, 2) are unknown.
+    /// Indices of the unknown coordinates among x, y, z (0, 1, 2).
     pub fn indices(self) -> &'static [usize] {
         match self {
             Self::Z => &[2],

@@ -50,9 +50,10 @@ impl RowConductance {
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
         let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
+        let sensor = (model.scale, &model.geometry);
         match self.axes {
-            Axes::Z => sum_reciprocal_distances::<1>(model, row, displacements_mm, sums, derivatives),
-            Axes::Xyz => sum_reciprocal_distances::<3>(model, row, displacements_mm, sums, derivatives),
+            Axes::Z => sum_reciprocal_distances::<1>(sensor, row, displacements_mm, sums, derivatives),
+            Axes::Xyz => sum_reciprocal_distances::<3>(sensor, row, displacements_mm, sums, derivatives),
         }
     }
 }

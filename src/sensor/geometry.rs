@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::ArrayScale;
 
-/// Where the electrode nodes are when nothing presses, in millimetres.
+/// Positions of the electrode nodes of the undeformed sensor, in millimetres.
 ///
 /// The paper gives the height (5), the gap between wires (1) and row-wires at x = 8..17. The other values are an
 /// assumption: the layout, of 330 scanned, under which the model comes closest to the paper's Tables 1 and 3.
@@ -37,7 +37,7 @@ pub enum GeometryError {
     /// A length is NaN or infinite.
     #[error("{what} is {value}: give a finite length in millimetres")]
     NotFinite {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -45,7 +45,7 @@ pub enum GeometryError {
     /// A length that must be positive is not.
     #[error("{what} is {value} mm: it must be above 0")]
     NotPositive {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -68,7 +68,7 @@ impl Default for Geometry {
 }
 
 impl Geometry {
-    /// What the program tells its user about the default values.
+    /// Note to the user about the default values.
     pub const ASSUMPTION: &'static str = "The paper gives height, wire gap and row positions (x = 8 to 17 mm). Node \
          pitch and column-node positions are assumed: the layout, of 330 scanned, that comes closest to its tables.";
 
@@ -126,6 +126,17 @@ impl Geometry {
     /// Undeformed position of node `node` on row-wire `row`.
     pub fn row_node_mm(&self, scale: ArrayScale, row: usize, node: usize) -> DVec3 {
         DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)
+    }
+
+    /// Position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z counts downwards (compression is
+    /// positive).
+    pub fn displaced_mm(&self, scale: ArrayScale, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
+        let rest = self.row_node_mm(scale, row, node);
+        DVec3::new(
+            rest.x + displacement_mm.x,
+            rest.y + displacement_mm.y,
+            rest.z - displacement_mm.z,
+        )
     }
 
     /// Position of node `node` on column-wire `column`; the bottom layer never moves.

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::{Axes, RowConductance, SensorError, SensorModel};
 
-/// What the readings of one row-wire can tell about its nodes, from the singular values of the Jacobian of ln R.
+/// Deformation patterns that the readings of one row-wire see, from the singular values of the Jacobian of ln R.
 ///
 /// With readings that are off by ε (relative, one standard deviation), a deformation pattern whose singular value is s
 /// is known to ε/s millimetres: the smallest value decides what noise the sensor can bear.
@@ -22,7 +22,7 @@ pub struct Identifiability {
     pub singular_values_per_mm: Vec<f64>,
     /// The pattern of unit length that changes the readings least: one displacement for each node.
     pub worst_pattern: Vec<DVec3>,
-    /// How much the row's readings change when one node moves: rms over readings of ∂ ln R/∂u, for each axis, in 1/mm.
+    /// Sensitivity of the row's readings to each node: rms over readings of ∂ ln R/∂u, for each axis, in 1/mm.
     pub sensitivity_per_mm: Vec<DVec3>,
 }
 
@@ -37,7 +37,7 @@ pub struct RowPair {
     pub difference: f64,
 }
 
-/// Why the singular values are not known.
+/// Error of an identifiability analysis.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IdentifiabilityError {
@@ -45,15 +45,15 @@ pub enum IdentifiabilityError {
     #[error(transparent)]
     Sensor(#[from] SensorError),
     /// The array has no such row-wire.
-    #[error("row {row} does not exist: the array has {rows} row-wires, numbered from 0")]
+    #[error("row {} does not exist: the array has rows 1 to {rows}", row + 1)]
     Row {
-        /// What was asked for.
+        /// Row-wire asked for, from 0.
         row: usize,
-        /// What there is.
+        /// Row-wires of the array.
         rows: usize,
     },
     /// The decomposition did not converge.
-    #[error("the singular values of row {0} did not converge: use lengths of similar size in the geometry")]
+    #[error("the singular values of row {} did not converge: use lengths of similar size in the geometry", .0 + 1)]
     NotConverged(usize),
 }
 
@@ -67,7 +67,7 @@ impl Identifiability {
     /// Rows whose undeformed readings differ less than this count as the same even without noise.
     pub const SAME_ROWS: f64 = 1e-9;
 
-    /// Looks at row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them) and move along `axes`.
+    /// Analyses row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them) and move along `axes`.
     ///
     /// # Errors
     /// No such row, no resistance for the deformation, or a decomposition that does not converge.
@@ -96,6 +96,10 @@ impl Identifiability {
         let svd = jacobian
             .thin_svd()
             .map_err(|_| IdentifiabilityError::NotConverged(row))?;
+        // Rounding would leave the zeros of the added rows at about 1e-17.
+        let singular_values_per_mm = svd.S().column_vector().iter().enumerate();
+        let singular_values_per_mm =
+            singular_values_per_mm.map(|(pattern, &value)| if pattern < equations { value } else { 0.0 });
         let worst = svd.V().col(unknowns - 1);
         let nodes = 0..displacements_mm.len();
         let by_axis = |value: &dyn Fn(usize) -> f64, node: usize| {
@@ -112,7 +116,7 @@ impl Identifiability {
             row,
             axes,
             equations,
-            singular_values_per_mm: svd.S().column_vector().iter().copied().collect(),
+            singular_values_per_mm: singular_values_per_mm.collect(),
             worst_pattern: nodes.clone().map(|node| by_axis(&|u| sign * worst[u], node)).collect(),
             sensitivity_per_mm: nodes.map(|node| by_axis(&rms, node)).collect(),
         })
@@ -132,18 +136,24 @@ impl Identifiability {
         }
     }
 
-    /// How far, in millimetres, the worst-seen pattern can be off when readings are off by `noise` (relative).
+    /// Standard deviation in millimetres to which readings with `noise` (relative) know the worst-seen pattern; infinite
+    /// where they do not see it at all.
     pub fn worst_spread_mm(&self, noise: f64) -> f64 {
-        noise / self.singular_values_per_mm.last().copied().unwrap_or(0.0)
+        match self.singular_values_per_mm.last() {
+            Some(&smallest) if smallest > 0.0 => noise / smallest,
+            _ => f64::INFINITY,
+        }
     }
 
-    /// What remains of a prior spread of `prior_mm` (standard deviation of each unknown) after a reading with `noise`
-    /// (relative), as a share of it: the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 tells that all is
-    /// known, 1 that the reading told nothing.
+    /// Share of a prior spread of `prior_mm` (standard deviation of each unknown) that remains after a reading with
+    /// `noise` (relative): the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 means that everything is known, 1
+    /// that the reading told nothing. Of a pattern that no reading sees (s = 0) everything remains, also without noise.
     pub fn remaining_share(&self, noise: f64, prior_mm: f64) -> f64 {
         let remaining = |&s: &f64| {
             let seen = s * prior_mm / noise;
-            if seen.is_finite() {
+            if s == 0.0 {
+                1.0
+            } else if seen.is_finite() {
                 1.0 / (1.0 + seen * seen)
             } else {
                 0.0
@@ -181,7 +191,7 @@ impl Identifiability {
         Ok(closest)
     }
 
-    /// What a user should know, worst first. `noise` is the relative error of a reading, `prior_mm` the standard
+    /// Warnings to the user, most severe first. `noise` is the relative error of a reading, `prior_mm` the standard
     /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
     pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
         let condition = self.condition();
@@ -200,7 +210,7 @@ impl Identifiability {
     }
 }
 
-/// What stands in the way of decoupling, and what to change.
+/// An obstacle to decoupling, and what to change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IdentifiabilityWarning {
     /// Fewer readings than unknowns.
@@ -212,7 +222,7 @@ pub enum IdentifiabilityWarning {
     },
     /// Two rows read the same.
     RowsAlike {
-        /// Which.
+        /// The two rows.
         pair: RowPair,
         /// Relative error of a reading.
         noise: f64,
@@ -221,10 +231,10 @@ pub enum IdentifiabilityWarning {
     Hopeless {
         /// Relative error of a reading.
         noise: f64,
-        /// What remains of the prior spread.
+        /// Share of the prior spread that remains.
         share: f64,
     },
-    /// Some pattern is hardly seen.
+    /// Some deformation pattern hardly changes the readings.
     IllConditioned {
         /// Largest singular value over the smallest.
         condition: f64,
@@ -349,6 +359,25 @@ mod tests {
                 unknowns: 6
             }
         ));
+    }
+
+    /// Four readings tell four of six patterns exactly; of the other two the whole prior remains.
+    #[test]
+    fn unseen_patterns_remain_whole_without_noise() {
+        let seen = at_rest(&SensorModel::new("2x6_3x4".parse().unwrap()), 1, Axes::Z);
+        let share = seen.remaining_share(0.0, 0.3);
+        assert!((share - (2.0_f64 / 6.0).sqrt()).abs() < 1e-12, "{share}");
+        // With a little noise the same, but for what that hides.
+        assert!((seen.remaining_share(1e-9, 0.3) - share).abs() < 1e-3);
+        assert_eq!(seen.worst_spread_mm(0.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn rows_that_do_not_exist_are_counted_from_one() {
+        let model = SensorModel::new(ArrayScale::default());
+        let error = Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z).unwrap_err();
+        assert_eq!(error.to_string(), "row 11 does not exist: the array has rows 1 to 10");
+        assert!(IdentifiabilityError::NotConverged(0).to_string().contains("row 1 "));
     }
 
     #[test]

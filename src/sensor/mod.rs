@@ -1,4 +1,5 @@
-//! The sensor: how many wires and nodes, where they are, and what resistance a deformation gives.
+//! The sensor: numbers and positions of wires and nodes, and the resistances of a deformation. Displacements and positions
+//! are [`DVec3`], the double-precision vector of the crate `glam`.
 
 mod array_scale;
 mod axes;
@@ -12,5 +13,6 @@ pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
 pub use conductance::RowConductance;
 pub use geometry::{Geometry, GeometryError};
+pub use glam::DVec3;
 pub use identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair};
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, SensorError, SensorModel};

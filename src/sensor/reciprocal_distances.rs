@@ -1,27 +1,28 @@
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
-use super::SensorModel;
+use super::{ArrayScale, Geometry};
 
-/// Columns are taken this many at a time, whose sums stay in registers; what the last block has too much is dropped.
+/// Columns per block, whose sums stay in registers. The padding of the last block is discarded.
 const LANES: usize = 8;
 
-/// Writes `s_k = Σ_i Σ_j 1/d` of Eq. (2), in 1/mm, for row-wire `row` whose nodes are displaced by `displacements_mm`
-/// (M2), to `sums` (M4); and to `derivatives` (M2 × `AXES` × M4, in 1/mm²) how they change as the nodes move along no
-/// axis (0), z (1) or x, y and z (3).
+/// Computes `s_k = Σ_i Σ_j 1/d` of Eq. (2), in 1/mm, for row-wire `row` whose nodes are displaced by `displacements_mm`
+/// (M2), into `sums` (M4); and its derivatives by the displacements along no axis (`AXES` = 0), z (1) or x, y and z (3)
+/// into `derivatives` (M2 × `AXES` × M4, in 1/mm²).
 ///
 /// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, uz counting downwards, ∂(1/d)/∂uz = z/d³.
 ///
 /// No fused operations, so every machine gives the same bits.
 pub(super) fn sum_reciprocal_distances<const AXES: usize>(
-    model: &SensorModel,
+    (scale, geometry): (ArrayScale, &Geometry),
     row: usize,
     displacements_mm: &[DVec3],
     sums: &mut [f64],
     derivatives: &mut [f64],
 ) {
     pulp::Arch::new().dispatch(Summation::<AXES> {
-        model,
+        scale,
+        geometry,
         row,
         displacements_mm,
         sums,
@@ -29,9 +30,10 @@ pub(super) fn sum_reciprocal_distances<const AXES: usize>(
     });
 }
 
-/// A type rather than a closure, which would be too long to be moved into the code for vector registers.
+/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
 struct Summation<'a, const AXES: usize> {
-    model: &'a SensorModel,
+    scale: ArrayScale,
+    geometry: &'a Geometry,
     row: usize,
     displacements_mm: &'a [DVec3],
     sums: &'a mut [f64],
@@ -43,7 +45,7 @@ impl<const AXES: usize> WithSimd for Summation<'_, AXES> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let geometry = &self.model.geometry;
+        let geometry = self.geometry;
         let columns = self.sums.len();
         for (block, sums) in self.sums.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
@@ -53,9 +55,9 @@ impl<const AXES: usize> WithSimd for Summation<'_, AXES> {
             }
             let mut totals = [0.0; LANES];
             for (node, &displacement) in self.displacements_mm.iter().enumerate() {
-                let position = self.model.displaced_mm(self.row, node, displacement);
+                let position = geometry.displaced_mm(self.scale, self.row, node, displacement);
                 let mut slopes = [[0.0; LANES]; AXES];
-                add_node(self.model, position, &y_mm, &mut totals, &mut slopes);
+                add_node(self.scale, geometry, position, &y_mm, &mut totals, &mut slopes);
                 for (axis, slopes) in slopes.iter().enumerate() {
                     let begin = (node * AXES + axis) * columns + first;
                     self.derivatives[begin..begin + sums.len()].copy_from_slice(&slopes[..sums.len()]);
@@ -68,14 +70,15 @@ impl<const AXES: usize> WithSimd for Summation<'_, AXES> {
 
 #[inline(always)]
 fn add_node<const AXES: usize>(
-    model: &SensorModel,
+    scale: ArrayScale,
+    geometry: &Geometry,
     position: DVec3,
     y_mm: &[f64; LANES],
     sums: &mut [f64; LANES],
     slopes: &mut [[f64; LANES]; AXES],
 ) {
-    for j in 0..model.scale.nodes_per_column() {
-        let dx = position.x - model.geometry.column_node_mm(0, j).x;
+    for j in 0..scale.nodes_per_column() {
+        let dx = position.x - geometry.column_node_mm(0, j).x;
         let across2 = dx * dx + position.z * position.z;
         for lane in 0..LANES {
             let dy = position.y - y_mm[lane];

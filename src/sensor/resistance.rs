@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::{ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances};
 
-/// Resistance per millimetre of rubber used where nothing else is said. The paper gives none: g scales every
+/// Default resistance per millimetre of rubber. The paper gives none: g scales every
 /// resistance alike, so no relative error depends on it.
 pub const DEFAULT_RESISTIVITY_OHM_PER_MM: f64 = 100.0;
 
@@ -13,15 +13,15 @@ pub const DEFAULT_RESISTIVITY_OHM_PER_MM: f64 = 100.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorModel {
-    /// How many wires and nodes.
+    /// Number of wires and nodes.
     pub scale: ArrayScale,
-    /// Where they are.
+    /// Positions of the nodes.
     pub geometry: Geometry,
     /// g, resistance per millimetre of rubber.
     pub resistivity_ohm_per_mm: f64,
 }
 
-/// Why the model cannot answer.
+/// Error of the resistance model.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SensorError {
@@ -33,14 +33,16 @@ pub enum SensorError {
     Resistivity(f64),
     /// A resistance came out as zero, infinite or NaN.
     #[error(
-        "row {row}, column {column}: the resistance is {resistance_ohm} ohm; a node touches a column-wire or a length is out of range"
+        "row {}, column {}: the resistance is {resistance_ohm} ohm; a node touches a column-wire or a length is out of range",
+        row + 1,
+        column + 1
     )]
     Resistance {
         /// Row-wire, from 0.
         row: usize,
         /// Column-wire, from 0.
         column: usize,
-        /// What came out.
+        /// Computed value.
         resistance_ohm: f64,
     },
 }
@@ -58,7 +60,7 @@ impl SensorModel {
     /// Checks geometry and resistivity.
     ///
     /// # Errors
-    /// What is impossible.
+    /// The first impossible value.
     pub fn check(&self) -> Result<(), SensorError> {
         self.geometry.check()?;
         let g = self.resistivity_ohm_per_mm;
@@ -71,12 +73,7 @@ impl SensorModel {
 
     /// Position of a node displaced by `displacement_mm`, whose z counts downwards (compression is positive).
     pub fn displaced_mm(&self, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
-        let rest = self.geometry.row_node_mm(self.scale, row, node);
-        DVec3::new(
-            rest.x + displacement_mm.x,
-            rest.y + displacement_mm.y,
-            rest.z - displacement_mm.z,
-        )
+        self.geometry.displaced_mm(self.scale, row, node, displacement_mm)
     }
 
     /// The displacement that puts a node at `position_mm`, z counting downwards: the inverse of [`Self::displaced_mm`].
@@ -104,7 +101,13 @@ impl SensorModel {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
         // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
-        sum_reciprocal_distances::<0>(self, row, displacements_mm, resistances_ohm, &mut []);
+        sum_reciprocal_distances::<0>(
+            (self.scale, &self.geometry),
+            row,
+            displacements_mm,
+            resistances_ohm,
+            &mut [],
+        );
         for (column, value) in resistances_ohm.iter_mut().enumerate() {
             *value = self.resistivity_ohm_per_mm / *value;
             if !(*value > 0.0 && value.is_finite()) {
@@ -118,7 +121,7 @@ impl SensorModel {
         Ok(())
     }
 
-    /// As [`Self::row_resistances_into`], in a new vector of M4 resistances in ohm.
+    /// Row-column resistances in ohm as by [`Self::row_resistances_into`], in a new vector (M4).
     ///
     /// # Errors
     /// A resistance that is not a positive finite number.
@@ -191,7 +194,7 @@ mod tests {
         model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
         let touch = DVec3::new(0.0, 0.0, model.geometry.height_mm);
         let error = model.row_resistances(0, &[touch]).unwrap_err();
-        assert!(error.to_string().contains("row 0, column 0"), "{error}");
+        assert!(error.to_string().contains("row 1, column 1"), "{error}");
         let near = DVec3::new(0.0, 0.0, model.geometry.height_mm * (1.0 - 1e-15));
         assert!(model.row_resistances(0, &[near]).is_ok());
         assert!(model.row_resistances(0, &[DVec3::NAN]).is_err());

@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::{
     app::test_view::Frame,
     evaluation::SimulatedSettings,
-    scene::{Noise, RowModel, Scene, SceneError},
+    scene::{RelativeNoise, RowModel, Scene, SceneError},
     sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair, SensorError, SensorModel},
     surface::{SurfaceError, SurfaceMap},
 };
@@ -91,8 +91,8 @@ impl Analysis {
         sensor.check()?;
         scene.check()?;
         let read = scene.rows.read(sensor.scale.rows())?;
-        let pressed = DVec3::Z * question.compression * sensor.geometry.height_mm;
-        let displacements_mm = vec![pressed; sensor.scale.nodes_per_row()];
+        let depth_mm = question.compression * sensor.geometry.height_mm;
+        let displacements_mm = vec![DVec3::Z * depth_mm; sensor.scale.nodes_per_row()];
         let axes = scene.movement.axes();
         let mut rows = Vec::with_capacity(read.len());
         for row in read {
@@ -109,7 +109,7 @@ impl Analysis {
             RowModel::Shared => Some(Identifiability::most_alike_rows(sensor)?),
             RowModel::Each => None,
         };
-        let noise = relative_noise(sensor, scene.noise, &rows[worst], &displacements_mm)?;
+        let noise = RelativeNoise::of(scene.noise, sensor, &[rows[worst].row], depth_mm)?.total();
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         let surface = match last {
             Some(last) if lattice(&last.question.sensor) == lattice(sensor) && last.rows.len() == rows.len() => {
@@ -198,23 +198,10 @@ fn frame(
     }
 }
 
-/// What all sources of noise make of the middle reading of a row, in proportion to it.
-fn relative_noise(
-    sensor: &SensorModel,
-    noise: Noise,
-    row: &Identifiability,
-    displacements_mm: &[DVec3],
-) -> Result<f64, SensorError> {
-    let mut readings_ohm = sensor.row_resistances(row.row, displacements_mm)?;
-    readings_ohm.sort_by(f64::total_cmp);
-    let spread = noise.source(sensor)?.spread(readings_ohm[readings_ohm.len() / 2]);
-    Ok(spread.own.hypot(spread.common))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Movement, Rows};
+    use crate::scene::{Movement, Noise, Rows};
 
     fn analysis(question: &Question) -> Analysis {
         Analysis::new(question, None, || false).unwrap().unwrap()

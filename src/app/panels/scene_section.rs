@@ -227,7 +227,7 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
         let hint = "The steepest slope of the body against the surface; each is drawn from 0 to it.";
         quantity_ui(ui, "Largest tilt", hint, tilt, 0.0..=45.0, "°");
     }
-    let hint = "Distance over which the surface comes back around the body.";
+    let hint = "Decay length of the surface around the indenter, in mm.";
     quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
@@ -249,14 +249,13 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
         condition => format!("Condition number {}", format_number(condition)),
     };
     dim_ui(ui, &text).on_hover_text(
-        "Of the worst row, its nodes half way down: the largest singular value of the Jacobian of ln R over the smallest. \
-         By up to so much an error of the readings grows.",
+        "Worst-case amplification of a relative error in the readings: the largest singular value of the Jacobian of ln R \
+         over the smallest, of the worst row, its nodes half way down.",
     );
     let Some(outlook) = outlook else { return };
-    let noise = draft.source.scene.noise.relative;
     let sideways = draft.source.scene.movement != Movement::Z;
     if outlook.warnings.is_empty() && sideways {
-        note_ui(ui, &sideways_in_words(outlook, noise));
+        note_ui(ui, &sideways_in_words(outlook));
     }
     for warning in &outlook.warnings {
         note_ui(ui, &super::fields::capitalised(&format!("{warning}.")));
@@ -264,8 +263,8 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
 }
 
 /// What scenes of nodes that shift sideways ask of the readings.
-fn sideways_in_words(outlook: &Outlook, noise: f64) -> String {
-    let worst = &outlook.worst_row;
+fn sideways_in_words(outlook: &Outlook) -> String {
+    let (worst, noise) = (&outlook.worst_row, outlook.noise);
     if noise > 0.0 {
         let spread = format_number(worst.worst_spread_mm(noise));
         format!("With this noise the movement that is seen worst is known to ±{spread} mm only.")

@@ -56,7 +56,7 @@ pub fn keys(level: &TradeLevel, palette: &Palette) -> Vec<Key> {
 
 /// The error of the reference, where it has a place on a logarithmic axis.
 fn limit(level: &TradeLevel) -> Option<f64> {
-    let percent = level.points.first()?.reference.z_percent?;
+    let percent = level.points.first()?.reference?.z_percent?;
     (percent > 0.0).then_some(percent)
 }
 

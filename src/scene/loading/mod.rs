@@ -1,6 +1,9 @@
-//! How the surface is loaded, and the drawing of deformations.
+//! Loadings of the surface, and the drawing of deformations.
 
 mod indenter;
+mod modified_bessel;
+mod press;
+mod round_contact;
 mod sampler;
 mod smooth_field;
 
@@ -13,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::SceneError;
 
-/// How the top surface is loaded.
+/// Loading of the top surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Loading {

@@ -1,0 +1,205 @@
+use glam::DVec2;
+
+use super::round_contact::RoundContact;
+
+/// An indenter's body with its radius in millimetres.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Body {
+    Sphere(f64),
+    FlatPunch(f64),
+    Cylinder(f64),
+    Edge,
+}
+
+/// One press of an indenter, prepared to be evaluated at many nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Press {
+    face: Face,
+    place: DVec2,
+    /// Depth of the middle of the body.
+    depth_mm: f64,
+    /// Unit vector along which the body is inclined; the axis of a cylinder, the line of an edge.
+    direction: DVec2,
+    /// Depth gained for each millimetre along `direction`.
+    slope: f64,
+    spread_mm: f64,
+}
+
+/// A body with its contact, where that is the same everywhere.
+#[derive(Clone, Copy, Debug)]
+enum Face {
+    Sphere { radius_mm: f64, contact: RoundContact },
+    FlatPunch(RoundContact),
+    Cylinder { radius_mm: f64 },
+    Edge,
+}
+
+impl Press {
+    /// Presses `body` at `place` so deep, inclined by `slope` along `direction`, on a surface of decay length
+    /// `spread_mm`.
+    pub(super) fn new(body: Body, place: DVec2, depth_mm: f64, direction: DVec2, slope: f64, spread_mm: f64) -> Self {
+        let face = match body {
+            Body::Sphere(radius_mm) => Face::Sphere {
+                radius_mm,
+                contact: RoundContact::of_ball(radius_mm, depth_mm, spread_mm),
+            },
+            Body::FlatPunch(radius_mm) => Face::FlatPunch(RoundContact::new(radius_mm, spread_mm)),
+            Body::Cylinder(radius_mm) => Face::Cylinder { radius_mm },
+            Body::Edge => Face::Edge,
+        };
+        Self {
+            face,
+            place,
+            depth_mm,
+            direction,
+            slope,
+            spread_mm,
+        }
+    }
+
+    /// Depth of the surface at (x, y), in millimetres; below 0 where a tilted body lifts off.
+    pub(super) fn depth_at_mm(&self, x: f64, y: f64) -> f64 {
+        let apart = DVec2::new(x, y) - self.place;
+        let (along, across) = (apart.dot(self.direction), apart.perp_dot(self.direction));
+        let distance = apart.length();
+        match self.face {
+            Face::Sphere { radius_mm, contact } => {
+                let inside = distance.min(contact.radius_mm);
+                let at_body = self.depth_mm - inside * inside / (2.0 * radius_mm);
+                at_body * contact.share_at(distance)
+            }
+            Face::Cylinder { radius_mm } => self.cylinder(self.depth_mm + self.slope * along, radius_mm, across),
+            Face::FlatPunch(contact) => {
+                // Outside, the surface starts from the nearest point of the face.
+                let inside = (contact.radius_mm / distance).min(1.0);
+                (self.depth_mm + self.slope * along * inside) * contact.share_at(distance)
+            }
+            Face::Edge => (self.depth_mm + self.slope * along) * (-across.max(0.0) / self.spread_mm).exp(),
+        }
+    }
+
+    /// A cylinder of this depth and radius at `distance` from its axis: the parabola depth − distance²/(2 radius) up to
+    /// where its slope equals the free surface's, a/radius = depth(a)/spread, and that surface beyond.
+    fn cylinder(&self, depth_mm: f64, radius: f64, distance: f64) -> f64 {
+        if depth_mm <= 0.0 {
+            return 0.0;
+        }
+        // √(λ² + 2 radius·depth) − λ, in the unit √(2 radius·depth) so that a long λ neither cancels nor overflows.
+        let unit_mm = radius.sqrt() * (2.0 * depth_mm).sqrt();
+        let length = self.spread_mm / unit_mm;
+        let contact = unit_mm / (length + (1.0 + length * length).sqrt());
+        let distance = distance.abs();
+        let inside = distance.min(contact);
+        let at_body = depth_mm - inside * inside / (2.0 * radius);
+        at_body * (-(distance - inside) / self.spread_mm).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn press(body: Body, slope: f64) -> Press {
+        Press::new(body, DVec2::new(3.0, -1.0), 0.8, DVec2::X, slope, 2.0)
+    }
+
+    #[test]
+    fn the_surface_follows_the_body_and_comes_back() {
+        let sphere = press(Body::Sphere(4.0), 0.0);
+        assert!((sphere.depth_at_mm(3.0, -1.0) - 0.8).abs() < 1e-15);
+        assert!((sphere.depth_at_mm(3.5, -1.0) - (0.8 - 0.25 / 8.0)).abs() < 1e-15);
+        assert!(sphere.depth_at_mm(30.0, -1.0) < 1e-4);
+        let punch = press(Body::FlatPunch(2.0), 0.0);
+        assert!((punch.depth_at_mm(3.0, 0.9) - 0.8).abs() < 1e-15);
+        let edge = press(Body::Edge, 0.0);
+        let (one, other) = (edge.depth_at_mm(3.0, 5.0), edge.depth_at_mm(3.0, -7.0));
+        assert_eq!(one.max(other), 0.8);
+        assert!((one.min(other) - 0.8 * (-3.0_f64).exp()).abs() < 1e-15);
+    }
+
+    /// The solution in the plane, exp(−4/2) = 0.135, holds for bodies that are long in one direction.
+    #[test]
+    fn around_round_bodies_the_surface_is_axisymmetric() {
+        // scipy.special.k0(3.5) / scipy.special.k0(1.5), SciPy 1.17.1.
+        let punch = press(Body::FlatPunch(3.0), 0.0);
+        assert!((punch.depth_at_mm(3.0, 6.0) / 0.8 - 0.09166691889433545).abs() < 1e-15);
+        // Contact radius by scipy.optimize.brentq, then its depth times k0(3 / 2) / k0(radius / 2).
+        let sphere = press(Body::Sphere(4.0), 0.0);
+        assert!((sphere.depth_at_mm(3.0, 2.0) - 0.18187682811379735).abs() < 1e-14);
+    }
+
+    /// w″ + w′/r = w/λ² beside round bodies, w″ = w/λ² beside long ones, by central differences.
+    #[test]
+    fn the_free_surface_obeys_the_equation_of_its_foundation() {
+        let step = 1e-3;
+        for (body, curvature) in [
+            (Body::Sphere(4.0), 1.0),
+            (Body::FlatPunch(2.0), 1.0),
+            (Body::Cylinder(4.0), 0.0),
+            (Body::Edge, 0.0),
+        ] {
+            let press = press(body, 0.0);
+            for distance in [2.5, 4.0, 7.0] {
+                let side = if press.depth_at_mm(3.0, 5.0) < 0.7 { 1.0 } else { -1.0 };
+                let depth = |r: f64| press.depth_at_mm(3.0, -1.0 + side * r);
+                let (before, at, after) = (depth(distance - step), depth(distance), depth(distance + step));
+                let second = (before - 2.0 * at + after) / (step * step);
+                let first = (after - before) / (2.0 * step);
+                let residual = second + curvature * first / distance - at / 4.0;
+                assert!(residual.abs() < 1e-6 * at, "{body:?} {distance}: {residual} {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_round_body_leaves_no_kink() {
+        let sphere = press(Body::Sphere(4.0), 0.0);
+        let slope =
+            |at: f64| (sphere.depth_at_mm(3.0 + at + 1e-6, -1.0) - sphere.depth_at_mm(3.0 + at - 1e-6, -1.0)) / 2e-6;
+        let mut last = slope(0.01);
+        for step in 2..600 {
+            let next = slope(0.01 * f64::from(step));
+            assert!((next - last).abs() < 0.01, "{step}");
+            last = next;
+        }
+    }
+
+    /// The parabola of a cylinder ends where a/4 = (0.8 − a²/8)/λ, here with λ so long that √(λ² + 6.4) − λ cancels.
+    #[test]
+    fn extreme_sizes_give_depths_up_to_the_bodys() {
+        let cylinder = Press::new(Body::Cylinder(4.0), DVec2::ZERO, 0.8, DVec2::X, 0.0, 1e9);
+        let bent = 0.8 - cylinder.depth_at_mm(0.0, 1.6e-9);
+        assert!((0.0..1e-15).contains(&bent), "{bent}");
+        let sizes = [5e-324, 1e-300, 1e-9, 1.0, 1e9, 1e300, f64::MAX];
+        for size in sizes {
+            for body in [
+                Body::Sphere(size),
+                Body::FlatPunch(size),
+                Body::Cylinder(size),
+                Body::Edge,
+            ] {
+                for spread in sizes {
+                    for depth in [0.0, 5e-324, 0.8] {
+                        let press = Press::new(body, DVec2::ZERO, depth, DVec2::X, 0.0, spread);
+                        for distance in [0.0, 1e-300, 1e-9, 1.0, -7.0, 1e9, 1e150] {
+                            let found = press.depth_at_mm(0.0, distance);
+                            assert!(
+                                (0.0..=depth).contains(&found),
+                                "{body:?} {spread} {depth} {distance}: {found}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_tilted_body_presses_deeper_along_its_tilt() {
+        for body in [Body::FlatPunch(2.0), Body::Cylinder(4.0), Body::Edge] {
+            let press = press(body, 0.1);
+            let rise = press.depth_at_mm(4.0, -1.0) - press.depth_at_mm(2.0, -1.0);
+            assert!((rise - 0.2).abs() < 1e-12, "{body:?} {rise}");
+        }
+    }
+}
