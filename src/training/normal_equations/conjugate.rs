@@ -28,13 +28,17 @@ use crate::{
 
 /// Iterations that a step is assumed to need: 30 to 70 were seen in training, more at the end of it.
 const ITERATIONS: f64 = 100.0;
-/// The residual, relative to the right-hand side and both measured by the preconditioner, at which a step is good enough.
-/// Steps then agree with those of the factored equations to about as many digits.
+/// Residual, relative to the right-hand side and both in the norm of the preconditioner's inverse, at which the iteration
+/// has converged. The relative error of the step, in the norm of S, is at most this times the root of the condition number
+/// of the preconditioned matrix: no bound on the digits of single weights when the damping is small.
 const TOLERANCE: f64 = 1e-8;
 /// Ridge on the diagonals of the preconditioner, relative to their largest entry, against rounding.
 const RIDGE: f64 = 1e-13;
-/// A step that is not that good by then is taken as it is: it still lowers the error of the linearised network.
+/// Iterations after which the step is taken as it is, if its residual is below [`WORST_RESIDUAL`].
 const MOST_ITERATIONS: usize = 500;
+/// Largest relative residual of an inexact Gauss-Newton step (Dembo, Eisenstat and Steihaug 1982). Above it the solution is
+/// refused and the damping has to grow.
+const WORST_RESIDUAL: f64 = 1e-3;
 
 /// Solves S δ = r on W by preconditioned conjugate gradients (Hestenes and Stiefel 1952), never forming S. With P the
 /// vector as n1 × h,
@@ -55,6 +59,7 @@ pub(in crate::training) struct ConjugateGradient {
     /// F with the entries of each node together: n1 × h·(h+1).
     f: Mat<f64>,
     cholesky: Cholesky,
+    most_iterations: usize,
     /// One for each part of the samples; the first gets the sum.
     parts: Vec<PartBuffers>,
     /// FᵀP and that times V̄V̄ᵀ: (h+1) × h.
@@ -86,6 +91,7 @@ impl HiddenSolver for ConjugateGradient {
             blocks: Mat::zeros(n1, order),
             f: Mat::zeros(n1, h * (h + 1)),
             cholesky: Cholesky::new(n1),
+            most_iterations: MOST_ITERATIONS,
             parts: (0..parts).map(part).collect(),
             eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
             residual: vec![0.0; order],
@@ -151,14 +157,18 @@ impl HiddenSolver for ConjugateGradient {
         let mut length = self.precondition();
         self.direction.copy_from_slice(&self.preconditioned);
         let goal = TOLERANCE * TOLERANCE * length;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..self.most_iterations {
+            if length <= goal {
+                return Some(());
+            }
             self.apply(system, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
             let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
-            // Rounding has taken over, or the right-hand side is zero.
-            if !(curvature > 0.0 && length > goal) {
-                break;
+            // Rounding has taken over. False for NaN.
+            let is_convex = curvature > 0.0;
+            if !is_convex {
+                return None;
             }
             let distance = length / curvature;
             for (value, direction) in solution.iter_mut().zip(&self.direction) {
@@ -169,14 +179,12 @@ impl HiddenSolver for ConjugateGradient {
             }
             let before = length;
             length = self.precondition();
-            if length <= goal {
-                break;
-            }
             for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {
                 *direction = value + length / before * *direction;
             }
         }
-        Some(())
+        let worst = WORST_RESIDUAL / TOLERANCE;
+        (length <= worst * worst * goal).then_some(())
     }
 }
 
@@ -295,5 +303,42 @@ impl PartBuffers {
             1.0,
             Par::Seq,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::{
+        examples::tests::{random_examples, random_mlp},
+        normal_equations::{elimination::Elimination, products::Products},
+    };
+
+    /// Solves at damping 1e-3 within so many iterations.
+    fn solve(most_iterations: usize) -> Option<()> {
+        let (mlp, examples) = (random_mlp(8, 12, 2, 1), random_examples(40, 8, 2, 2));
+        let shape = mlp.shape();
+        let mut solver = ConjugateGradient::new(shape, &examples);
+        solver.most_iterations = most_iterations;
+        let mut products = Products::new(&solver, &ConjugateGradient::cost(shape, 40), 1);
+        let mut kept = KeptActivations::new(shape, &examples, 1);
+        products.gather(&solver, &mlp, &examples, &mut kept);
+        let (mut elimination, mut right) = (Elimination::new(shape), vec![0.0; shape.hidden_weights()]);
+        elimination.factor(products.sums(), 1e-3)?;
+        elimination.reduce(products.sums(), &mlp, 0.0, &mut right);
+        let system = System {
+            mlp: &mlp,
+            examples: &examples,
+            sums: products.sums(),
+            elimination: &elimination,
+            damping: 1e-3,
+        };
+        solver.solve(system, &mut kept, &mut right)
+    }
+
+    #[test]
+    fn a_step_that_is_far_from_converged_is_refused() {
+        assert_eq!(solve(MOST_ITERATIONS), Some(()));
+        assert_eq!(solve(3), None);
     }
 }

@@ -77,6 +77,13 @@ impl DampedLeastSquares {
         (0..step.nrows()).map(|k| step[(k, 0)]).collect()
     }
 
+    /// The part of the possible decrease of ‖[J; √mu I] δ + [e; 0]‖² that `step` misses, given the best step.
+    pub(super) fn missed(&self, step: &[f64], best: &[f64]) -> f64 {
+        let column = |step: &[f64]| Mat::from_fn(step.len(), 1, |row, _| step[row]);
+        let apart = &self.matrix * (column(step) - column(best));
+        apart.squared_norm_l2() / (&self.matrix * column(best)).squared_norm_l2()
+    }
+
     /// Condition number of the damped normal equations: the square of that of the matrix.
     pub(super) fn normal_condition(&self) -> f64 {
         let values = self.matrix.singular_values().unwrap();

@@ -227,11 +227,11 @@ mod tests {
         Some(step)
     }
 
-    /// Rounding is amplified by the condition number κ of the normal equations. Conjugate gradients also leave a residual
-    /// of 1e-8, amplified by the condition of the preconditioned equations; where they do not reach it, they say so.
+    /// Rounding is amplified by the condition number κ of the normal equations, and so is the residual that conjugate
+    /// gradients leave. The directions in which the step is then uncertain hardly change the linearised error: at least
+    /// its decrease is found to six digits.
     #[test]
     fn the_step_is_that_of_the_dense_jacobian() {
-        let mut refused = 0;
         for (inputs, hidden, outputs, samples) in [
             (5, 4, 3, 300),
             (1, 1, 1, 3),
@@ -251,7 +251,6 @@ mod tests {
                 match step(&mut factored, &mlp, &examples, mu) {
                     Some(step) => {
                         let distance = distance(&step, &expected);
-                        println!("{what}, factored: {distance:e}");
                         assert!(distance < rounding.max(1e-12), "{what}, factored: {distance:e}");
                     }
                     // Lost in rounding.
@@ -260,15 +259,15 @@ mod tests {
                 match step(&mut iterated, &mlp, &examples, mu) {
                     Some(step) => {
                         let distance = distance(&step, &expected);
-                        println!("{what}, iterated: {distance:e}");
-                        let close = rounding + 1e-8 * condition.sqrt();
-                        assert!(distance < close, "{what}, iterated: {distance:e}");
+                        let missed = dense.missed(&step, &expected);
+                        assert!(missed < 1e-6, "{what}, iterated: {missed:e}");
+                        let close = rounding + 1e-8 * condition;
+                        assert!(distance < close || condition > 1e6, "{what}, iterated: {distance:e}");
                     }
-                    None => refused += 1,
+                    None => assert!(rounding > 1.0, "{what}, iterated"),
                 }
             }
         }
-        println!("{refused} refused");
     }
 
     /// Enough samples that they are divided into parts.
