@@ -84,10 +84,17 @@ impl AdaptiveDescentSettings {
 /// Largest learning rate, which keeps a long run of accepted steps from overflowing.
 const LARGEST_RATE: f64 = 1e300;
 
-/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). The step is
-/// `dX = mc·dXprev + lr·(1 − mc)·g`, g the negative gradient. If it lowers the error, lr grows by `rate_increase`; if it
-/// raises the error by more than the factor `largest_error_increase`, it is taken back, lr shrinks by `rate_decrease`
-/// and the momentum is forgotten. (The reference manual prints `lr·mc·g`; we use 1 − mc, as in `traingdm`.)
+/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). With gX the negative
+/// gradient, each epoch tries
+///
+/// ```text
+/// dX = mc·dXprev + lr·(1 − mc)·gX
+/// ```
+///
+/// If the step lowers the error, lr grows by the factor `rate_increase`. If it raises the error by more than the factor
+/// `largest_error_increase`, it is rejected: the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of the
+/// next epoch is `lr·gX` with the reduced lr (0 if that overflows). Before the first epoch dXprev is 0. (The reference
+/// manual prints `lr·mc·gX` in the step; we use 1 − mc, as in `traingdm`.)
 pub(super) struct AdaptiveDescent {
     settings: AdaptiveDescentSettings,
     state: AdaptiveState,
@@ -167,7 +174,10 @@ impl Algorithm for AdaptiveDescent {
             self.now = then;
         } else {
             *learning_rate *= self.settings.rate_decrease;
-            step.fill(0.0);
+            for (step, slope) in step.iter_mut().zip(&self.gradient) {
+                let next = -*learning_rate * slope;
+                *step = if next.is_finite() { next } else { 0.0 };
+            }
         }
         Ok(self.now)
     }
@@ -202,5 +212,21 @@ mod tests {
             .last()
             .unwrap();
         assert!(last.mse < start.mse, "{last:?}");
+    }
+
+    /// `traingdx` keeps `lr·gX` with the reduced rate as the step that momentum mixes in next.
+    #[test]
+    fn after_a_rejected_step_momentum_mixes_in_the_gradient_at_the_reduced_rate() {
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = AdaptiveDescentSettings {
+            learning_rate: 1e3,
+            ..AdaptiveDescentSettings::default()
+        };
+        let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
+        let gradient = method.gradient.clone();
+        assert_eq!(method.step(&mut mlp, &examples), Ok(start), "the step is rejected");
+        for (step, slope) in method.state().step.iter().zip(&gradient) {
+            assert_eq!(*step, -700.0 * slope);
+        }
     }
 }
