@@ -46,11 +46,7 @@ impl Trainer {
             return Ok(());
         }
         self.settings.stopping = stopping;
-        let by_rule = !matches!(
-            self.stop_reason,
-            Some(StopReason::Stopped | StopReason::Diverged | StopReason::MuLarge)
-        );
-        if by_rule {
+        if self.stop_reason.is_none_or(StopReason::depends_on_rules) {
             let latest = *self.latest();
             self.stop_reason = self.reason_to_stop(&latest);
         }

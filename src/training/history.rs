@@ -22,6 +22,7 @@ pub struct EpochRecord {
     /// Number of weights that the data determine, where the method estimates it.
     #[serde(default)]
     pub effective_parameters: Option<f64>,
-    /// How often the validation error has risen since it last fell.
+    /// Number of epochs at which the validation error was above its best, since the last new best or since the present
+    /// method began.
     pub validation_failures: usize,
 }

@@ -167,8 +167,11 @@ impl Algorithm for ScaledConjugateGradient {
 
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let square = dot(&self.state.p, &self.state.p);
-        if !(square > 0.0 && square.is_finite()) {
+        if square == 0.0 {
             return Err(StopReason::GradientSmall);
+        }
+        if !square.is_finite() {
+            return Err(StopReason::Diverged);
         }
         if self.state.success {
             let sigma = self.settings.sigma / square.sqrt();
@@ -213,7 +216,7 @@ impl Algorithm for ScaledConjugateGradient {
         if self.state.lambda.is_finite() {
             Ok(self.now)
         } else {
-            Err(StopReason::GradientSmall)
+            Err(StopReason::LambdaLarge)
         }
     }
 
@@ -231,4 +234,23 @@ const WORST: f64 = -1e3;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::examples::tests::{random_examples, random_mlp};
+
+    #[test]
+    fn a_lambda_that_overflows_is_no_small_gradient() {
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = ScaledConjugateGradientSettings {
+            lambda: 1e300,
+            ..ScaledConjugateGradientSettings::default()
+        };
+        let (mut method, start) = ScaledConjugateGradient::new(settings, &mlp, &examples);
+        assert!(start.gradient_norm > 0.1);
+        let reason = (0..100).find_map(|_| method.step(&mut mlp, &examples).err());
+        assert_eq!(reason, Some(StopReason::LambdaLarge));
+    }
 }

@@ -88,7 +88,7 @@ pub struct Trainer {
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
     pub(super) stages: Vec<Stage>,
-    /// How often the validation error has risen since it last fell, under the present method.
+    /// Epochs since the last best validation error or since the present method began, see [`StoppingRules::max_fail`].
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
     pub(super) elapsed: Duration,
@@ -183,17 +183,14 @@ impl Trainer {
         };
         let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
         let deciding = validation_mse.unwrap_or(mse);
-        let before = self.history.last();
-        let epoch = before.map_or(0, |last| last.epoch + 1);
+        let epoch = self.history.len();
         if deciding < self.best.mse {
             self.best.mse = deciding;
             self.best.epoch = epoch;
             self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
-        }
-        match before {
-            Some(last) if validation_mse > last.validation_mse => self.validation_failures += 1,
-            Some(last) if validation_mse == last.validation_mse => {}
-            _ => self.validation_failures = 0,
+            self.validation_failures = 0;
+        } else if validation_mse.is_some_and(|mse| mse.is_nan() || mse > self.best.mse) {
+            self.validation_failures += 1;
         }
         let latest = EpochRecord {
             epoch,
@@ -211,16 +208,17 @@ impl Trainer {
 
     pub(super) fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
         let rules = self.settings.stopping;
-        let validation_rose = self.validation_failures >= rules.max_fail;
+        let failed_to_validate = self.validation_failures >= rules.max_fail;
         let mse = latest.training_mse;
         let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
             (!mse.is_finite(), StopReason::Diverged),
-            // Validation that rises together with the training error, above where it began, is no overfitting.
-            (validation_rose && mse > start_mse, StopReason::Diverged),
+            // A validation error that stays above its best while the training error is above the initial one is no
+            // overfitting.
+            (failed_to_validate && mse > start_mse, StopReason::Diverged),
             (mse <= rules.goal_mse, StopReason::GoalReached),
             (latest.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
-            (validation_rose, StopReason::ValidationRose),
+            (failed_to_validate, StopReason::ValidationRose),
             (latest.epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
