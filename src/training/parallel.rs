@@ -3,6 +3,9 @@
 //! One large product is split by rows and columns of its result; many small products, one for each block of samples, are
 //! split by samples. The splits depend on sizes alone, so every entry is summed in the same order and the bits are the
 //! same on any number of threads.
+//!
+//! faer's own `Par::rayon(n)` with a fixed n keeps its bits too, but was slower on a loaded 2-core machine: 297 ms against
+//! 177 ms for a Cholesky factor of order 1984, 99 ms against 79 ms for a product of 4753×512×512.
 
 use std::ops::Range;
 
