@@ -221,15 +221,15 @@ fn extremes_end_with_a_reason_and_without_nan() {
                 let mut trainer = Trainer::new(start, alone(examples.clone()), TrainingSettings { method, stopping })
                     .expect("it can be tried");
                 while trainer.step().is_none() {}
-                let place = format!("{what}, {method}, first setting {first:?}: {:?}", trainer.stop_reason());
-                assert_ne!(trainer.stop_reason(), Some(StopReason::Stopped), "{place}");
+                let case = format!("{what}, {method}, first setting {first:?}: {:?}", trainer.stop_reason());
+                assert_ne!(trainer.stop_reason(), Some(StopReason::Stopped), "{case}");
                 for epoch in trainer.history() {
                     let numbers = [epoch.training_mse, epoch.gradient_norm, epoch.parameter];
-                    assert!(numbers.iter().all(|number| number.is_finite()), "{place}: {epoch:?}");
+                    assert!(numbers.iter().all(|number| number.is_finite()), "{case}: {epoch:?}");
                 }
                 assert!(
                     trainer.best().weights().iter().all(|weight| weight.is_finite()),
-                    "{place}"
+                    "{case}"
                 );
             }
         }

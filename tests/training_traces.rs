@@ -18,6 +18,16 @@ struct Traces {
     start: Vec<f64>,
     weights_by_epoch: BTreeMap<String, Vec<Vec<f64>>>,
     effective_parameters: Vec<f64>,
+    rejecting: BTreeMap<String, Rejecting>,
+}
+
+/// A trace in which some steps are rejected.
+#[derive(Deserialize)]
+struct Rejecting {
+    first_setting: f64,
+    start: Vec<f64>,
+    weights: Vec<Vec<f64>>,
+    rejected: Vec<bool>,
 }
 
 fn traces() -> Traces {
@@ -25,7 +35,7 @@ fn traces() -> Traces {
 }
 
 impl Traces {
-    fn trainer(&self, method: Method) -> Trainer {
+    fn trainer(&self, method: Method, start: &[f64]) -> Trainer {
         let array =
             |rows: &[Vec<f64>]| Array2::from_shape_fn((rows.len(), rows[0].len()), |(row, column)| rows[row][column]);
         let training = Examples::new(array(&self.inputs).view(), array(&self.targets).view());
@@ -43,7 +53,7 @@ impl Traces {
             method,
             stopping: StoppingRules::default(),
         };
-        Trainer::new(Mlp::from_weights(shape, self.start.clone()), problem, settings).expect("it can be trained")
+        Trainer::new(Mlp::from_weights(shape, start.to_vec()), problem, settings).expect("it can be trained")
     }
 }
 
@@ -55,7 +65,7 @@ fn with_the_fixtures_settings(mut method: Method) -> Method {
     method
 }
 
-/// How far the weights may be from the fixture's: rounding, amplified where the problem is stiff (most where the output
+/// Largest relative difference from the fixture's weights: rounding, amplified where the problem is stiff (most where the output
 /// layer follows the hidden layer exactly, `varpro`) or where two gradients 5e-5 apart are subtracted (`scg`).
 fn tolerance(method: &str) -> f64 {
     match method {
@@ -63,6 +73,15 @@ fn tolerance(method: &str) -> f64 {
         "lm" | "br" => 1e-7,
         _ => 1e-12,
     }
+}
+
+/// The largest difference between two lists of weights, relative to the largest weight.
+fn apart(ours: &[f64], expected: &[f64]) -> f64 {
+    let largest = expected
+        .iter()
+        .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
+    let pairs = ours.iter().zip(expected);
+    pairs.map(|(ours, theirs)| (ours - theirs).abs()).fold(0.0, f64::max) / largest
 }
 
 #[test]
@@ -75,18 +94,32 @@ fn paths_agree_with_independent_programs() {
             assert_eq!(name, "gdm");
             continue;
         };
-        let mut trainer = traces.trainer(with_the_fixtures_settings(method));
+        let mut trainer = traces.trainer(with_the_fixtures_settings(method), &traces.start);
         for (epoch, expected) in (1..).zip(expected) {
             assert_eq!(trainer.step(), None, "{name}, epoch {epoch}");
-            let largest = expected
-                .iter()
-                .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
-            let pairs = trainer.present().weights().iter().zip(expected);
-            let apart = pairs.map(|(ours, theirs)| (ours - theirs).abs()).fold(0.0, f64::max);
-            assert!(
-                apart <= tolerance(name) * largest,
-                "{name}, epoch {epoch}: {apart:e} of {largest}"
-            );
+            let apart = apart(trainer.present().weights(), expected);
+            assert!(apart <= tolerance(name), "{name}, epoch {epoch}: {apart:e}");
+        }
+    }
+}
+
+/// The steps that the independent program rejects are rejected, and what follows a rejection is the same.
+#[test]
+fn paths_with_rejected_steps_agree_with_independent_programs() {
+    let traces = traces();
+    assert_eq!(traces.rejecting.len(), 2);
+    for (name, case) in &traces.rejecting {
+        let method = Method::all().into_iter().find(|method| method.short_name() == name);
+        let mut method = method.expect("it is offered");
+        *method.settings()[0].value = case.first_setting;
+        let mut trainer = traces.trainer(method, &case.start);
+        assert!(case.rejected.contains(&true), "{name}");
+        for (epoch, (expected, rejected)) in (1..).zip(case.weights.iter().zip(&case.rejected)) {
+            let before = trainer.present().clone();
+            assert_eq!(trainer.step(), None, "{name}, epoch {epoch}");
+            assert_eq!(trainer.present() == &before, *rejected, "{name}, epoch {epoch}");
+            let apart = apart(trainer.present().weights(), expected);
+            assert!(apart <= tolerance(name), "{name}, epoch {epoch}: {apart:e}");
         }
     }
 }
@@ -95,7 +128,7 @@ fn paths_agree_with_independent_programs() {
 fn the_effective_number_of_parameters_is_that_of_the_dense_hessian() {
     let traces = traces();
     let bayesian = Method::all().into_iter().find(|method| method.short_name() == "br");
-    let mut trainer = traces.trainer(bayesian.expect("it is offered"));
+    let mut trainer = traces.trainer(bayesian.expect("it is offered"), &traces.start);
     for expected in &traces.effective_parameters {
         trainer.step();
         let ours = trainer.latest().effective_parameters.expect("it is estimated");

@@ -1,5 +1,5 @@
-//! Levenberg-Marquardt as the textbooks write it, with the dense Jacobian and the same GEMM library: what the structured
-//! normal equations are measured against, in time and in the path they take.
+//! Levenberg-Marquardt as in the textbooks, with the dense Jacobian and the same GEMM library: the reference for the time
+//! and the path of the structured normal equations.
 
 use decoupler::{
     network::{Mlp, Shape},
@@ -79,7 +79,7 @@ impl Dense {
     }
 }
 
-/// Prints the ratio of the epochs' times and how far the two paths are apart after as many steps.
+/// Prints the ratio of the epochs' times and the largest difference between the two paths.
 pub(crate) fn print() {
     let shape = Shape {
         inputs: 30,

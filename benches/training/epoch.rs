@@ -1,4 +1,4 @@
-//! An epoch of Levenberg-Marquardt against the one product that it cannot do without.
+//! Time of an epoch of Levenberg-Marquardt relative to its largest matrix product.
 
 use std::hint::black_box;
 

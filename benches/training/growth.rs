@@ -1,4 +1,4 @@
-//! How an epoch's time and memory grow with samples, hidden nodes and the array.
+//! Growth of an epoch's time and memory with samples, hidden nodes and the array.
 
 use decoupler::training::Method;
 

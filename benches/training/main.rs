@@ -1,8 +1,8 @@
-//! How fast training is: `cargo bench --no-default-features --bench training`, or a part of it with its name behind
+//! Speed of training: `cargo bench --no-default-features --bench training`, or a part of it with its name behind
 //! `--`: `epoch`, `dense`, `sizes`, `growth` or `methods`.
 //!
-//! Every figure is a median, and what is compared is measured in turns within the same run, since a machine's speed
-//! drifts. Only ratios are worth remembering.
+//! Every figure is a median. Figures that are compared are measured in turns within one run, since a machine's speed
+//! drifts; only ratios are comparable between runs.
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs)]
 

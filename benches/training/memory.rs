@@ -1,4 +1,4 @@
-//! The most memory that a training takes, measured by a process of its own.
+//! Peak memory of a training, measured in a separate process.
 
 use std::{fs, process::Command};
 
@@ -7,11 +7,11 @@ use rayon::ThreadPoolBuilder;
 
 use crate::problem::Sizes;
 
-/// How this program is told to be the process that is measured.
+/// Argument that makes this program the measured process.
 const FLAG: &str = "--peak-of";
 
-/// Megabytes of a process that trains a few epochs of Levenberg-Marquardt on one thread; `None` where the system does
-/// not tell.
+/// Returns the peak memory in megabytes of a process that trains a few epochs of Levenberg-Marquardt on one thread; `None`
+/// where the system does not report it.
 pub(crate) fn peak_mb(sizes: Sizes) -> Option<f64> {
     let Sizes { shape, samples } = sizes;
     let numbers = [shape.inputs, shape.hidden, shape.outputs, samples].map(|number| number.to_string());
@@ -21,7 +21,7 @@ pub(crate) fn peak_mb(sizes: Sizes) -> Option<f64> {
     Some(kilobytes * 1024.0 / 1e6)
 }
 
-/// What to train if this is the process that is measured.
+/// Returns the sizes to train if this is the measured process.
 pub(crate) fn asked(arguments: &[String]) -> Option<Sizes> {
     let (flag, numbers) = arguments.split_first()?;
     let numbers: Vec<usize> = numbers.iter().filter_map(|number| number.parse().ok()).collect();
@@ -38,7 +38,7 @@ pub(crate) fn asked(arguments: &[String]) -> Option<Sizes> {
     }
 }
 
-/// Trains and prints the most kilobytes held, as Linux tells them.
+/// Trains and prints the peak memory in kilobytes, as Linux reports it.
 pub(crate) fn print_peak(sizes: Sizes) {
     let pool = ThreadPoolBuilder::new().num_threads(1).build();
     pool.expect("a thread can be had").install(|| {

@@ -1,4 +1,4 @@
-//! What each method reaches on the paper's main experiment: same sets, same split and same start for all.
+//! Accuracy of each method on the paper's main experiment, with the same sets, split and start for all.
 
 use std::time::Duration;
 
@@ -11,10 +11,10 @@ use decoupler::{
 use crate::timing::median;
 
 const SEEDS: [u64; 5] = [0, 1, 2, 3, 4];
-/// As long as each method may take: several times what Levenberg-Marquardt needs.
+/// Time limit of each method: several times what Levenberg-Marquardt needs.
 const MOST_TIME: Duration = Duration::from_secs(5);
 
-/// What a training came to.
+/// Result of a training.
 struct Outcome {
     epochs: f64,
     seconds: f64,
@@ -58,7 +58,7 @@ pub(crate) fn print() {
         SEEDS.len()
     );
     println!(
-        "rose 6 times in a row, the gradient vanished, mu grew too large) or after {} seconds.\n",
+        "reached no new best for 6 epochs, the gradient vanished, mu grew too large) or after {} seconds.\n",
         MOST_TIME.as_secs()
     );
     println!("| method | epochs | seconds | Z % | X % | ended by time |\n|---|---:|---:|---:|---:|---:|");

@@ -9,7 +9,7 @@ use rayon::ThreadPoolBuilder;
 
 use crate::timing::{median, time_ms};
 
-/// A network and how many samples it is trained with.
+/// Sizes of a network and its training set.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sizes {
     pub(crate) shape: Shape,
@@ -17,7 +17,7 @@ pub(crate) struct Sizes {
 }
 
 impl Sizes {
-    /// An array with so many nodes on each row-wire: its readings, and the x and z of its nodes.
+    /// Sizes for an array with `nodes` nodes on each row-wire: its readings in, the x and z of its nodes out.
     pub(crate) fn array(nodes: usize, hidden: usize, samples: usize) -> Self {
         let shape = Shape {
             inputs: 3 * nodes,
@@ -43,7 +43,7 @@ impl Sizes {
         Trainer::new(start, problem, settings).expect("it can be trained")
     }
 
-    /// Median milliseconds of an epoch.
+    /// Returns the median time of an epoch in milliseconds.
     pub(crate) fn epoch_ms(self, method: Method, threads: usize, epochs: usize) -> f64 {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)

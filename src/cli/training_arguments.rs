@@ -41,7 +41,7 @@ pub(super) struct TrainingArguments {
     /// Training error (mse, scaled) at which training ends [default: 0]
     #[arg(long, value_name = "MSE", value_parser = number)]
     goal: Option<f64>,
-    /// Consecutive epochs in which the validation error may rise before training ends [default: 6]
+    /// Validation failures, epochs without a new best validation error, that end training [default: 6]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     max_fail: Option<usize>,
     /// Norm of the gradient below which training ends [default: 1e-7]

@@ -377,9 +377,7 @@ mod tests {
         let mut rng = Seed(1).rng(Stream::Expectation);
         let mut posterior = Posterior::new(&model, &Scene::default(), &[0, 1], &mut rng).unwrap();
         let mut coordinates = vec![0.0; 12];
-        let report = posterior
-            .solve(1, set.sample_readings(3), &mut coordinates)
-            .unwrap();
+        let report = posterior.solve(1, set.sample_readings(3), &mut coordinates).unwrap();
         assert_eq!((report.spread_mm, report.converged), (None, true));
         for (ours, truth) in coordinates.iter().zip(set.sample_targets(3)) {
             assert!((ours - truth).abs() < 1e-9);

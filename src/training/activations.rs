@@ -1,3 +1,5 @@
+//! The outputs and errors of the layers, block by block of samples.
+
 use std::ops::Range;
 
 use faer::{Accum, Mat, MatRef, Par, linalg::matmul::matmul};
@@ -10,12 +12,12 @@ use super::{
 };
 use crate::network::{Mlp, Shape, tanh_in_place};
 
-/// The most memory for keeping the activations of all blocks; above it they are made anew for each use.
+/// Most memory for keeping the activations of all blocks; above it they are recomputed for each use.
 const LARGEST_KEPT_BYTES: usize = 32 << 20;
 
-/// What the layers answer for one block; room that is used again for every block.
+/// Hidden outputs and errors of one block, in memory that is used again for every block.
 #[derive(Clone, Debug)]
-pub struct Activations {
+pub(super) struct Activations {
     /// H̃ = [H, 1]: block × (hidden + 1).
     pub(super) hidden: Mat<f64>,
     /// E = H̃V − T: block × outputs.
@@ -23,8 +25,8 @@ pub struct Activations {
 }
 
 impl Activations {
-    /// Room for a network of this size.
-    pub fn new(shape: Shape) -> Self {
+    /// Allocates for a network of this shape.
+    pub(super) fn new(shape: Shape) -> Self {
         Self {
             hidden: Mat::from_fn(
                 BLOCK,
@@ -62,15 +64,22 @@ impl Activations {
         }
         squares
     }
+
+    /// Mean squared error of `mlp` over samples and outputs.
+    pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
+        let blocks = examples.blocks().iter();
+        let squares = blocks.map(|block| self.forward(mlp, block)).sum::<f64>();
+        squares / examples.errors()
+    }
 }
 
-/// The activations of every block at the weights last evaluated, so that a step that is accepted need not run the
-/// network a second time. Where they would take too much memory, room for one block of each part of the samples.
+/// The activations of every block at the weights last evaluated, so that the network is not run a second time when a step
+/// is accepted. Where they would take too much memory, only buffers of one block for each part of the samples.
 #[derive(Debug)]
 pub(super) struct KeptActivations {
     /// One for each block, or one for each part.
-    rooms: Vec<Activations>,
-    made_anew: bool,
+    buffers: Vec<Activations>,
+    recomputed: bool,
     parts: usize,
     /// The weights evaluated last; empty before the first.
     weights: Vec<f64>,
@@ -78,14 +87,14 @@ pub(super) struct KeptActivations {
 }
 
 impl KeptActivations {
-    /// Room for samples that are worked on in up to `parts` parts.
+    /// Allocates for samples that are worked on in up to `parts` parts.
     pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
         let bytes = examples.samples() * (shape.hidden + 1 + shape.outputs) * size_of::<f64>();
-        let made_anew = bytes > LARGEST_KEPT_BYTES;
-        let rooms = if made_anew { parts } else { examples.blocks().len() };
+        let recomputed = bytes > LARGEST_KEPT_BYTES;
+        let count = if recomputed { parts } else { examples.blocks().len() };
         Self {
-            rooms: vec![Activations::new(shape); rooms],
-            made_anew,
+            buffers: vec![Activations::new(shape); count],
+            recomputed,
             parts,
             weights: Vec::new(),
             squares: 0.0,
@@ -104,24 +113,24 @@ impl KeptActivations {
 
     fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         let blocks = examples.blocks();
-        let mut rooms = self.rooms.as_mut_slice();
+        let mut buffers = self.buffers.as_mut_slice();
         let part = |blocks: Range<usize>| {
-            let count = if self.made_anew { 1 } else { blocks.len() };
-            let (own, others) = std::mem::take(&mut rooms).split_at_mut(count);
-            rooms = others;
+            let count = if self.recomputed { 1 } else { blocks.len() };
+            let (own, others) = std::mem::take(&mut buffers).split_at_mut(count);
+            buffers = others;
             (blocks, own, 0.0)
         };
         let mut parts: Vec<_> = parts(blocks.len(), self.parts).map(part).collect();
-        for_each_part(&mut parts, |(numbers, rooms, squares)| {
+        for_each_part(&mut parts, |(numbers, own, squares)| {
             for (index, block) in blocks[numbers.clone()].iter().enumerate() {
-                *squares += rooms[index % rooms.len()].forward(mlp, block);
+                *squares += own[index % own.len()].forward(mlp, block);
             }
         });
         parts.iter().map(|(.., squares)| squares).sum()
     }
 
-    /// Does `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided into
-    /// as many parts as there are `sums`, and the blocks of each part, in order, come with that part's own.
+    /// Calls `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided into
+    /// as many parts as there are `sums`; `work` gets the blocks of each part in order, with the sums of that part.
     pub(super) fn for_each_block<S: Send>(
         &mut self,
         mlp: &Mlp,
@@ -130,8 +139,8 @@ impl KeptActivations {
         work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
     ) {
         let numbers = parts(examples.blocks().len(), sums.len());
-        if self.made_anew {
-            let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.rooms).collect();
+        if self.recomputed {
+            let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.buffers).collect();
             for_each_part(&mut parts, |((numbers, sums), activations)| {
                 for number in numbers.clone() {
                     activations.forward(mlp, &examples.blocks()[number]);
@@ -142,16 +151,16 @@ impl KeptActivations {
             let mut parts: Vec<_> = numbers.zip(sums).collect();
             for_each_part(&mut parts, |(numbers, sums)| {
                 for number in numbers.clone() {
-                    work(sums, &BlockNow::new(examples, number, &self.rooms[number]));
+                    work(sums, &BlockNow::new(examples, number, &self.buffers[number]));
                 }
             });
         }
     }
 }
 
-/// A block of samples with what the network makes of it.
+/// A block of samples with its activations.
 pub(super) struct BlockNow<'a> {
-    /// Which block, from 0.
+    /// Index of the block.
     pub(super) number: usize,
     pub(super) block: &'a Block,
     activations: &'a Activations,
@@ -174,5 +183,25 @@ impl<'a> BlockNow<'a> {
     /// E: samples × outputs.
     pub(super) fn errors(&self) -> MatRef<'_, f64> {
         self.activations.errors.as_ref().subrows(0, self.block.samples())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::training::examples::tests::random_mlp;
+
+    #[test]
+    fn the_error_is_that_of_the_network_itself() {
+        let mlp = random_mlp(3, 5, 2, 1);
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut draw = |columns| Array2::from_shape_simple_fn((BLOCK * 2 + 7, columns), || rng.random_range(-1.0..1.0));
+        let (inputs, targets) = (draw(3), draw(2));
+        let expected = (mlp.forward(inputs.view()) - &targets).mapv(|e| e * e).mean().unwrap();
+        let mse = Activations::new(mlp.shape()).mse(&mlp, &Examples::new(inputs.view(), targets.view()));
+        assert!((mse - expected).abs() < 1e-14);
     }
 }

@@ -1,8 +1,10 @@
+//! Gradient descent with momentum and an adaptive learning rate (`traingdx`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -12,15 +14,15 @@ use crate::network::Mlp;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveDescentSettings {
-    /// First learning rate.
+    /// Initial learning rate.
     pub learning_rate: f64,
     /// The momentum constant mc.
     pub momentum: f64,
     /// Factor on the learning rate after a step that lowers the error.
     pub rate_increase: f64,
-    /// Factor on the learning rate after a step that is taken back.
+    /// Factor on the learning rate after a rejected step.
     pub rate_decrease: f64,
-    /// A step that raises the error by more than this factor is taken back.
+    /// A step that raises the error by more than this factor is rejected.
     pub largest_error_increase: f64,
 }
 
@@ -37,12 +39,12 @@ impl Default for AdaptiveDescentSettings {
 }
 
 impl AdaptiveDescentSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         let default = Self::default();
         vec![
             Setting {
                 name: "learning rate",
-                meaning: "First length of a step per length of the gradient; it adapts from there.",
+                meaning: "Initial step length relative to the length of the gradient; it adapts from there.",
                 default: default.learning_rate,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.learning_rate,
@@ -63,14 +65,14 @@ impl AdaptiveDescentSettings {
             },
             Setting {
                 name: "rate decrease",
-                meaning: "Factor on the learning rate after a step that is taken back.",
+                meaning: "Factor on the learning rate after a rejected step.",
                 default: default.rate_decrease,
                 range: 1e-6..=0.999,
                 value: &mut self.rate_decrease,
             },
             Setting {
                 name: "largest error increase",
-                meaning: "A step that raises the error by more than this factor is taken back.",
+                meaning: "A step that raises the error by more than this factor is rejected.",
                 default: default.largest_error_increase,
                 range: 1.0..=1e6,
                 value: &mut self.largest_error_increase,
@@ -79,13 +81,20 @@ impl AdaptiveDescentSettings {
     }
 }
 
-/// Above this a learning rate says nothing; it keeps a long run of successes from overflowing.
+/// Largest learning rate, which keeps a long run of accepted steps from overflowing.
 const LARGEST_RATE: f64 = 1e300;
 
-/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). The step is
-/// `dX = mc·dXprev + lr·(1 − mc)·g`, g the negative gradient. If it lowers the error, lr grows by `rate_increase`; if it
-/// raises the error by more than the factor `largest_error_increase`, it is taken back, lr shrinks by `rate_decrease`
-/// and the momentum is forgotten. (The reference manual prints `lr·mc·g`; we use 1 − mc, as in `traingdm`.)
+/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). With gX the negative
+/// gradient, each epoch tries
+///
+/// ```text
+/// dX = mc·dXprev + lr·(1 − mc)·gX
+/// ```
+///
+/// If the step lowers the error, lr grows by the factor `rate_increase`. If it raises the error by more than the factor
+/// `largest_error_increase`, it is rejected: the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of the
+/// next epoch is `lr·gX` with the reduced lr (0 if that overflows). Before the first epoch dXprev is 0. (The reference
+/// manual prints `lr·mc·gX` in the step; we use 1 − mc, as in `traingdm`.)
 pub(super) struct AdaptiveDescent {
     settings: AdaptiveDescentSettings,
     state: AdaptiveState,
@@ -97,17 +106,36 @@ pub(super) struct AdaptiveDescent {
     candidate: Mlp,
 }
 
-/// What `AdaptiveDescent` remembers.
+/// State of gradient descent with an adaptive learning rate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveState {
-    pub(super) learning_rate: f64,
-    pub(super) step: Vec<f64>,
+    learning_rate: f64,
+    step: Vec<f64>,
 }
 
-impl AdaptiveDescent {
-    /// Takes the gradient at the start.
-    pub(super) fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Checked for AdaptiveState {
+    fn vectors(&self) -> Vec<&[f64]> {
+        vec![&self.step]
+    }
+}
+
+impl Algorithm for AdaptiveDescent {
+    type Settings = AdaptiveDescentSettings;
+    type State = AdaptiveState;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "gdx",
+        name: "Adaptive rate with momentum",
+        summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
+        parameter_name: "learning rate",
+    };
+
+    fn list(settings: &mut AdaptiveDescentSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let now = backpropagation.evaluate(mlp, examples);
         let method = Self {
@@ -124,14 +152,10 @@ impl AdaptiveDescent {
         (method, now)
     }
 
-    /// Goes on with the rate and step of an interrupted training.
-    pub(super) fn resume(mut self, state: AdaptiveState) -> Self {
+    fn restore(&mut self, state: AdaptiveState) {
         self.state = state;
-        self
     }
-}
 
-impl Algorithm for AdaptiveDescent {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let AdaptiveState { learning_rate, step } = &mut self.state;
         let momentum = self.settings.momentum;
@@ -150,7 +174,10 @@ impl Algorithm for AdaptiveDescent {
             self.now = then;
         } else {
             *learning_rate *= self.settings.rate_decrease;
-            step.fill(0.0);
+            for (step, slope) in step.iter_mut().zip(&self.gradient) {
+                let next = -*learning_rate * slope;
+                *step = if next.is_finite() { next } else { 0.0 };
+            }
         }
         Ok(self.now)
     }
@@ -159,8 +186,8 @@ impl Algorithm for AdaptiveDescent {
         self.state.learning_rate
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::AdaptiveDescent(self.state.clone())
+    fn state(&self) -> AdaptiveState {
+        self.state.clone()
     }
 }
 
@@ -185,5 +212,21 @@ mod tests {
             .last()
             .unwrap();
         assert!(last.mse < start.mse, "{last:?}");
+    }
+
+    /// `traingdx` keeps `lr·gX` with the reduced rate as the step that momentum mixes in next.
+    #[test]
+    fn after_a_rejected_step_momentum_mixes_in_the_gradient_at_the_reduced_rate() {
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = AdaptiveDescentSettings {
+            learning_rate: 1e3,
+            ..AdaptiveDescentSettings::default()
+        };
+        let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
+        let gradient = method.gradient.clone();
+        assert_eq!(method.step(&mut mlp, &examples), Ok(start), "the step is rejected");
+        for (step, slope) in method.state().step.iter().zip(&gradient) {
+            assert_eq!(*step, -700.0 * slope);
+        }
     }
 }

@@ -1,87 +1,80 @@
-use serde::{Deserialize, Serialize};
+//! The interface of a training method: each method's file implements it, and [`super::Method`] lists the methods.
 
-use super::{
-    Evaluation, Examples, StopReason, adaptive_descent::AdaptiveState, bayesian_regularization::BayesianState,
-    scaled_conjugate_gradient::ConjugateState, variable_projection::ProjectionState,
-};
-use crate::network::Mlp;
+use super::{Evaluation, Examples, Setting, StopReason};
+use crate::network::{Mlp, Shape};
 
-/// A method at work.
-pub(super) trait Algorithm: Send + Sync {
+/// A training method at work on one network.
+pub(super) trait Algorithm: Sized + Send + Sync {
+    /// Settings, chosen before training.
+    type Settings: Default;
+    /// Everything that is carried from epoch to epoch beside the weights.
+    type State;
+
+    /// Name and description for menus, tables and the terminal.
+    const DESCRIPTION: Description;
+
+    /// The field's usual settings.
+    fn default_settings() -> Self::Settings {
+        Self::Settings::default()
+    }
+
+    /// The settings, to be shown and changed.
+    fn list(settings: &mut Self::Settings) -> Vec<Setting<'_>>;
+
+    /// About how many bytes the method's equations take for a network of this shape and so many samples.
+    fn equations_bytes(_shape: Shape, _samples: usize) -> usize {
+        0
+    }
+
+    /// Starts from the weights of `mlp`.
+    fn new(settings: Self::Settings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation);
+
+    /// Restores the state of an interrupted training.
+    fn restore(&mut self, state: Self::State);
+
     /// Moves `mlp` by one epoch.
     ///
     /// # Errors
-    /// Why there is no further epoch; `mlp` may then be anywhere.
+    /// The reason why there is no further epoch; the weights of `mlp` are then unspecified.
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason>;
 
-    /// What [`super::EpochRecord::parameter`] records.
+    /// Value recorded as [`super::EpochRecord::parameter`].
     fn parameter(&self) -> f64;
 
-    /// The number of weights that the data determine, for a method that estimates it.
+    /// Number of weights that the data determine, for a method that estimates it.
     fn effective_parameters(&self) -> Option<f64> {
         None
     }
 
-    /// What it remembers from epoch to epoch.
-    fn state(&self) -> MethodState;
+    /// The state, to be saved.
+    fn state(&self) -> Self::State;
 }
 
-/// What a method remembers from epoch to epoch, beside the weights: with it a training continues as if it had never
-/// been interrupted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MethodState {
-    /// Nothing.
-    GradientDescent,
-    /// The gradient before the present one.
-    Momentum(Vec<f64>),
-    /// The last step.
-    StepMomentum(Vec<f64>),
-    /// Learning rate and last step.
-    AdaptiveDescent(AdaptiveState),
-    /// The gradient before the present one, and each weight's step length.
-    Resilient {
-        /// The gradient before the present one.
-        previous_gradient: Vec<f64>,
-        /// Each weight's step length.
-        lengths: Vec<f64>,
-    },
-    /// Direction, residual and scale.
-    ScaledConjugateGradient(ConjugateState),
-    /// The damping.
-    LevenbergMarquardt {
-        /// The damping.
-        mu: f64,
-    },
-    /// Damping and the weighing of error against weights.
-    BayesianRegularization(BayesianState),
-    /// Damping, and whether the output layer was solved for.
-    VariableProjection(ProjectionState),
+/// Name and description of a method.
+pub(super) struct Description {
+    /// Name in the terminal and in tables.
+    pub(super) short_name: &'static str,
+    pub(super) name: &'static str,
+    /// One sentence.
+    pub(super) summary: &'static str,
+    /// Name of [`Algorithm::parameter`].
+    pub(super) parameter_name: &'static str,
 }
 
-impl MethodState {
-    /// Whether it is a state for this many weights, of finite numbers.
-    pub(super) fn fits(&self, weights: usize) -> bool {
-        let vectors: &[&[f64]] = match self {
-            Self::GradientDescent
-            | Self::LevenbergMarquardt { .. }
-            | Self::BayesianRegularization(_)
-            | Self::VariableProjection(_) => &[],
-            Self::Momentum(vector) | Self::StepMomentum(vector) => &[vector],
-            Self::AdaptiveDescent(state) => &[&state.step],
-            Self::Resilient {
-                previous_gradient,
-                lengths,
-            } => &[previous_gradient, lengths],
-            Self::ScaledConjugateGradient(state) => &[&state.p, &state.r],
-        };
-        let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
-        vectors.iter().all(fits)
+/// State of a method, as read from a file.
+pub(super) trait Checked {
+    /// Vectors with one entry for each weight.
+    fn vectors(&self) -> Vec<&[f64]>;
+}
+
+impl Checked for Vec<f64> {
+    fn vectors(&self) -> Vec<&[f64]> {
+        vec![self]
     }
 }
 
-/// Puts `candidate` one step from `mlp`; weights beyond the end of `step` stay those of `mlp`.
-pub(super) fn place(candidate: &mut Mlp, mlp: &Mlp, step: &[f64]) {
+/// Sets `candidate` to the weights of `mlp` plus `step`; weights beyond the end of `step` are those of `mlp`.
+pub(super) fn add_step(candidate: &mut Mlp, mlp: &Mlp, step: &[f64]) {
     let candidate = candidate.weights_mut();
     candidate.copy_from_slice(mlp.weights());
     for (weight, step) in candidate.iter_mut().zip(step) {

@@ -1,3 +1,5 @@
+//! The gradient of the mean squared error.
+
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
 use super::{
@@ -7,8 +9,7 @@ use super::{
 };
 use crate::network::Mlp;
 
-/// The gradient of the mean squared error by back-propagation (section 3.1 of the paper), for any method that
-/// descends by it.
+/// Computes the gradient of the mean squared error by back-propagation (section 3.1 of the paper).
 #[derive(Clone, Debug)]
 pub(super) struct Backpropagation {
     activations: Activations,
@@ -27,7 +28,7 @@ impl Backpropagation {
         }
     }
 
-    /// Error and gradient at the weights of `mlp`.
+    /// Returns the error at the weights of `mlp` and computes its gradient.
     pub(super) fn evaluate(&mut self, mlp: &Mlp, examples: &Examples) -> Evaluation {
         let shape = mlp.shape();
         self.gradient.fill(0.0);
@@ -99,7 +100,7 @@ mod tests {
             let mse = |by: f64| {
                 let mut moved = mlp.clone();
                 moved.weights_mut()[index] += by;
-                examples.mse(&moved, &mut Activations::new(moved.shape()))
+                Activations::new(moved.shape()).mse(&moved, &examples)
             };
             let difference = (mse(step) - mse(-step)) / (2.0 * step);
             assert!((ours - difference).abs() < 1e-8, "weight {index}: {ours} {difference}");

@@ -1,95 +1,35 @@
+//! Bayesian regularisation (`trainbr`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, NormalEquations, Setting, StopReason,
-    algorithm::{Algorithm, MethodState, place},
-    levenberg_marquardt::SMALLEST_MU,
-    normal_equations::Way,
+    Damping, Evaluation, Examples, FactoredEquations, Setting, StopReason,
+    algorithm::{Algorithm, Checked, Description, add_step},
 };
-use crate::network::Mlp;
-
-/// Settings of Bayesian regularisation, with the field's usual defaults (`trainbr`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BayesianRegularizationSettings {
-    /// First damping.
-    pub mu: f64,
-    /// Factor on mu after a step that lowers the objective.
-    pub mu_decrease: f64,
-    /// Factor on mu after a step that does not.
-    pub mu_increase: f64,
-    /// Damping at which training gives up.
-    pub mu_max: f64,
-}
-
-impl Default for BayesianRegularizationSettings {
-    fn default() -> Self {
-        Self {
-            mu: 0.005,
-            mu_decrease: 0.1,
-            mu_increase: 10.0,
-            mu_max: 1e10,
-        }
-    }
-}
-
-impl BayesianRegularizationSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "mu",
-                meaning: "First damping. Large: short steps down the gradient; small: full Gauss-Newton steps.",
-                default: default.mu,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu,
-            },
-            Setting {
-                name: "mu decrease",
-                meaning: "Factor on mu after a step that lowers the regularised error.",
-                default: default.mu_decrease,
-                range: 1e-6..=0.999,
-                value: &mut self.mu_decrease,
-            },
-            Setting {
-                name: "mu increase",
-                meaning: "Factor on mu after a step that does not lower the regularised error.",
-                default: default.mu_increase,
-                range: 1.001..=1e6,
-                value: &mut self.mu_increase,
-            },
-            Setting {
-                name: "largest mu",
-                meaning: "Training ends when mu exceeds this: no step lowers the regularised error any more.",
-                default: default.mu_max,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu_max,
-            },
-        ]
-    }
-}
+use crate::network::{Mlp, Shape};
 
 /// Levenberg-Marquardt on `F = β Σe² + α Σw²`, with α and β estimated from the data (MacKay 1992; Foresee and Hagan
 /// 1997; `trainbr`). After every accepted step, with N weights and n errors,
 ///
 /// ```text
-/// γ = N − α tr (β JᵀJ + α I)⁻¹        the weights that the data determine
+/// γ = N − α tr (β JᵀJ + α I)⁻¹        effective number of parameters
 /// α = γ / (2 Σw²)                     β = (n − γ) / (2 Σe²)
 /// ```
 ///
-/// The recorded gradient is that of F / (β n): what becomes small where F is smallest. Unlike the field's toolbox, which
-/// switches them off for this method, our stopping rules on the validation error hold here as for every other method.
+/// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox switches the
+/// stopping rules on the validation error off for this method; here they hold as for every other method.
 pub(super) struct BayesianRegularization {
-    settings: BayesianRegularizationSettings,
+    damping: Damping,
     state: BayesianState,
-    equations: NormalEquations,
+    equations: FactoredEquations,
+    /// Number of errors n.
     errors: f64,
     mse: f64,
     step: Vec<f64>,
     candidate: Mlp,
 }
 
-/// What `BayesianRegularization` remembers.
+/// State of Bayesian regularisation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BayesianState {
@@ -102,39 +42,23 @@ pub struct BayesianState {
     effective_parameters: f64,
 }
 
+impl Checked for BayesianState {
+    fn vectors(&self) -> Vec<&[f64]> {
+        Vec::new()
+    }
+}
+
+impl BayesianState {
+    /// β Σe² + α Σw², with Σe² = `mse`·`errors`.
+    fn objective(&self, mse: f64, errors: f64, mlp: &Mlp) -> f64 {
+        self.beta * mse * errors + self.alpha * sum_of_squares(mlp)
+    }
+}
+
 impl BayesianRegularization {
-    /// Gathers the normal equations at the start, where all weights are taken as determined by the data.
-    pub(super) fn new(settings: BayesianRegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::solved_by(Way::Factored, mlp.shape(), examples);
-        let evaluation = equations.gather(mlp, examples);
-        let weights = mlp.weights().len();
-        let mut method = Self {
-            settings,
-            state: BayesianState {
-                mu: settings.mu,
-                alpha: 1.0,
-                beta: 1.0,
-                effective_parameters: weights as f64,
-            },
-            equations,
-            errors: examples.errors(),
-            mse: evaluation.mse,
-            step: vec![0.0; weights],
-            candidate: mlp.clone(),
-        };
-        method.weigh(mlp);
-        let evaluation = method.regularized(mlp);
-        (method, evaluation)
-    }
-
-    /// Goes on with the weighing of an interrupted training.
-    pub(super) fn resume(mut self, state: BayesianState) -> Self {
-        self.state = state;
-        self
-    }
-
-    /// α and β from γ; each 1 where it would not be a positive number, and neither so extreme that their ratio overflows.
-    fn weigh(&mut self, mlp: &Mlp) {
+    /// Updates α and β from γ; each is 1 where the formula gives no positive number, and neither is so extreme that their
+    /// ratio overflows.
+    fn update_weighting(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
         let bounded = |value: f64| {
             if value > 0.0 && value.is_finite() {
@@ -143,13 +67,8 @@ impl BayesianRegularization {
                 1.0
             }
         };
-        self.state.alpha = bounded(gamma / (2.0 * squares(mlp)));
+        self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(mlp)));
         self.state.beta = bounded((self.errors - gamma) / (2.0 * self.mse * self.errors));
-    }
-
-    /// β Σe² + α Σw².
-    fn objective(&self, mse: f64, mlp: &Mlp) -> f64 {
-        self.state.beta * mse * self.errors + self.state.alpha * squares(mlp)
     }
 
     /// The present error with the gradient of F / (β n).
@@ -163,35 +82,82 @@ impl BayesianRegularization {
 }
 
 impl Algorithm for BayesianRegularization {
-    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let objective = self.objective(self.mse, mlp);
-        while self.state.mu <= self.settings.mu_max {
-            let BayesianState { mu, alpha, beta, .. } = self.state;
-            let damping = (mu + alpha) / beta;
-            if self
-                .equations
-                .solve_with_decay(mlp, examples, damping, alpha / beta, &mut self.step)
-            {
-                place(&mut self.candidate, mlp, &self.step);
-                let mse = self.equations.mse(&self.candidate, examples);
-                // Written so that NaN is rejected.
-                if self.objective(mse, &self.candidate) < objective {
-                    std::mem::swap(mlp, &mut self.candidate);
-                    self.state.mu = (mu * self.settings.mu_decrease).max(SMALLEST_MU);
-                    self.mse = mse;
-                    self.equations.gather(mlp, examples);
-                    // Where rounding leaves no trace, γ stays as it was.
-                    if let Some(trace) = self.equations.trace_of_inverse(mlp, alpha / beta) {
-                        let weights = self.step.len() as f64;
-                        self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
-                    }
-                    self.weigh(mlp);
-                    return Ok(self.regularized(mlp));
-                }
-            }
-            self.state.mu *= self.settings.mu_increase;
+    type Settings = Damping;
+    type State = BayesianState;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "br",
+        name: "Bayesian regularisation",
+        summary: "Levenberg-Marquardt that keeps weights small, weighing them against the error by what the data can \
+                  determine: for few or noisy samples.",
+        parameter_name: "mu",
+    };
+
+    fn default_settings() -> Damping {
+        Damping {
+            mu: 0.005,
+            ..Damping::default()
         }
-        Err(StopReason::MuLarge)
+    }
+
+    fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
+        settings.list(Self::default_settings())
+    }
+
+    fn equations_bytes(shape: Shape, samples: usize) -> usize {
+        FactoredEquations::factored_bytes(shape, samples)
+    }
+
+    /// Starts with γ = N, as if the data determined all weights.
+    fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut equations = FactoredEquations::factored(mlp.shape(), examples);
+        let evaluation = equations.gather(mlp, examples);
+        let weights = mlp.weights().len();
+        let mut method = Self {
+            damping,
+            state: BayesianState {
+                mu: damping.mu,
+                alpha: 1.0,
+                beta: 1.0,
+                effective_parameters: weights as f64,
+            },
+            equations,
+            errors: examples.errors(),
+            mse: evaluation.mse,
+            step: vec![0.0; weights],
+            candidate: mlp.clone(),
+        };
+        method.update_weighting(mlp);
+        let evaluation = method.regularized(mlp);
+        (method, evaluation)
+    }
+
+    fn restore(&mut self, state: BayesianState) {
+        self.state = state;
+    }
+
+    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+        let weighting = self.state.clone();
+        let BayesianState { alpha, beta, .. } = weighting;
+        let objective = weighting.objective(self.mse, self.errors, mlp);
+        self.mse = self.damping.search(&mut self.state.mu, |mu| {
+            let damping = (mu + alpha) / beta;
+            self.equations
+                .solve_with_decay(mlp, examples, damping, alpha / beta, &mut self.step)?;
+            add_step(&mut self.candidate, mlp, &self.step);
+            let mse = self.equations.mse(&self.candidate, examples);
+            // False for NaN.
+            (weighting.objective(mse, self.errors, &self.candidate) < objective).then_some(mse)
+        })?;
+        std::mem::swap(mlp, &mut self.candidate);
+        self.equations.gather(mlp, examples);
+        // Where rounding leaves no trace, γ stays as it was.
+        if let Some(trace) = self.equations.trace_of_inverse(mlp, alpha / beta) {
+            let weights = self.step.len() as f64;
+            self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
+        }
+        self.update_weighting(mlp);
+        Ok(self.regularized(mlp))
     }
 
     fn parameter(&self) -> f64 {
@@ -202,12 +168,12 @@ impl Algorithm for BayesianRegularization {
         Some(self.state.effective_parameters)
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::BayesianRegularization(self.state.clone())
+    fn state(&self) -> BayesianState {
+        self.state.clone()
     }
 }
 
 /// Σw².
-fn squares(mlp: &Mlp) -> f64 {
+fn sum_of_squares(mlp: &Mlp) -> f64 {
     mlp.weights().iter().map(|weight| weight * weight).sum()
 }

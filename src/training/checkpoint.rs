@@ -1,3 +1,5 @@
+//! The state of a training, saved and resumed.
+
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -9,15 +11,15 @@ use super::{
 };
 use crate::network::{Mlp, Shape};
 
-/// Everything a [`Trainer`] holds but its samples. Resumed with the same samples it gives the same bits as a training
-/// that was never interrupted.
+/// Everything that a [`Trainer`] holds except its samples. A training resumed with the same samples gives bit-identical
+/// results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainerState {
     settings: TrainingSettings,
     shape: Shape,
     weights: Vec<f64>,
-    /// Training error of `weights`, by which the samples are recognised.
+    /// Training error of `weights`, which tells whether the samples are the same.
     mse: f64,
     best_weights: Vec<f64>,
     best_epoch: usize,
@@ -29,14 +31,14 @@ pub struct TrainerState {
     method: MethodState,
 }
 
-/// Why a training cannot be resumed.
+/// Reason why a training cannot be resumed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ResumeError {
     /// A setting is out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The parts do not fit together, or contain numbers that are not finite.
+    /// The parts contradict each other, or contain numbers that are not finite.
     #[error("the saved training is damaged: {0}")]
     Damaged(&'static str),
     /// The network does not fit the samples.
@@ -53,7 +55,7 @@ pub enum ResumeError {
         /// Of the samples.
         outputs: usize,
     },
-    /// The saved weights have another error on these samples than they had.
+    /// The saved weights have a different error on these samples.
     #[error(
         "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings and \
          the version of the program it was begun with"
@@ -66,11 +68,11 @@ pub enum ResumeError {
     },
 }
 
-/// How closely the saved error must be found again. Another machine's rounding stays far below.
+/// Relative difference up to which two training errors count as the same. Rounding on another machine stays far below.
 const SAME_ERROR: f64 = 1e-6;
 
 impl TrainerState {
-    /// How it is trained.
+    /// The method and the stopping rules.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
@@ -80,7 +82,7 @@ impl TrainerState {
         &self.history.0
     }
 
-    /// Checks what does not depend on the samples.
+    /// Checks everything that does not depend on the samples.
     fn check(&self) -> Result<(), ResumeError> {
         self.settings.method.check()?;
         self.settings.stopping.check()?;
@@ -121,16 +123,13 @@ impl TrainerState {
 }
 
 impl Trainer {
-    /// The state to be saved.
+    /// Returns the state, to be saved.
     pub fn state(&self) -> TrainerState {
         TrainerState {
             settings: self.settings,
             shape: self.mlp.shape(),
             weights: self.mlp.weights().to_vec(),
-            mse: self
-                .problem
-                .training
-                .mse(&self.mlp, &mut Activations::new(self.mlp.shape())),
+            mse: Activations::new(self.mlp.shape()).mse(&self.mlp, &self.problem.training),
             best_weights: self.best.mlp.weights().to_vec(),
             best_epoch: self.best.epoch,
             history: History(self.history.clone()),
@@ -142,7 +141,7 @@ impl Trainer {
         }
     }
 
-    /// Goes on where `state` was taken, with the same samples. A training that the user had stopped goes on.
+    /// Resumes a training from `state`, with the same samples. A training that the user had stopped goes on.
     ///
     /// # Errors
     /// A state that is damaged or belongs to other samples.
@@ -158,7 +157,7 @@ impl Trainer {
         }
         let mlp = Mlp::from_weights(shape, state.weights);
         let mut activations = Activations::new(shape);
-        let found = training.mse(&mlp, &mut activations);
+        let found = activations.mse(&mlp, training);
         let saved = state.mse;
         // False for NaN.
         let is_same = (found - saved).abs() <= SAME_ERROR * saved.abs();

@@ -1,4 +1,4 @@
-//! Products of columns, entry by entry, in the machine's vector registers.
+//! Elementwise products of columns, dispatched to the machine's SIMD instructions.
 
 use pulp::{Simd, WithSimd};
 
@@ -47,7 +47,7 @@ pub(super) fn add_scaled(sum: &mut [f64], factor: f64, a: &[f64]) {
     });
 }
 
-/// Multiplies `values` by the slopes of tanh where its values are `h`: 1 − h².
+/// Multiplies `values` by the derivatives of tanh where its values are `h`: 1 − h².
 pub(super) fn multiply_by_tanh_slopes(values: &mut [f64], h: &[f64]) {
     pulp::Arch::new().dispatch(|| {
         for (value, h) in values.iter_mut().zip(h) {
@@ -56,7 +56,7 @@ pub(super) fn multiply_by_tanh_slopes(values: &mut [f64], h: &[f64]) {
     });
 }
 
-/// Writes the slope of tanh where its value is `h`: 1 − h².
+/// Writes the derivative of tanh where its value is `h`: 1 − h².
 pub(super) fn tanh_slopes_into(slopes: &mut [f64], h: &[f64]) {
     pulp::Arch::new().dispatch(|| {
         for (slope, h) in slopes.iter_mut().zip(h) {
@@ -70,7 +70,7 @@ pub(super) fn subtract(outputs: &mut [f64], targets: &[f64]) -> f64 {
     pulp::Arch::new().dispatch(Subtraction { outputs, targets })
 }
 
-/// A type rather than a closure, which would be too long to be moved into the code for vector registers.
+/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
 struct Subtraction<'a> {
     outputs: &'a mut [f64],
     targets: &'a [f64],

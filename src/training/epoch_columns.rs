@@ -1,3 +1,5 @@
+//! The history of a training in files, column by column.
+
 use std::fmt;
 
 use serde::{
@@ -7,8 +9,8 @@ use serde::{
 
 use super::EpochRecord;
 
-/// The history of a training as columns of equal length: a third of the size of records, and what a plotting program
-/// wants.
+/// The history of a training as columns of equal length: a third of the size of records, and the shape that plotting
+/// programs read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Columns", into = "Columns")]
 pub(crate) struct History(pub(crate) Vec<EpochRecord>);
@@ -72,24 +74,24 @@ impl TryFrom<Columns> for History {
                 return Err(format!("history.{name} has {length} entries, but epoch has {epochs}"));
             }
         }
-        if let Some(place) = (0..epochs).find(|&place| columns.epoch[place] != place) {
-            return Err(format!("history.epoch: epoch {place} is missing"));
+        if let Some(missing) = (0..epochs).find(|&epoch| columns.epoch[epoch] != epoch) {
+            return Err(format!("history.epoch: epoch {missing} is missing"));
         }
-        let record = |place: usize| EpochRecord {
-            epoch: place,
-            training_mse: columns.training_mse[place].0,
-            validation_mse: columns.validation_mse[place].map(|number| number.0),
-            test_mse: columns.test_mse[place].map(|number| number.0),
-            gradient_norm: columns.gradient_norm[place].0,
-            parameter: columns.parameter[place].0,
-            effective_parameters: columns.effective_parameters[place].map(|number| number.0),
-            validation_failures: columns.validation_failures[place],
+        let record = |epoch: usize| EpochRecord {
+            epoch,
+            training_mse: columns.training_mse[epoch].0,
+            validation_mse: columns.validation_mse[epoch].map(|number| number.0),
+            test_mse: columns.test_mse[epoch].map(|number| number.0),
+            gradient_norm: columns.gradient_norm[epoch].0,
+            parameter: columns.parameter[epoch].0,
+            effective_parameters: columns.effective_parameters[epoch].map(|number| number.0),
+            validation_failures: columns.validation_failures[epoch],
         };
         Ok(Self((0..epochs).map(record).collect()))
     }
 }
 
-/// A number of a training that may have grown without bound. JSON knows no infinity and no NaN, so these are words.
+/// A number that may be infinite or NaN, which are words in the file since JSON has no such numbers.
 #[derive(Clone, Copy)]
 struct Number(f64);
 

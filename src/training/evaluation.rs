@@ -1,17 +1,19 @@
+//! Error and gradient at the present weights.
+
 use super::StopReason;
 
-/// Where a method stands: at the weights it has just reached.
+/// Error and gradient at the weights that a method has just reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evaluation {
     /// Mean squared error over samples and outputs, in scaled units.
     pub mse: f64,
-    /// Euclidean length of the gradient of what the method makes small: of [`Self::mse`], plus the weights' share where
-    /// the method regularises.
+    /// Euclidean norm of the gradient of the objective: of [`Self::mse`], plus the penalty on the weights where the method
+    /// regularises.
     pub gradient_norm: f64,
 }
 
 impl Evaluation {
-    /// The evaluation, if it consists of finite numbers.
+    /// Returns the evaluation if it consists of finite numbers.
     ///
     /// # Errors
     /// [`StopReason::Diverged`] if it does not.

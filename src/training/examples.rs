@@ -1,27 +1,26 @@
+//! Training samples, cut into blocks.
+
 use std::sync::{Arc, OnceLock};
 
 use faer::{Mat, MatMut, MatRef};
 use ndarray::ArrayView2;
 
-use super::activations::Activations;
-use crate::network::Mlp;
-
-/// Samples of a block. Products run block by block, so that what they need stays in the cache and memory does not
-/// grow with the number of samples.
+/// Number of samples in a block. Products run block by block, so that their operands stay in the cache and memory does
+/// not grow with the number of samples.
 pub(super) const BLOCK: usize = 512;
 
 /// Scaled inputs and targets, cut into blocks of samples for the products of training. A clone shares the samples.
 #[derive(Clone, Debug)]
 pub struct Examples {
-    shared: Arc<Shared>,
+    data: Arc<Data>,
     samples: usize,
     inputs: usize,
     outputs: usize,
 }
 
-/// What all trainings on the same examples share.
+/// The samples, which all trainings on them have in common.
 #[derive(Debug)]
-struct Shared {
+struct Data {
     blocks: Vec<Block>,
     /// Products of two input columns, block by block, once a method has asked for them.
     input_pairs: OnceLock<Vec<Mat<f64>>>,
@@ -43,7 +42,7 @@ impl Block {
 }
 
 impl Examples {
-    /// Takes scaled inputs (samples × n) and targets (samples × m).
+    /// Copies scaled inputs (samples × n) and targets (samples × m).
     ///
     /// # Panics
     /// If the numbers of samples differ.
@@ -58,7 +57,7 @@ impl Examples {
             }
         };
         Self {
-            shared: Arc::new(Shared {
+            data: Arc::new(Data {
                 blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
                 input_pairs: OnceLock::new(),
             }),
@@ -89,24 +88,14 @@ impl Examples {
     }
 
     pub(super) fn blocks(&self) -> &[Block] {
-        &self.shared.blocks
+        &self.data.blocks
     }
 
-    /// The products of two input columns of each block, made by `make` if nobody has asked before. Making must not
+    /// Returns the products of two input columns of each block, computed by `make` on the first call. `make` must not
     /// wait for other threads, which may be waiting here.
     pub(super) fn input_pairs(&self, make: impl FnMut(&Block) -> Mat<f64>) -> &[Mat<f64>] {
         let all = || self.blocks().iter().map(make).collect();
-        self.shared.input_pairs.get_or_init(all)
-    }
-
-    /// Mean squared error of `mlp` over samples and outputs.
-    pub fn mse(&self, mlp: &Mlp, activations: &mut Activations) -> f64 {
-        let squares = self
-            .blocks()
-            .iter()
-            .map(|block| activations.forward(mlp, block))
-            .sum::<f64>();
-        squares / self.errors()
+        self.data.input_pairs.get_or_init(all)
     }
 }
 
@@ -133,7 +122,7 @@ pub(super) mod tests {
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::network::Shape;
+    use crate::network::{Mlp, Shape};
 
     pub(in crate::training) fn random_examples(samples: usize, inputs: usize, outputs: usize, seed: u64) -> Examples {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -152,16 +141,5 @@ pub(super) mod tests {
             shape,
             (0..shape.weights()).map(|_| rng.random_range(-1.0..1.0)).collect(),
         )
-    }
-
-    #[test]
-    fn the_error_is_that_of_the_network_itself() {
-        let mlp = random_mlp(3, 5, 2, 1);
-        let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let mut draw = |columns| Array2::from_shape_simple_fn((BLOCK * 2 + 7, columns), || rng.random_range(-1.0..1.0));
-        let (inputs, targets) = (draw(3), draw(2));
-        let expected = (mlp.forward(inputs.view()) - &targets).mapv(|e| e * e).mean().unwrap();
-        let mse = Examples::new(inputs.view(), targets.view()).mse(&mlp, &mut Activations::new(mlp.shape()));
-        assert!((mse - expected).abs() < 1e-14);
     }
 }

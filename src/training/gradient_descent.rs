@@ -1,8 +1,10 @@
+//! Conventional back-propagation (`traingd`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -22,10 +24,10 @@ impl Default for GradientDescentSettings {
 }
 
 impl GradientDescentSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         vec![Setting {
             name: "learning rate",
-            meaning: "Length of a step per length of the gradient.",
+            meaning: "Step length relative to the length of the gradient.",
             default: Self::default().learning_rate,
             range: f64::MIN_POSITIVE..=1e300,
             value: &mut self.learning_rate,
@@ -33,17 +35,30 @@ impl GradientDescentSettings {
     }
 }
 
-/// The conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, g the negative
-/// gradient of the mean squared error over all samples. The slope that Eq. (8)-(9) write for a sigmoid is here that of
-/// our layers: 1 − h² for the tanh nodes and 1 for the linear outputs.
+/// Conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, g the negative
+/// gradient of the mean squared error over all samples. The derivative that Eq. (8)-(9) write for a sigmoid is here that
+/// of our layers: 1 − h² for the tanh nodes and 1 for the linear outputs.
 pub(super) struct GradientDescent {
     settings: GradientDescentSettings,
     backpropagation: Backpropagation,
 }
 
-impl GradientDescent {
-    /// Takes the gradient at the start.
-    pub(super) fn new(settings: GradientDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Algorithm for GradientDescent {
+    type Settings = GradientDescentSettings;
+    type State = ();
+
+    const DESCRIPTION: Description = Description {
+        short_name: "gd",
+        name: "Gradient descent",
+        summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
+        parameter_name: "learning rate",
+    };
+
+    fn list(settings: &mut GradientDescentSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: GradientDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let method = Self {
@@ -52,9 +67,9 @@ impl GradientDescent {
         };
         (method, evaluation)
     }
-}
 
-impl Algorithm for GradientDescent {
+    fn restore(&mut self, (): ()) {}
+
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         for (weight, slope) in mlp.weights_mut().iter_mut().zip(&self.backpropagation.gradient) {
             *weight -= self.settings.learning_rate * slope;
@@ -66,9 +81,7 @@ impl Algorithm for GradientDescent {
         self.settings.learning_rate
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::GradientDescent
-    }
+    fn state(&self) {}
 }
 
 #[cfg(test)]

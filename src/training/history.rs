@@ -1,24 +1,28 @@
+//! The record of one epoch.
+
 use serde::{Deserialize, Serialize};
 
-/// What is kept of each epoch; epoch 0 is the start. Errors are mean squared errors in scaled units.
+/// Errors and state of the training after one epoch; epoch 0 is the start. Errors are mean squared errors in scaled units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpochRecord {
-    /// Epoch, the start being 0.
+    /// Number of the epoch; 0 is the start.
     pub epoch: usize,
     /// Error on the training set.
     pub training_mse: f64,
     /// Error on the validation set, if there is one.
     pub validation_mse: Option<f64>,
-    /// Error on the test set, if it is watched. It decides nothing.
+    /// Error on the test set, if there is one. It is only displayed.
     pub test_mse: Option<f64>,
-    /// Length of the gradient of the training error, the weights' share included where the method regularises.
+    /// Euclidean norm of the gradient of the training error, including the penalty on the weights where the method
+    /// regularises.
     pub gradient_norm: f64,
     /// The damping mu, or the learning rate, after this epoch: [`super::Method::parameter_name`].
     pub parameter: f64,
-    /// How many weights the data determine, where the method estimates it.
+    /// Number of weights that the data determine, where the method estimates it.
     #[serde(default)]
     pub effective_parameters: Option<f64>,
-    /// How often the validation error has risen since it last fell.
+    /// Number of epochs at which the validation error was above its best, since the last new best or since the present
+    /// method began.
     pub validation_failures: usize,
 }

@@ -1,3 +1,5 @@
+//! Products of two input channels, which the factored equations need of every sample.
+
 use faer::{Mat, MatMut, MatRef};
 
 use super::{
@@ -6,62 +8,71 @@ use super::{
     examples::{BLOCK, Block, column_mut},
 };
 
-/// The most memory for keeping the pairs of all blocks; above it each block's pairs are made anew every time, which
-/// costs a few percent of the product they enter.
+/// Most memory for keeping the pairs of all blocks; above it the pairs are recomputed block by block, which costs a few
+/// percent of the product they enter.
 const LARGEST_KEPT_BYTES: usize = 32 << 20;
 
-/// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a
-/// sample are contiguous and enter the product as they are. They never change during training.
+/// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a sample are
+/// contiguous and enter the product as they are. They do not change during training.
 #[derive(Debug)]
 pub(super) enum InputPairs {
     /// One matrix per block, shared by all trainings on these examples.
     Kept(Examples),
-    /// Made anew for each block.
-    Made,
+    /// Recomputed for each block.
+    Recomputed,
 }
 
-/// Room for the pairs of one block, if they are made anew.
+/// Buffer for the pairs of one block; empty if they are kept.
 #[derive(Debug)]
-pub(super) struct PairsRoom {
+pub(super) struct PairsBuffer {
     pairs: Mat<f64>,
     sample: Vec<f64>,
+}
+
+impl Default for PairsBuffer {
+    fn default() -> Self {
+        Self {
+            pairs: Mat::new(),
+            sample: Vec::new(),
+        }
+    }
 }
 
 impl InputPairs {
     pub(super) fn new(examples: &Examples) -> Self {
         let n1 = examples.inputs() + 1;
         if examples.samples() * pairs(n1) * size_of::<f64>() > LARGEST_KEPT_BYTES {
-            return Self::Made;
+            return Self::Recomputed;
         }
         kept(examples);
         Self::Kept(examples.clone())
     }
 
-    /// Room for [`Self::of`].
-    pub(super) fn room(&self, n1: usize) -> PairsRoom {
+    /// Allocates the buffer for [`Self::of`].
+    pub(super) fn buffer(&self, n1: usize) -> PairsBuffer {
         let samples = match self {
             Self::Kept(_) => 0,
-            Self::Made => BLOCK,
+            Self::Recomputed => BLOCK,
         };
-        PairsRoom {
+        PairsBuffer {
             pairs: Mat::zeros(pairs(n1), samples),
             sample: vec![0.0; n1],
         }
     }
 
-    /// The pairs of block number `index`.
-    pub(super) fn of<'a>(&'a self, index: usize, block: &Block, room: &'a mut PairsRoom) -> MatRef<'a, f64> {
+    /// Returns the pairs of block number `index`.
+    pub(super) fn of<'a>(&'a self, index: usize, block: &Block, buffer: &'a mut PairsBuffer) -> MatRef<'a, f64> {
         match self {
             Self::Kept(examples) => kept(examples)[index].as_ref(),
-            Self::Made => {
-                let mut pairs = room.pairs.as_mut().subcols_mut(0, block.samples());
-                fill(block.inputs.as_ref(), &mut room.sample, pairs.as_mut());
-                room.pairs.as_ref().subcols(0, block.samples())
+            Self::Recomputed => {
+                let mut pairs = buffer.pairs.as_mut().subcols_mut(0, block.samples());
+                fill(block.inputs.as_ref(), &mut buffer.sample, pairs.as_mut());
+                buffer.pairs.as_ref().subcols(0, block.samples())
             }
         }
     }
 
-    /// Writes the symmetric n1 × n1 matrix whose lower triangle is packed column by column.
+    /// Unpacks the symmetric n1 × n1 matrix whose lower triangle is packed column by column.
     #[inline(always)]
     pub(super) fn unpack(packed: &[f64], n1: usize, square: &mut [f64]) {
         let mut rest = packed;
@@ -76,11 +87,12 @@ impl InputPairs {
     }
 }
 
-fn pairs(n1: usize) -> usize {
+/// Number of pairs.
+pub(super) fn pairs(n1: usize) -> usize {
     n1 * (n1 + 1) / 2
 }
 
-/// The pairs of all blocks, made when first asked for.
+/// Returns the pairs of all blocks, computed on the first call.
 fn kept(examples: &Examples) -> &[Mat<f64>] {
     examples.input_pairs(|block| {
         let n1 = block.inputs.ncols();

@@ -1,78 +1,17 @@
+//! Levenberg-Marquardt (`trainlm`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, NormalEquations, Setting, StopReason,
-    algorithm::{Algorithm, MethodState, place},
+    Damping, Evaluation, Examples, NormalEquations, Setting, StopReason,
+    algorithm::{Algorithm, Checked, Description, add_step},
 };
-use crate::network::Mlp;
+use crate::network::{Mlp, Shape};
 
-/// Settings of Levenberg-Marquardt (Hagan and Menhaj 1994), with the field's usual defaults.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LevenbergMarquardtSettings {
-    /// First damping: large values take short steps down the gradient, small ones full Gauss-Newton steps.
-    pub mu: f64,
-    /// Factor on mu after a step that lowers the error.
-    pub mu_decrease: f64,
-    /// Factor on mu after a step that does not.
-    pub mu_increase: f64,
-    /// Damping at which training gives up.
-    pub mu_max: f64,
-}
-
-impl Default for LevenbergMarquardtSettings {
-    fn default() -> Self {
-        Self {
-            mu: 1e-3,
-            mu_decrease: 0.1,
-            mu_increase: 10.0,
-            mu_max: 1e10,
-        }
-    }
-}
-
-impl LevenbergMarquardtSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "mu",
-                meaning: "First damping. Large: short steps down the gradient; small: full Gauss-Newton steps.",
-                default: default.mu,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu,
-            },
-            Setting {
-                name: "mu decrease",
-                meaning: "Factor on mu after a step that lowers the error.",
-                default: default.mu_decrease,
-                range: 1e-6..=0.999,
-                value: &mut self.mu_decrease,
-            },
-            Setting {
-                name: "mu increase",
-                meaning: "Factor on mu after a step that does not lower the error.",
-                default: default.mu_increase,
-                range: 1.001..=1e6,
-                value: &mut self.mu_increase,
-            },
-            Setting {
-                name: "largest mu",
-                meaning: "Training ends when mu exceeds this: no step lowers the error any more.",
-                default: default.mu_max,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu_max,
-            },
-        ]
-    }
-}
-
-/// Below this, mu is lost in the rounding of any sum of squares worth damping.
-pub(super) const SMALLEST_MU: f64 = 1e-20;
-
-/// Levenberg-Marquardt at work. A rejected step only factors the gathered products again, with a larger mu.
+/// Levenberg-Marquardt (Hagan and Menhaj 1994). After a rejected step only the damped equations are solved again, with a
+/// larger mu; the products are gathered once an epoch.
 pub(super) struct LevenbergMarquardt {
-    settings: LevenbergMarquardtSettings,
+    damping: Damping,
     mu: f64,
     mse: f64,
     equations: NormalEquations,
@@ -80,14 +19,43 @@ pub(super) struct LevenbergMarquardt {
     candidate: Mlp,
 }
 
-impl LevenbergMarquardt {
-    /// Gathers the normal equations at the start.
-    pub(super) fn new(settings: LevenbergMarquardtSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::new(mlp.shape(), examples);
+/// State of Levenberg-Marquardt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DampedState {
+    mu: f64,
+}
+
+impl Checked for DampedState {
+    fn vectors(&self) -> Vec<&[f64]> {
+        Vec::new()
+    }
+}
+
+impl Algorithm for LevenbergMarquardt {
+    type Settings = Damping;
+    type State = DampedState;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "lm",
+        name: "Levenberg-Marquardt",
+        summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the least time.",
+        parameter_name: "mu",
+    };
+
+    fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
+        settings.list(Self::default_settings())
+    }
+
+    fn equations_bytes(shape: Shape, samples: usize) -> usize {
+        NormalEquations::cheapest_bytes(shape, samples)
+    }
+
+    fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut equations = NormalEquations::cheapest(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let method = Self {
-            settings,
-            mu: settings.mu,
+            damping,
+            mu: damping.mu,
             mse: evaluation.mse,
             equations,
             step: vec![0.0; mlp.weights().len()],
@@ -96,37 +64,28 @@ impl LevenbergMarquardt {
         (method, evaluation)
     }
 
-    /// Goes on with the damping of an interrupted training.
-    pub(super) fn resume(mut self, mu: f64) -> Self {
-        self.mu = mu;
-        self
+    fn restore(&mut self, state: DampedState) {
+        self.mu = state.mu;
     }
-}
 
-impl Algorithm for LevenbergMarquardt {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        while self.mu <= self.settings.mu_max {
-            if self.equations.solve(mlp, examples, self.mu, &mut self.step) {
-                place(&mut self.candidate, mlp, &self.step);
-                let mse = self.equations.mse(&self.candidate, examples);
-                // Written so that NaN is rejected.
-                if mse < self.mse {
-                    std::mem::swap(mlp, &mut self.candidate);
-                    self.mu = (self.mu * self.settings.mu_decrease).max(SMALLEST_MU);
-                    self.mse = mse;
-                    return Ok(self.equations.gather(mlp, examples));
-                }
-            }
-            self.mu *= self.settings.mu_increase;
-        }
-        Err(StopReason::MuLarge)
+        let before = self.mse;
+        self.mse = self.damping.search(&mut self.mu, |mu| {
+            self.equations.solve(mlp, examples, mu, &mut self.step)?;
+            add_step(&mut self.candidate, mlp, &self.step);
+            let mse = self.equations.mse(&self.candidate, examples);
+            // False for NaN.
+            (mse < before).then_some(mse)
+        })?;
+        std::mem::swap(mlp, &mut self.candidate);
+        Ok(self.equations.gather(mlp, examples))
     }
 
     fn parameter(&self) -> f64 {
         self.mu
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::LevenbergMarquardt { mu: self.mu }
+    fn state(&self) -> DampedState {
+        DampedState { mu: self.mu }
     }
 }

@@ -1,162 +1,196 @@
+//! The list of training methods, with their settings and their states.
+//!
+//! To add a method, implement [`Algorithm`] in a file of its own and add one entry to the list below; `mod.rs` names
+//! the file and exports its settings.
+
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdaptiveDescentSettings, BayesianRegularizationSettings, Evaluation, Examples, GradientDescentSettings,
-    LevenbergMarquardtSettings, MethodState, MomentumSettings, ResilientSettings, ScaledConjugateGradientSettings,
-    Setting, SettingError, StepMomentumSettings, VariableProjectionSettings, adaptive_descent::AdaptiveDescent,
-    algorithm::Algorithm, bayesian_regularization::BayesianRegularization, gradient_descent::GradientDescent,
-    levenberg_marquardt::LevenbergMarquardt, momentum::Momentum, normal_equations::Way, resilient::Resilient,
-    scaled_conjugate_gradient::ScaledConjugateGradient, step_momentum::StepMomentum,
+    AdaptiveDescentSettings, AdaptiveState, BayesianState, ConjugateState, DampedState, Damping, Evaluation, Examples,
+    GradientDescentSettings, MomentumSettings, ProjectionState, ResilientSettings, ResilientState,
+    ScaledConjugateGradientSettings, Setting, SettingError, StepMomentumSettings, StopReason,
+    adaptive_descent::AdaptiveDescent,
+    algorithm::{Algorithm, Checked, Description},
+    bayesian_regularization::BayesianRegularization,
+    gradient_descent::GradientDescent,
+    levenberg_marquardt::LevenbergMarquardt,
+    momentum::Momentum,
+    resilient::Resilient,
+    scaled_conjugate_gradient::ScaledConjugateGradient,
+    step_momentum::StepMomentum,
     variable_projection::VariableProjection,
 };
 use crate::network::{Mlp, Shape};
 
-/// A training method with its settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Damped Gauss-Newton steps (`trainlm`). Their equations are factored, or where it is cheaper, which is for wide
-    /// networks and decided by their shape and the number of samples, solved by conjugate gradients to a relative
-    /// residual of 1e-8: the same steps to about as many digits.
-    LevenbergMarquardt(LevenbergMarquardtSettings),
-    /// Levenberg-Marquardt that keeps the weights small, as much as the data ask for (`trainbr`). Its equations are
-    /// always factored, since it needs the trace of their inverse.
-    BayesianRegularization(BayesianRegularizationSettings),
-    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer. Its equations are always factored: its
-    /// damping falls so low that conjugate gradients would need thousands of iterations.
-    VariableProjection(VariableProjectionSettings),
+/// Defines [`Method`], [`MethodState`] and [`Running`] from the list of methods: the name of each method's [`Algorithm`],
+/// its settings and, unless it has none, its state.
+macro_rules! methods {
+    ($($(#[doc = $doc:literal])* $name:ident($Settings:ty) $(with $state:ident: $State:ty)?,)*) => {
+        /// A training method with its settings.
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Method {
+            $($(#[doc = $doc])* $name($Settings),)*
+        }
+
+        /// State that a method carries from epoch to epoch beside the weights. A training resumed from it gives
+        /// bit-identical results.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum MethodState {
+            $(#[doc = concat!("State of [`Method::", stringify!($name), "`].")] $name $(($State))?,)*
+        }
+
+        /// A method at work.
+        pub(super) enum Running {
+            $($name(Box<$name>),)*
+        }
+
+        impl Method {
+            /// Every method with its defaults, in the order offered.
+            pub fn all() -> [Self; [$(stringify!($name)),*].len()] {
+                [$(Self::$name($name::default_settings())),*]
+            }
+
+            fn words(&self) -> Description {
+                match self {
+                    $(Self::$name(_) => $name::DESCRIPTION,)*
+                }
+            }
+
+            /// The settings of this method, to be shown and changed.
+            pub fn settings(&mut self) -> Vec<Setting<'_>> {
+                match self {
+                    $(Self::$name(settings) => $name::list(settings),)*
+                }
+            }
+
+            /// About how many bytes the method's equations take for a network of this shape and so many samples.
+            pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
+                match self {
+                    $(Self::$name(_) => $name::equations_bytes(shape, samples),)*
+                }
+            }
+
+            /// Starts the method from the weights of `mlp`.
+            pub(super) fn start(&self, mlp: &Mlp, examples: &Examples) -> (Running, Evaluation) {
+                match *self {
+                    $(Self::$name(settings) => {
+                        let (method, evaluation) = $name::new(settings, mlp, examples);
+                        (Running::$name(Box::new(method)), evaluation)
+                    })*
+                }
+            }
+        }
+
+        impl MethodState {
+            fn vectors(&self) -> Vec<&[f64]> {
+                match self {
+                    $(Self::$name $(($state))? => methods!(@vectors $($state)?),)*
+                }
+            }
+        }
+
+        impl Running {
+            /// Restores the state of an interrupted training; false if it is the state of another method.
+            fn restore(&mut self, state: MethodState) -> bool {
+                match (self, state) {
+                    $((Self::$name(_method), MethodState::$name $(($state))?) => {
+                        $(_method.restore($state);)?
+                        true
+                    })*
+                    _ => false,
+                }
+            }
+
+            /// See [`Algorithm::step`].
+            pub(super) fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
+                match self {
+                    $(Self::$name(method) => method.step(mlp, examples),)*
+                }
+            }
+
+            /// See [`Algorithm::parameter`].
+            pub(super) fn parameter(&self) -> f64 {
+                match self {
+                    $(Self::$name(method) => method.parameter(),)*
+                }
+            }
+
+            /// See [`Algorithm::effective_parameters`].
+            pub(super) fn effective_parameters(&self) -> Option<f64> {
+                match self {
+                    $(Self::$name(method) => method.effective_parameters(),)*
+                }
+            }
+
+            /// The state, to be saved.
+            pub(super) fn state(&self) -> MethodState {
+                match self {
+                    $(Self::$name(_method) => MethodState::$name $(({
+                        let $state: $State = _method.state();
+                        $state
+                    }))?,)*
+                }
+            }
+        }
+    };
+    (@vectors) => { Vec::new() };
+    (@vectors $state:ident) => { $state.vectors() };
+}
+
+methods! {
+    /// Damped Gauss-Newton steps (`trainlm`). The normal equations are factored or, where that costs more, which is for
+    /// wide networks and is decided by their shape and the number of samples, solved by conjugate gradients to a
+    /// relative residual of 1e-8, after 500 iterations of at most 1e-3; a step that misses that is rejected.
+    LevenbergMarquardt(Damping) with state: DampedState,
+    /// Levenberg-Marquardt that keeps the weights as small as the data permit (`trainbr`). The normal equations are
+    /// always factored, since the method needs the trace of their inverse.
+    BayesianRegularization(Damping) with state: BayesianState,
+    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer. The normal equations are always
+    /// factored: the damping falls so low that conjugate gradients would need thousands of iterations.
+    VariableProjection(Damping) with state: ProjectionState,
     /// Møller's scaled conjugate gradient (`trainscg`).
-    ScaledConjugateGradient(ScaledConjugateGradientSettings),
+    ScaledConjugateGradient(ScaledConjugateGradientSettings) with state: ConjugateState,
     /// Resilient back-propagation (`trainrp`).
-    Resilient(ResilientSettings),
+    Resilient(ResilientSettings) with state: ResilientState,
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
-    AdaptiveDescent(AdaptiveDescentSettings),
+    AdaptiveDescent(AdaptiveDescentSettings) with state: AdaptiveState,
     /// Gradient descent with momentum of steps (`traingdm`).
-    StepMomentum(StepMomentumSettings),
+    StepMomentum(StepMomentumSettings) with state: Vec<f64>,
     /// Gradient descent with momentum of gradients, Eq. (11).
-    Momentum(MomentumSettings),
+    Momentum(MomentumSettings) with state: Vec<f64>,
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
     GradientDescent(GradientDescentSettings),
 }
 
 impl Default for Method {
     fn default() -> Self {
-        Self::LevenbergMarquardt(LevenbergMarquardtSettings::default())
+        Self::LevenbergMarquardt(Damping::default())
     }
 }
 
 impl Method {
-    /// Every method with its defaults, in the order offered.
-    pub fn all() -> [Self; 9] {
-        [
-            Self::default(),
-            Self::BayesianRegularization(BayesianRegularizationSettings::default()),
-            Self::VariableProjection(VariableProjectionSettings::default()),
-            Self::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
-            Self::Resilient(ResilientSettings::default()),
-            Self::AdaptiveDescent(AdaptiveDescentSettings::default()),
-            Self::StepMomentum(StepMomentumSettings::default()),
-            Self::Momentum(MomentumSettings::default()),
-            Self::GradientDescent(GradientDescentSettings::default()),
-        ]
-    }
-
-    /// The word for it in the terminal and in tables.
+    /// Short name, for the terminal and tables.
     pub fn short_name(&self) -> &'static str {
-        self.words().0
+        self.words().short_name
     }
 
-    /// Its name.
+    /// Full name.
     pub fn name(&self) -> &'static str {
-        self.words().1
+        self.words().name
     }
 
-    /// What it does, in a sentence.
+    /// One sentence on what the method does.
     pub fn description(&self) -> &'static str {
-        self.words().2
+        self.words().summary
     }
 
-    /// What [`super::EpochRecord::parameter`] is.
+    /// Name of the value recorded as [`super::EpochRecord::parameter`].
     pub fn parameter_name(&self) -> &'static str {
-        self.words().3
-    }
-
-    /// Short name, name, description, and what its parameter is.
-    fn words(&self) -> (&'static str, &'static str, &'static str, &'static str) {
-        match self {
-            Self::LevenbergMarquardt(_) => (
-                "lm",
-                "Levenberg-Marquardt",
-                "Damped Gauss-Newton steps: the fewest epochs, and here also the least time.",
-                "mu",
-            ),
-            Self::BayesianRegularization(_) => (
-                "br",
-                "Bayesian regularisation",
-                "Levenberg-Marquardt that keeps weights small, weighing them against the error by what the data can \
-                 determine: for few or noisy samples.",
-                "mu",
-            ),
-            Self::VariableProjection(_) => (
-                "varpro",
-                "Variable projection",
-                "Solves the linear output layer exactly and takes Levenberg-Marquardt steps on the hidden layer only.",
-                "mu",
-            ),
-            Self::ScaledConjugateGradient(_) => (
-                "scg",
-                "Scaled conjugate gradient",
-                "Conjugate directions with the step length from the curvature: little memory, for very large networks.",
-                "lambda",
-            ),
-            Self::Resilient(_) => (
-                "rp",
-                "Resilient back-propagation",
-                "Each weight keeps a step length of its own and follows only the sign of its slope.",
-                "mean step length",
-            ),
-            Self::AdaptiveDescent(_) => (
-                "gdx",
-                "Adaptive rate with momentum",
-                "Gradient descent with momentum whose learning rate grows while the error falls.",
-                "learning rate",
-            ),
-            Self::StepMomentum(_) => (
-                "gdms",
-                "Momentum of steps",
-                "Gradient descent that mixes the previous step into each step, as traingdm does.",
-                "learning rate",
-            ),
-            Self::Momentum(_) => (
-                "gdm",
-                "Momentum, Eq. (11)",
-                "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
-                "learning rate",
-            ),
-            Self::GradientDescent(_) => (
-                "gd",
-                "Gradient descent",
-                "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
-                "learning rate",
-            ),
-        }
-    }
-
-    /// The settings that this method has, to be shown and changed.
-    pub fn settings(&mut self) -> Vec<Setting<'_>> {
-        match self {
-            Self::LevenbergMarquardt(settings) => settings.list(),
-            Self::BayesianRegularization(settings) => settings.list(),
-            Self::VariableProjection(settings) => settings.list(),
-            Self::ScaledConjugateGradient(settings) => settings.list(),
-            Self::Resilient(settings) => settings.list(),
-            Self::AdaptiveDescent(settings) => settings.list(),
-            Self::StepMomentum(settings) => settings.list(),
-            Self::Momentum(settings) => settings.list(),
-            Self::GradientDescent(settings) => settings.list(),
-        }
+        self.words().parameter_name
     }
 
     /// Checks the ranges of the settings.
@@ -168,78 +202,18 @@ impl Method {
         copy.settings().iter().try_for_each(Setting::check)
     }
 
-    /// How it solves the normal equations for a network of this shape and so many samples, if it has any.
-    fn equations(&self, shape: Shape, samples: usize) -> Option<Way> {
-        match self {
-            Self::LevenbergMarquardt(_) => Some(Way::cheaper(shape, samples)),
-            Self::BayesianRegularization(_) | Self::VariableProjection(_) => Some(Way::Factored),
-            _ => None,
-        }
+    /// Resumes the method where an interrupted training left it; `None` if `state` is that of another method.
+    pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Running> {
+        let (mut running, _) = self.start(mlp, examples);
+        running.restore(state).then_some(running)
     }
+}
 
-    /// About how many bytes its equations take for a network of this shape and so many samples.
-    pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
-        self.equations(shape, samples).map_or(0, |way| way.bytes(shape))
-    }
-
-    /// Puts the method to work from the weights of `mlp`.
-    pub(super) fn start(&self, mlp: &Mlp, examples: &Examples) -> (Box<dyn Algorithm>, Evaluation) {
-        fn boxed<A: Algorithm + 'static>((method, now): (A, Evaluation)) -> (Box<dyn Algorithm>, Evaluation) {
-            (Box::new(method), now)
-        }
-        match *self {
-            Self::LevenbergMarquardt(settings) => boxed(LevenbergMarquardt::new(settings, mlp, examples)),
-            Self::BayesianRegularization(settings) => boxed(BayesianRegularization::new(settings, mlp, examples)),
-            Self::VariableProjection(settings) => boxed(VariableProjection::new(settings, mlp, examples)),
-            Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
-            Self::Resilient(settings) => boxed(Resilient::new(settings, mlp, examples)),
-            Self::AdaptiveDescent(settings) => boxed(AdaptiveDescent::new(settings, mlp, examples)),
-            Self::StepMomentum(settings) => boxed(StepMomentum::new(settings, mlp, examples)),
-            Self::Momentum(settings) => boxed(Momentum::new(settings, mlp, examples)),
-            Self::GradientDescent(settings) => boxed(GradientDescent::new(settings, mlp, examples)),
-        }
-    }
-
-    /// Puts the method to work where an interrupted training left it; `None` if `state` is another method's.
-    pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Box<dyn Algorithm>> {
-        Some(match (*self, state) {
-            (Self::LevenbergMarquardt(settings), MethodState::LevenbergMarquardt { mu }) => {
-                Box::new(LevenbergMarquardt::new(settings, mlp, examples).0.resume(mu))
-            }
-            (Self::BayesianRegularization(settings), MethodState::BayesianRegularization(state)) => {
-                Box::new(BayesianRegularization::new(settings, mlp, examples).0.resume(state))
-            }
-            (Self::VariableProjection(settings), MethodState::VariableProjection(state)) => {
-                Box::new(VariableProjection::new(settings, mlp, examples).0.resume(state))
-            }
-            (Self::ScaledConjugateGradient(settings), MethodState::ScaledConjugateGradient(state)) => {
-                Box::new(ScaledConjugateGradient::new(settings, mlp, examples).0.resume(state))
-            }
-            (
-                Self::Resilient(settings),
-                MethodState::Resilient {
-                    previous_gradient,
-                    lengths,
-                },
-            ) => Box::new(
-                Resilient::new(settings, mlp, examples)
-                    .0
-                    .resume(previous_gradient, lengths),
-            ),
-            (Self::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
-                Box::new(AdaptiveDescent::new(settings, mlp, examples).0.resume(state))
-            }
-            (Self::StepMomentum(settings), MethodState::StepMomentum(step)) => {
-                Box::new(StepMomentum::new(settings, mlp, examples).0.resume(step))
-            }
-            (Self::Momentum(settings), MethodState::Momentum(gradient)) => {
-                Box::new(Momentum::new(settings, mlp, examples).0.resume(gradient))
-            }
-            (Self::GradientDescent(settings), MethodState::GradientDescent) => {
-                Box::new(GradientDescent::new(settings, mlp, examples).0)
-            }
-            _ => return None,
-        })
+impl MethodState {
+    /// Tells whether the state has finite values for this many weights.
+    pub(super) fn fits(&self, weights: usize) -> bool {
+        let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
+        self.vectors().iter().all(fits)
     }
 }
 

@@ -1,8 +1,10 @@
+//! Gradient descent with momentum of gradients, Eq. (11) of the paper.
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -27,12 +29,12 @@ impl Default for MomentumSettings {
 }
 
 impl MomentumSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         let default = Self::default();
         vec![
             Setting {
                 name: "learning rate",
-                meaning: "Length of a step per length of the gradient (alpha).",
+                meaning: "Step length relative to the length of the gradient (alpha).",
                 default: default.learning_rate,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.learning_rate,
@@ -58,9 +60,22 @@ pub(super) struct Momentum {
     previous_gradient: Vec<f64>,
 }
 
-impl Momentum {
-    /// Takes the gradient at the start.
-    pub(super) fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Algorithm for Momentum {
+    type Settings = MomentumSettings;
+    type State = Vec<f64>;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "gdm",
+        name: "Momentum, Eq. (11)",
+        summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
+        parameter_name: "learning rate",
+    };
+
+    fn list(settings: &mut MomentumSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let previous_gradient = backpropagation.gradient.clone();
@@ -72,14 +87,10 @@ impl Momentum {
         (method, evaluation)
     }
 
-    /// Goes on with the gradient before the present one of an interrupted training.
-    pub(super) fn resume(mut self, previous_gradient: Vec<f64>) -> Self {
+    fn restore(&mut self, previous_gradient: Vec<f64>) {
         self.previous_gradient = previous_gradient;
-        self
     }
-}
 
-impl Algorithm for Momentum {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let MomentumSettings {
             learning_rate,
@@ -97,8 +108,8 @@ impl Algorithm for Momentum {
         self.settings.learning_rate
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::Momentum(self.previous_gradient.clone())
+    fn state(&self) -> Vec<f64> {
+        self.previous_gradient.clone()
     }
 }
 

@@ -1,8 +1,11 @@
-//! Work on all threads of the present rayon pool.
+//! Division of work among the threads of the current rayon pool.
 //!
-//! One large product is divided by rows and columns of its result; many small ones, one for each block of samples, by
-//! samples. Where is decided by sizes alone. So every entry is summed in the same order, and the bits are the same on
-//! any number of threads.
+//! One large product is split by rows and columns of its result; many small products, one for each block of samples, are
+//! split by samples. The splits depend on sizes alone, so every entry is summed in the same order and the bits are the
+//! same on any number of threads.
+//!
+//! faer's own `Par::rayon(n)` with a fixed n keeps its bits too, but was slower on a loaded 2-core machine: 297 ms against
+//! 177 ms for a Cholesky factor of order 1984, 99 ms against 79 ms for a product of 4753×512×512.
 
 use std::ops::Range;
 
@@ -15,59 +18,59 @@ use faer::{
 };
 use rayon::prelude::*;
 
-/// Multiplications (rows × depth × columns) below which a product is not worth dividing: about a
-/// millisecond of work, many times what waking another thread costs.
+/// Multiplications (rows × depth × columns) below which a product is not worth splitting: about a millisecond of work,
+/// many times the cost of waking another thread.
 pub(super) const LARGE: usize = 1 << 25;
-/// A result is not divided further, since each piece reads its factors anew.
+/// Most pieces of a result, since each piece reads its factors again.
 const MOST_PIECES: usize = 16;
-/// Narrower pieces waste the vector registers.
+/// Fewest rows or columns of a piece; narrower ones waste SIMD lanes.
 const NARROWEST: usize = 16;
 
-/// Samples are not divided further, since each part needs room of its own for its sums.
+/// Most parts of the samples, since each part needs memory for its own sums.
 const MOST_PARTS: usize = 8;
-/// The most memory for that.
+/// Most memory for those sums.
 const LARGEST_PARTS_BYTES: usize = 32 << 20;
 
-/// How much there is to do with some blocks of samples.
+/// The amount of work with some blocks of samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work {
-    /// Blocks of samples.
+    /// Number of blocks.
     pub(super) blocks: usize,
-    /// Multiplications for each of them.
+    /// Multiplications per block.
     pub(super) multiplications: usize,
-    /// Room that each part needs.
+    /// Memory that each part needs.
     pub(super) bytes: usize,
 }
 
 impl Work {
-    /// Into how many parts the samples are divided, none with fewer multiplications than `smallest`.
+    /// Number of parts to split the samples into, none with fewer multiplications than `smallest`.
     pub(super) fn parts(self, smallest: usize) -> usize {
         let worth = self.blocks.saturating_mul(self.multiplications) / smallest;
-        let room = LARGEST_PARTS_BYTES / self.bytes.max(1);
-        worth.min(self.blocks).min(room).clamp(1, MOST_PARTS)
+        let affordable = LARGEST_PARTS_BYTES / self.bytes.max(1);
+        worth.min(self.blocks).min(affordable).clamp(1, MOST_PARTS)
     }
 }
 
-/// The blocks of each part.
+/// Returns the blocks of each part.
 pub(super) fn parts(blocks: usize, parts: usize) -> impl Iterator<Item = Range<usize>> {
     (0..parts).map(move |part| part * blocks / parts..(part + 1) * blocks / parts)
 }
 
-/// Does `work` for each part on any thread.
+/// Calls `work` for each part, on any thread.
 pub(super) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sync + Send) {
     match parts {
-        // Without a detour through the thread pool.
+        // Not through the thread pool.
         [part] => work(part),
         parts => parts.par_iter_mut().for_each(work),
     }
 }
 
-/// Whether a product of this many multiplications is divided.
+/// Tells whether a product of this many multiplications is split.
 pub(super) fn is_large(multiplications: usize) -> bool {
     multiplications >= 2 * LARGE
 }
 
-/// Into how many pieces a product of this many multiplications is divided: a power of two.
+/// Number of pieces to split a product of this many multiplications into: a power of two.
 pub(super) fn pieces(multiplications: usize) -> usize {
     let pieces = (multiplications / LARGE).clamp(1, MOST_PIECES);
     1 << pieces.ilog2()
@@ -79,7 +82,7 @@ pub(super) fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: Ma
     add_in_pieces(sum, left, right, factor, pieces);
 }
 
-/// Halves the longer side until there are so many pieces.
+/// Halves the longer side until there are `pieces` pieces.
 fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64, pieces: usize) {
     let (rows, columns) = (sum.nrows(), sum.ncols());
     if pieces == 1 || rows.max(columns) < 2 * NARROWEST {
@@ -103,7 +106,7 @@ fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, 
     }
 }
 
-/// Half of `length` in whole vector registers.
+/// Half of `length`, rounded up to whole SIMD registers.
 fn middle(length: usize) -> usize {
     (length / 2).next_multiple_of(NARROWEST)
 }

@@ -1,8 +1,10 @@
+//! Resilient back-propagation (`trainrp`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -11,7 +13,7 @@ use crate::network::Mlp;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ResilientSettings {
-    /// First step length of every weight.
+    /// Initial step length of every weight.
     pub first_length: f64,
     /// Factor on a weight's step length while its slope keeps its sign.
     pub length_increase: f64,
@@ -33,12 +35,12 @@ impl Default for ResilientSettings {
 }
 
 impl ResilientSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         let default = Self::default();
         vec![
             Setting {
                 name: "first step length",
-                meaning: "By how much every weight moves in the first epoch (delta0).",
+                meaning: "Step length of every weight in the first epoch (delta0).",
                 default: default.first_length,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.first_length,
@@ -59,7 +61,7 @@ impl ResilientSettings {
             },
             Setting {
                 name: "largest step length",
-                meaning: "By how much a weight moves at most in an epoch.",
+                meaning: "Largest step of a weight in one epoch (deltamax).",
                 default: default.largest_length,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.largest_length,
@@ -69,68 +71,94 @@ impl ResilientSettings {
 }
 
 /// Resilient back-propagation (Riedmiller and Braun 1993; `trainrp`): each weight has a step length of its own, and of
-/// its slope only the sign is used. The length grows while the sign stays and shrinks when it changes; steps are not
-/// taken back.
+/// its slope only the sign is used. The length grows while the sign stays and shrinks when it changes; no step is
+/// rejected.
 pub(super) struct Resilient {
     settings: ResilientSettings,
     backpropagation: Backpropagation,
+    state: ResilientState,
+}
+
+/// State of resilient back-propagation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResilientState {
+    /// The gradient before the present one.
     previous_gradient: Vec<f64>,
+    /// Step length of each weight.
     lengths: Vec<f64>,
 }
 
-impl Resilient {
-    /// Takes the gradient at the start.
-    pub(super) fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Checked for ResilientState {
+    fn vectors(&self) -> Vec<&[f64]> {
+        vec![&self.previous_gradient, &self.lengths]
+    }
+}
+
+impl Algorithm for Resilient {
+    type Settings = ResilientSettings;
+    type State = ResilientState;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "rp",
+        name: "Resilient back-propagation",
+        summary: "Each weight keeps a step length of its own and follows only the sign of its slope.",
+        parameter_name: "mean step length",
+    };
+
+    fn list(settings: &mut ResilientSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let weights = mlp.weights().len();
         let method = Self {
             settings,
             backpropagation,
-            previous_gradient: vec![0.0; weights],
-            lengths: vec![settings.first_length.min(settings.largest_length); weights],
+            state: ResilientState {
+                previous_gradient: vec![0.0; weights],
+                lengths: vec![settings.first_length.min(settings.largest_length); weights],
+            },
         };
         (method, evaluation)
     }
 
-    /// Goes on with the lengths of an interrupted training.
-    pub(super) fn resume(mut self, previous_gradient: Vec<f64>, lengths: Vec<f64>) -> Self {
-        self.previous_gradient = previous_gradient;
-        self.lengths = lengths;
-        self
+    fn restore(&mut self, state: ResilientState) {
+        self.state = state;
     }
-}
 
-impl Algorithm for Resilient {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let settings = self.settings;
         for (index, weight) in mlp.weights_mut().iter_mut().enumerate() {
-            let (now, before) = (self.backpropagation.gradient[index], self.previous_gradient[index]);
+            let (now, before) = (
+                self.backpropagation.gradient[index],
+                self.state.previous_gradient[index],
+            );
             // By signs: the product of two tiny slopes would be 0.
             let factor = match (now > 0.0, now < 0.0, before > 0.0, before < 0.0) {
                 (true, _, true, _) | (_, true, _, true) => settings.length_increase,
                 (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
                 _ => 1.0,
             };
-            let length = (self.lengths[index] * factor).min(settings.largest_length);
-            self.lengths[index] = length;
+            let length = (self.state.lengths[index] * factor).min(settings.largest_length);
+            self.state.lengths[index] = length;
             if now != 0.0 {
                 *weight -= length.copysign(now);
             }
         }
-        self.previous_gradient.copy_from_slice(&self.backpropagation.gradient);
+        self.state
+            .previous_gradient
+            .copy_from_slice(&self.backpropagation.gradient);
         self.backpropagation.evaluate(mlp, examples).if_finite()
     }
 
     /// The mean step length.
     fn parameter(&self) -> f64 {
-        self.lengths.iter().sum::<f64>() / self.lengths.len() as f64
+        self.state.lengths.iter().sum::<f64>() / self.state.lengths.len() as f64
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::Resilient {
-            previous_gradient: self.previous_gradient.clone(),
-            lengths: self.lengths.clone(),
-        }
+    fn state(&self) -> ResilientState {
+        self.state.clone()
     }
 }

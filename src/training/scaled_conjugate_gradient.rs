@@ -1,8 +1,10 @@
+//! Scaled conjugate gradient (`trainscg`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -11,9 +13,9 @@ use crate::network::Mlp;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaledConjugateGradientSettings {
-    /// Length of the difference from which the curvature is estimated.
+    /// Length of the finite difference from which the curvature is estimated.
     pub sigma: f64,
-    /// First scale of the curvature, which shortens the steps where the surface is not convex.
+    /// Initial scale of the curvature, which shortens the steps where the error is not convex.
     pub lambda: f64,
 }
 
@@ -27,19 +29,19 @@ impl Default for ScaledConjugateGradientSettings {
 }
 
 impl ScaledConjugateGradientSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         let default = Self::default();
         vec![
             Setting {
                 name: "sigma",
-                meaning: "Length of the difference from which the curvature is estimated.",
+                meaning: "Length of the finite difference from which the curvature is estimated.",
                 default: default.sigma,
                 range: 1e-12..=1.0,
                 value: &mut self.sigma,
             },
             Setting {
                 name: "lambda",
-                meaning: "First scale of the curvature: it shortens steps where the surface is not convex.",
+                meaning: "Initial scale of the curvature: it shortens steps where the error is not convex.",
                 default: default.lambda,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.lambda,
@@ -50,8 +52,8 @@ impl ScaledConjugateGradientSettings {
 
 /// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p the
 /// curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until it is
-/// positive; the step is pᵀr/δ, r the negative gradient. λ falls or grows with how well the parabola foretold the error.
-/// An epoch is one iteration, also one whose step is refused.
+/// positive; the step is pᵀr/δ, r the negative gradient. λ is lowered or raised by how well the quadratic model predicts
+/// the error. An epoch is one iteration, even if its step is rejected.
 pub(super) struct ScaledConjugateGradient {
     settings: ScaledConjugateGradientSettings,
     state: ConjugateState,
@@ -60,27 +62,84 @@ pub(super) struct ScaledConjugateGradient {
     moved: Mlp,
 }
 
-/// What `ScaledConjugateGradient` remembers, in Møller's letters.
+/// State of the scaled conjugate gradient, in Møller's letters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConjugateState {
     /// Direction p.
-    pub(super) p: Vec<f64>,
+    p: Vec<f64>,
     /// Residual r: the negative gradient.
-    pub(super) r: Vec<f64>,
-    /// Curvature δ along p, unscaled until used.
+    r: Vec<f64>,
+    /// Curvature δ along p.
     delta: f64,
     lambda: f64,
     lambda_bar: f64,
-    /// Whether the last step was made.
+    /// True if the last step was accepted.
     success: bool,
-    /// Steps made since p was last the gradient.
+    /// Accepted steps since p was last the gradient.
     since_restart: usize,
 }
 
+impl Checked for ConjugateState {
+    fn vectors(&self) -> Vec<&[f64]> {
+        vec![&self.p, &self.r]
+    }
+}
+
 impl ScaledConjugateGradient {
-    /// Takes the gradient at the start as the first direction.
-    pub(super) fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    /// Evaluates at `length` along p from `mlp`.
+    fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> Evaluation {
+        let moved = mlp.weights().iter().zip(&self.state.p);
+        for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
+            *target = weight + length * p;
+        }
+        self.backpropagation.evaluate(&self.moved, examples)
+    }
+
+    /// Updates residual and direction (Møller's step 7) after an accepted step with μ = pᵀr.
+    fn turn(&mut self, mu: f64) {
+        let state = &mut self.state;
+        state.since_restart += 1;
+        let (mut square, mut mixed) = (0.0, 0.0);
+        for (r, slope) in state.r.iter().zip(&self.backpropagation.gradient) {
+            square += slope * slope;
+            mixed -= slope * r;
+        }
+        let beta = if state.since_restart >= state.r.len() {
+            state.since_restart = 0;
+            0.0
+        } else {
+            (square - mixed) / mu
+        };
+        let beta = if beta.is_finite() { beta } else { 0.0 };
+        for ((p, r), slope) in state.p.iter_mut().zip(&mut state.r).zip(&self.backpropagation.gradient) {
+            *r = -slope;
+            *p = *r + beta * *p;
+        }
+        // Restart if the direction does not descend.
+        if dot(&state.p, &state.r) <= 0.0 {
+            state.p.copy_from_slice(&state.r);
+            state.since_restart = 0;
+        }
+    }
+}
+
+impl Algorithm for ScaledConjugateGradient {
+    type Settings = ScaledConjugateGradientSettings;
+    type State = ConjugateState;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "scg",
+        name: "Scaled conjugate gradient",
+        summary: "Conjugate directions with the step length from the curvature: little memory, for very large networks.",
+        parameter_name: "lambda",
+    };
+
+    fn list(settings: &mut ScaledConjugateGradientSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let now = backpropagation.evaluate(mlp, examples);
         let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
@@ -102,54 +161,17 @@ impl ScaledConjugateGradient {
         (method, now)
     }
 
-    /// Goes on with the direction and scale of an interrupted training.
-    pub(super) fn resume(mut self, state: ConjugateState) -> Self {
+    fn restore(&mut self, state: ConjugateState) {
         self.state = state;
-        self
     }
 
-    /// Evaluates at `length` along p from `mlp`.
-    fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> Evaluation {
-        let moved = mlp.weights().iter().zip(&self.state.p);
-        for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
-            *target = weight + length * p;
-        }
-        self.backpropagation.evaluate(&self.moved, examples)
-    }
-
-    /// Takes the new residual and turns the direction (Møller's step 7), after a step of μ = pᵀr.
-    fn turn(&mut self, mu: f64) {
-        let state = &mut self.state;
-        state.since_restart += 1;
-        let (mut square, mut mixed) = (0.0, 0.0);
-        for (r, slope) in state.r.iter().zip(&self.backpropagation.gradient) {
-            square += slope * slope;
-            mixed -= slope * r;
-        }
-        let beta = if state.since_restart >= state.r.len() {
-            state.since_restart = 0;
-            0.0
-        } else {
-            (square - mixed) / mu
-        };
-        let beta = if beta.is_finite() { beta } else { 0.0 };
-        for ((p, r), slope) in state.p.iter_mut().zip(&mut state.r).zip(&self.backpropagation.gradient) {
-            *r = -slope;
-            *p = *r + beta * *p;
-        }
-        // A direction that does not descend is no direction.
-        if dot(&state.p, &state.r) <= 0.0 {
-            state.p.copy_from_slice(&state.r);
-            state.since_restart = 0;
-        }
-    }
-}
-
-impl Algorithm for ScaledConjugateGradient {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let square = dot(&self.state.p, &self.state.p);
-        if !(square > 0.0 && square.is_finite()) {
+        if square == 0.0 {
             return Err(StopReason::GradientSmall);
+        }
+        if !square.is_finite() {
+            return Err(StopReason::Diverged);
         }
         if self.state.success {
             let sigma = self.settings.sigma / square.sqrt();
@@ -169,10 +191,10 @@ impl Algorithm for ScaledConjugateGradient {
         let mu = dot(&state.p, &state.r);
         let (delta, length) = (state.delta, mu / state.delta);
         let then = self.evaluate_along(mlp, length, examples);
-        let foretold = 2.0 * delta * (self.now.mse - then.mse) / (mu * mu);
-        // An error that is not finite counts as much worse than foretold.
+        let predicted = 2.0 * delta * (self.now.mse - then.mse) / (mu * mu);
+        // An error that is not finite counts as much worse than predicted.
         let comparison = if then.if_finite().is_ok() {
-            foretold.max(WORST)
+            predicted.max(WORST)
         } else {
             WORST
         };
@@ -194,7 +216,7 @@ impl Algorithm for ScaledConjugateGradient {
         if self.state.lambda.is_finite() {
             Ok(self.now)
         } else {
-            Err(StopReason::GradientSmall)
+            Err(StopReason::LambdaLarge)
         }
     }
 
@@ -202,14 +224,33 @@ impl Algorithm for ScaledConjugateGradient {
         self.state.lambda
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::ScaledConjugateGradient(self.state.clone())
+    fn state(&self) -> ConjugateState {
+        self.state.clone()
     }
 }
 
-/// The worst comparison between the error found and the one foretold that is believed.
+/// Least value of the comparison between the error found and the error predicted.
 const WORST: f64 = -1e3;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::examples::tests::{random_examples, random_mlp};
+
+    #[test]
+    fn a_lambda_that_overflows_is_no_small_gradient() {
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let settings = ScaledConjugateGradientSettings {
+            lambda: 1e300,
+            ..ScaledConjugateGradientSettings::default()
+        };
+        let (mut method, start) = ScaledConjugateGradient::new(settings, &mlp, &examples);
+        assert!(start.gradient_norm > 0.1);
+        let reason = (0..100).find_map(|_| method.step(&mut mlp, &examples).err());
+        assert_eq!(reason, Some(StopReason::LambdaLarge));
+    }
 }

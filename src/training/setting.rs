@@ -1,17 +1,19 @@
+//! Numbers that the user can set.
+
 use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
-/// One number that can be set: what the window and the terminal need to offer it.
+/// One number that can be set, as the window and the terminal offer it.
 #[derive(Debug)]
 pub struct Setting<'a> {
-    /// The field's word for it.
+    /// Name.
     pub name: &'static str,
-    /// What it does, in a sentence.
+    /// Explanation, in one or two sentences.
     pub meaning: &'static str,
-    /// The field's usual value.
+    /// Default value.
     pub default: f64,
-    /// What is allowed.
+    /// Allowed values.
     pub range: RangeInclusive<f64>,
     /// The present value.
     pub value: &'a mut f64,
@@ -21,11 +23,11 @@ pub struct Setting<'a> {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{name} is {value:?}: it must be from {:?} to {:?}", .range.start(), .range.end())]
 pub struct SettingError {
-    /// Which setting.
+    /// Name of the setting.
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// What is allowed.
+    /// Allowed values.
     pub range: RangeInclusive<f64>,
 }
 
@@ -33,7 +35,7 @@ impl Setting<'_> {
     /// Checks that the value is in range; NaN is in no range.
     ///
     /// # Errors
-    /// It is not.
+    /// The value is out of range.
     pub fn check(&self) -> Result<(), SettingError> {
         if self.range.contains(self.value) {
             return Ok(());

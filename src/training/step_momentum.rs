@@ -1,8 +1,10 @@
+//! Gradient descent with momentum of steps (`traingdm`).
+
 use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, Setting, StopReason,
-    algorithm::{Algorithm, MethodState},
+    algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
 };
 use crate::network::Mlp;
@@ -27,12 +29,12 @@ impl Default for StepMomentumSettings {
 }
 
 impl StepMomentumSettings {
-    pub(super) fn list(&mut self) -> Vec<Setting<'_>> {
+    fn list(&mut self) -> Vec<Setting<'_>> {
         let default = Self::default();
         vec![
             Setting {
                 name: "learning rate",
-                meaning: "Length of a step per length of the gradient.",
+                meaning: "Step length relative to the length of the gradient.",
                 default: default.learning_rate,
                 range: f64::MIN_POSITIVE..=1e300,
                 value: &mut self.learning_rate,
@@ -57,9 +59,22 @@ pub(super) struct StepMomentum {
     step: Vec<f64>,
 }
 
-impl StepMomentum {
-    /// Takes the gradient at the start.
-    pub(super) fn new(settings: StepMomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Algorithm for StepMomentum {
+    type Settings = StepMomentumSettings;
+    type State = Vec<f64>;
+
+    const DESCRIPTION: Description = Description {
+        short_name: "gdms",
+        name: "Momentum of steps",
+        summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
+        parameter_name: "learning rate",
+    };
+
+    fn list(settings: &mut StepMomentumSettings) -> Vec<Setting<'_>> {
+        settings.list()
+    }
+
+    fn new(settings: StepMomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let method = Self {
@@ -70,14 +85,10 @@ impl StepMomentum {
         (method, evaluation)
     }
 
-    /// Goes on with the last step of an interrupted training.
-    pub(super) fn resume(mut self, step: Vec<f64>) -> Self {
+    fn restore(&mut self, step: Vec<f64>) {
         self.step = step;
-        self
     }
-}
 
-impl Algorithm for StepMomentum {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let StepMomentumSettings {
             learning_rate,
@@ -95,7 +106,7 @@ impl Algorithm for StepMomentum {
         self.settings.learning_rate
     }
 
-    fn state(&self) -> MethodState {
-        MethodState::StepMomentum(self.step.clone())
+    fn state(&self) -> Vec<f64> {
+        self.step.clone()
     }
 }

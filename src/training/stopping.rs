@@ -1,20 +1,23 @@
+//! Stopping rules, and the reason why a training ended.
+
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::SettingError;
 
-/// When a training ends by itself, with the field's usual defaults.
+/// Rules that end a training by themselves, with the field's usual defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoppingRules {
-    /// Most epochs.
+    /// Maximum number of epochs.
     pub epochs: usize,
-    /// Training error (mse, scaled) that is good enough.
+    /// Training error (mean squared, in scaled units) at which training ends.
     pub goal_mse: f64,
-    /// Length of the gradient below which the surface is taken as flat.
+    /// Length of the gradient at which training ends.
     pub min_gradient: f64,
-    /// How often the validation error may rise from one epoch to the next before it falls again.
+    /// Maximum number of validation failures: epochs, since the last new best validation error, at which it was above
+    /// the best. An error equal to the best counts neither way.
     pub max_fail: usize,
 }
 
@@ -30,7 +33,7 @@ impl Default for StoppingRules {
 }
 
 impl StoppingRules {
-    /// The most epochs offered.
+    /// Largest number of epochs that can be set.
     pub const MOST_EPOCHS: usize = 1_000_000;
 
     /// Checks the ranges.
@@ -52,30 +55,39 @@ impl StoppingRules {
     }
 }
 
-/// Why a training ended. Ending is a result, not an error.
+/// Reason why a training ended. Ending is a result, not an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// All epochs were run.
+    /// The maximum number of epochs was run.
     EpochsReached,
     /// The training error reached the goal.
     GoalReached,
-    /// The gradient became as small as was asked.
+    /// The length of the gradient fell to its limit.
     GradientSmall,
-    /// No damping up to the largest one lowers the error.
+    /// No step with a damping mu up to its limit lowers the error.
     MuLarge,
-    /// The validation error rose too often.
+    /// The scale lambda of the scaled conjugate gradient overflowed: no step along its direction lowers the error.
+    LambdaLarge,
+    /// The validation error did not reach a new best for [`StoppingRules::max_fail`] epochs.
     ValidationRose,
-    /// The error became infinite; the best weights before that are kept.
+    /// The error or its gradient was no longer finite, or the training error was above the initial one when the validation
+    /// failures reached their limit. The best weights before that are kept.
     Diverged,
     /// The user stopped it.
     Stopped,
 }
 
 impl StopReason {
-    /// Whether the network's error was still finite and the method ended as it should.
+    /// Tells whether the error fell as it should until the training ended.
     pub fn was_successful(self) -> bool {
         self != Self::Diverged
+    }
+
+    /// Tells whether other stopping rules could have let the training continue: not if the user stopped it or the method
+    /// found no further step.
+    pub(super) fn depends_on_rules(self) -> bool {
+        !matches!(self, Self::Stopped | Self::Diverged | Self::MuLarge | Self::LambdaLarge)
     }
 }
 
@@ -86,9 +98,36 @@ impl fmt::Display for StopReason {
             Self::GoalReached => "goal reached",
             Self::GradientSmall => "gradient below its limit: no further progress to make",
             Self::MuLarge => "mu above its limit: no step lowers the error",
+            Self::LambdaLarge => {
+                "lambda above its limit: no step lowers the error; take another seed or another method"
+            }
             Self::ValidationRose => "validation error no longer falls",
-            Self::Diverged => "error grew without bound: lower the learning rate",
+            Self::Diverged => "error grew above its start: lower the learning rate, or take another seed or method",
             Self::Stopped => "stopped by you",
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reasons_in_files_keep_their_names() {
+        let table = [
+            ("epochs_reached", StopReason::EpochsReached),
+            ("goal_reached", StopReason::GoalReached),
+            ("gradient_small", StopReason::GradientSmall),
+            ("mu_large", StopReason::MuLarge),
+            ("lambda_large", StopReason::LambdaLarge),
+            ("validation_rose", StopReason::ValidationRose),
+            ("diverged", StopReason::Diverged),
+            ("stopped", StopReason::Stopped),
+        ];
+        for (name, reason) in table {
+            let text = format!("\"{name}\"");
+            assert_eq!(serde_json::from_str::<StopReason>(&text).unwrap(), reason);
+            assert_eq!(serde_json::to_string(&reason).unwrap(), text);
+        }
     }
 }

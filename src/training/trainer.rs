@@ -1,3 +1,5 @@
+//! A training in progress, stepped one epoch at a time.
+
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -5,17 +7,17 @@ use thiserror::Error;
 
 use super::{
     EpochRecord, Evaluation, Examples, Method, SettingError, Stage, StopReason, StoppingRules,
-    activations::Activations, algorithm::Algorithm,
+    activations::Activations, method::Running,
 };
 use crate::network::{Mlp, Shape};
 
-/// How to train.
+/// The method and the stopping rules of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSettings {
     /// The method and its settings.
     pub method: Method,
-    /// When to stop.
+    /// The stopping rules.
     pub stopping: StoppingRules,
 }
 
@@ -30,28 +32,28 @@ impl TrainingSettings {
     }
 }
 
-/// What is trained on and watched, scaled.
+/// The scaled training, validation and test sets.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// What the method fits.
+    /// Training set.
     pub training: Examples,
-    /// What decides which weights are best and when to stop, if anything was held out.
+    /// Validation set, if one is held out: it decides which weights are best and when to stop.
     pub validation: Option<Examples>,
-    /// What is only watched.
+    /// Test set, if its error is to be displayed.
     pub test: Option<Examples>,
 }
 
-/// Why training cannot begin.
+/// Reason why training cannot begin.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrainingError {
     /// A setting is out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// Nothing to learn.
+    /// No target varies.
     #[error("every target is constant in the training set: there is nothing to learn; draw more samples")]
     NothingVaries,
-    /// No hidden nodes.
+    /// The network has no hidden nodes.
     #[error("the network has no hidden nodes: give at least 1")]
     NoHiddenNodes,
     /// The method's equations would take too much memory.
@@ -61,12 +63,12 @@ pub enum TrainingError {
         *.bytes as f64 * 1e-9
     )]
     TooWide {
-        /// How many bytes they would take.
+        /// Bytes that they would take.
         bytes: usize,
     },
 }
 
-/// The most memory that the equations of a method may take.
+/// Most memory that the equations of a method may take.
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
@@ -78,23 +80,23 @@ pub(super) fn check_width(method: &Method, shape: Shape, samples: usize) -> Resu
     Ok(())
 }
 
-/// A training in progress: a value that is stepped one epoch at a time, so that pausing is not stepping.
+/// A training in progress. It runs one epoch for each call of [`Self::step`], so pausing only means not calling `step`.
 pub struct Trainer {
     pub(super) settings: TrainingSettings,
     pub(super) problem: Problem,
-    pub(super) algorithm: Box<dyn Algorithm>,
+    pub(super) algorithm: Running,
     pub(super) mlp: Mlp,
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
     pub(super) stages: Vec<Stage>,
-    /// How often the validation error has risen since it last fell, under the present method.
+    /// Epochs since the last best validation error or since the present method began, see [`StoppingRules::max_fail`].
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
     pub(super) elapsed: Duration,
     pub(super) activations: Activations,
 }
 
-/// The weights of the lowest validation error, or training error where nothing is held out.
+/// The weights with the lowest validation error, or training error where nothing is held out.
 #[derive(Debug)]
 pub(super) struct Best {
     pub(super) mlp: Mlp,
@@ -103,7 +105,7 @@ pub(super) struct Best {
 }
 
 impl Trainer {
-    /// Prepares training from the weights of `start`; evaluates them as epoch 0.
+    /// Prepares a training from the weights of `start` and records them as epoch 0.
     ///
     /// # Errors
     /// Settings out of range, or nothing to train.
@@ -143,7 +145,7 @@ impl Trainer {
         Ok(trainer)
     }
 
-    /// Runs one epoch, unless the training has ended. Returns why it has ended, if it has.
+    /// Runs one epoch, unless the training has ended. Returns the reason why it has ended, if it has.
     pub fn step(&mut self) -> Option<StopReason> {
         if self.stop_reason.is_none() {
             let begun = Instant::now();
@@ -163,13 +165,13 @@ impl Trainer {
         self.stop_reason
     }
 
-    /// Puts the method to work anew where it gave up with numbers that need not be finite, so that the state can be
-    /// saved and other rules can let it go on.
+    /// Restarts the method after it gave up, when its numbers need not be finite, so that the state can be saved and other
+    /// stopping rules can continue the training.
     fn restart_method(&mut self) {
         (self.algorithm, _) = self.settings.method.start(&self.mlp, &self.problem.training);
     }
 
-    /// Ends the training by the user's wish.
+    /// Ends the training on behalf of the user.
     pub fn stop(&mut self) {
         self.stop_reason.get_or_insert(StopReason::Stopped);
     }
@@ -178,21 +180,18 @@ impl Trainer {
         let Evaluation { mse, gradient_norm } = evaluation;
         let mut watch = |examples: &Option<Examples>| {
             let examples = examples.as_ref()?;
-            Some(examples.mse(&self.mlp, &mut self.activations))
+            Some(self.activations.mse(&self.mlp, examples))
         };
         let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
         let deciding = validation_mse.unwrap_or(mse);
-        let before = self.history.last();
-        let epoch = before.map_or(0, |last| last.epoch + 1);
+        let epoch = self.history.len();
         if deciding < self.best.mse {
             self.best.mse = deciding;
             self.best.epoch = epoch;
             self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
-        }
-        match before {
-            Some(last) if validation_mse > last.validation_mse => self.validation_failures += 1,
-            Some(last) if validation_mse == last.validation_mse => {}
-            _ => self.validation_failures = 0,
+            self.validation_failures = 0;
+        } else if validation_mse.is_some_and(|mse| mse.is_nan() || mse > self.best.mse) {
+            self.validation_failures += 1;
         }
         let latest = EpochRecord {
             epoch,
@@ -210,16 +209,17 @@ impl Trainer {
 
     pub(super) fn reason_to_stop(&self, latest: &EpochRecord) -> Option<StopReason> {
         let rules = self.settings.stopping;
-        let validation_rose = self.validation_failures >= rules.max_fail;
+        let failed_to_validate = self.validation_failures >= rules.max_fail;
         let mse = latest.training_mse;
         let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
             (!mse.is_finite(), StopReason::Diverged),
-            // Validation that rises together with the training error, above where it began, is no overfitting.
-            (validation_rose && mse > start_mse, StopReason::Diverged),
+            // A validation error that stays above its best while the training error is above the initial one is no
+            // overfitting.
+            (failed_to_validate && mse > start_mse, StopReason::Diverged),
             (mse <= rules.goal_mse, StopReason::GoalReached),
             (latest.gradient_norm <= rules.min_gradient, StopReason::GradientSmall),
-            (validation_rose, StopReason::ValidationRose),
+            (failed_to_validate, StopReason::ValidationRose),
             (latest.epoch >= rules.epochs, StopReason::EpochsReached),
         ];
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
@@ -230,17 +230,17 @@ impl Trainer {
         self.problem.training.samples()
     }
 
-    /// How it is trained.
+    /// The method and the stopping rules.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
 
-    /// The present weights, which another method would go on from.
+    /// The present weights, from which another method would continue.
     pub fn present(&self) -> &Mlp {
         &self.mlp
     }
 
-    /// The best weights so far: of the lowest validation error, or training error where nothing is held out.
+    /// The best weights so far: those with the lowest validation error, or training error where nothing is held out.
     pub fn best(&self) -> &Mlp {
         &self.best.mlp
     }
@@ -272,7 +272,7 @@ impl Trainer {
             .expect("the start is recorded when the trainer is made")
     }
 
-    /// Why the training has ended, if it has.
+    /// The reason why the training has ended, if it has.
     pub fn stop_reason(&self) -> Option<StopReason> {
         self.stop_reason
     }

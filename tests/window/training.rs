@@ -248,7 +248,7 @@ fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
     driver.enter("Validation samples", "0");
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
-    assert!(driver.says("error grew without bound: lower the learning rate"));
+    assert!(driver.says("error grew above its start: lower the learning rate, or take another seed or method"));
     let verdict = driver
         .texts()
         .into_iter()

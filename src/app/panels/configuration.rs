@@ -143,7 +143,7 @@ fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool)
                 0.0..=1e300,
                 "",
             );
-            let hint = "Stop when the validation error has risen this often since it last fell. Default 6.";
+            let hint = "Training ends after this many epochs without a new best validation error. Default 6.";
             count_ui(
                 ui,
                 "Validation failures",

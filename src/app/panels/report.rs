@@ -155,7 +155,7 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     let fault = if reason == StopReason::Diverged {
         let epoch = result.best_epoch;
         Some(format!(
-            "The error grew without bound; shown is the best network before that, of epoch {epoch}."
+            "The error grew above its start; shown is the best network before that, of epoch {epoch}."
         ))
     } else if loses_to(&baselines.mean) {
         Some("Always answering the mean of the training set would be better than this network.".to_owned())
@@ -192,7 +192,9 @@ fn remedy(reason: StopReason, parameter_name: &str) -> &'static str {
         StopReason::EpochsReached | StopReason::Stopped => "Train for more epochs, or with more hidden nodes.",
         StopReason::ValidationRose => "Draw more training samples, or take another seed or other hidden nodes.",
         StopReason::GoalReached => "Set a lower goal.",
-        StopReason::GradientSmall | StopReason::MuLarge => "It is stuck: take another seed, or more hidden nodes.",
+        StopReason::GradientSmall | StopReason::MuLarge | StopReason::LambdaLarge => {
+            "It is stuck: take another seed, or more hidden nodes."
+        }
     }
 }
 

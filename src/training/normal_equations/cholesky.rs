@@ -1,3 +1,5 @@
+//! Cholesky factorisation and triangular solves.
+
 use faer::{
     Accum, MatMut, MatRef, Par,
     dyn_stack::{MemBuffer, MemStack},
@@ -6,22 +8,22 @@ use faer::{
 
 use crate::training::parallel::{pieces, subtract_square};
 
-/// Up to this order a matrix is factored whole.
+/// Largest order of a matrix that is factored in one piece.
 const LARGEST_WHOLE: usize = 512;
-/// Up to this order a triangular system is solved whole.
+/// Largest order of a triangular system that is solved in one piece.
 const LARGEST_SOLVED_WHOLE: usize = 128;
 
-/// Room for the Cholesky factorisation of a symmetric matrix, in place, on all threads if it is large.
+/// Cholesky factorisation of a symmetric matrix, in place, on all threads if it is large.
 ///
-/// By halves: the first half is factored, the rows below are solved against it, the rest is reduced by their square and
-/// factored in turn. So nearly all of the work is in a few large products (Gustavson 1997, IBM Journal of Research and
+/// Recursive: the first half is factored, the rows below are solved against it, the rest is reduced by their square and
+/// factored in turn. Nearly all of the work is then in a few large products (Gustavson 1997, IBM Journal of Research and
 /// Development 41).
 pub(super) struct Cholesky {
     memory: MemBuffer,
 }
 
 impl Cholesky {
-    /// Room for matrices of up to `order` rows.
+    /// Allocates for matrices of up to `order` rows.
     pub(super) fn new(order: usize) -> Self {
         let order = order.min(LARGEST_WHOLE);
         let memory = llt::factor::cholesky_in_place_scratch::<f64>(order, Par::Seq, Default::default());
@@ -30,19 +32,18 @@ impl Cholesky {
         }
     }
 
-    /// Replaces the lower triangle of `matrix` by its Cholesky factor; false if it is not positive definite.
-    pub(super) fn factor(&mut self, matrix: MatMut<'_, f64>) -> bool {
+    /// Replaces the lower triangle of `matrix` by its Cholesky factor; `None` if it is not positive definite.
+    pub(super) fn factor(&mut self, matrix: MatMut<'_, f64>) -> Option<()> {
         let order = matrix.nrows();
         if order <= LARGEST_WHOLE {
             let memory = MemStack::new(&mut self.memory);
             return llt::factor::cholesky_in_place(matrix, Default::default(), Par::Seq, memory, Default::default())
-                .is_ok();
+                .ok()
+                .map(|_| ());
         }
         let half = half(order);
         let (mut first, _, mut below, mut corner) = matrix.split_at_mut(half, half);
-        if !self.factor(first.as_mut()) {
-            return false;
-        }
+        self.factor(first.as_mut())?;
         solve_rows(first.as_ref(), below.as_mut());
         subtract_square(corner.as_mut(), below.as_ref());
         self.factor(corner)
@@ -51,11 +52,11 @@ impl Cholesky {
 
 /// Replaces `right` by the solution for a matrix given by its Cholesky factor.
 pub(super) fn substitute(factor: MatRef<'_, f64>, right: MatMut<'_, f64>) {
-    // It needs no memory of its own.
+    // It needs no scratch memory.
     llt::solve::solve_in_place(factor, right, Par::Seq, MemStack::new(&mut []));
 }
 
-/// Replaces each row r of `rows` by r L⁻ᵀ; rows are divided among the threads if there is enough to do.
+/// Replaces each row r of `rows` by r L⁻ᵀ, on all threads if there are many.
 pub(super) fn solve_rows(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
     let (count, order) = (rows.nrows(), factor.nrows());
     solve_in_pieces(factor, rows, pieces(count * order * order / 2));
@@ -95,7 +96,7 @@ fn solve_by_halves(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
     solve_by_halves(corner, second);
 }
 
-/// Half of `order`, where the blocks keep whole vector registers.
+/// Half of `order`, rounded up to whole SIMD registers.
 fn half(order: usize) -> usize {
     (order / 2).next_multiple_of(16)
 }
@@ -107,13 +108,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn panels_give_the_factor() {
+    fn a_matrix_factored_in_pieces_is_the_product_of_its_factor() {
         let order = 3 * LARGEST_WHOLE / 2 + 7;
         let entry = |row: usize, column: usize| ((row * 31 + column * 17 + row * column) as f64).sin();
         let root = Mat::from_fn(order, order, entry);
         let matrix = &root * root.transpose() + Mat::<f64>::identity(order, order);
         let mut factor = matrix.clone();
-        assert!(Cholesky::new(order).factor(factor.as_mut()));
+        assert!(Cholesky::new(order).factor(factor.as_mut()).is_some());
         for (row, column) in (0..order).flat_map(|row| (row + 1..order).map(move |column| (row, column))) {
             factor[(row, column)] = 0.0;
         }
@@ -122,10 +123,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_positive_definite_is_refused() {
+    fn a_matrix_that_is_not_positive_definite_is_refused() {
         let order = LARGEST_WHOLE + 50;
         let mut matrix = Mat::<f64>::identity(order, order);
         matrix[(order - 3, order - 3)] = -1.0;
-        assert!(!Cholesky::new(order).factor(matrix.as_mut()));
+        assert!(Cholesky::new(order).factor(matrix.as_mut()).is_none());
     }
 }

@@ -1,3 +1,5 @@
+//! Preconditioned conjugate gradients on the hidden layer's equations.
+
 use faer::{
     Accum, Mat, MatMut, MatRef, Par,
     linalg::matmul::{
@@ -8,27 +10,35 @@ use faer::{
 
 use super::{
     cholesky::{Cholesky, substitute},
-    elimination::{Elimination, output_weights},
-    products::Sums,
+    cost::Cost,
+    elimination::output_weights,
+    hidden_solver::{HiddenSolver, System},
 };
 use crate::{
-    network::{Mlp, Shape},
+    network::Shape,
     training::{
         Examples,
         activations::{BlockNow, KeptActivations},
-        elementwise::{add_scaled, multiply_by_tanh_slopes, scale},
+        elementwise::{add_scaled, multiply_by_tanh_slopes, multiply_into, scale},
         examples::{BLOCK, column, column_mut},
-        parallel::for_each_part,
+        input_pairs::PairsBuffer,
+        parallel::{LARGE, Work, for_each_part},
     },
 };
 
-/// The residual, relative to the right-hand side and both measured by the preconditioner, at which a step is good enough.
-/// Steps then agree with those of the factored equations to about as many digits.
+/// Iterations that a step is assumed to need: 30 to 70 were seen in training, more at the end of it.
+const ITERATIONS: f64 = 100.0;
+/// Residual, relative to the right-hand side and both in the norm of the preconditioner's inverse, at which the iteration
+/// has converged. The relative error of the step, in the norm of S, is at most this times the root of the condition number
+/// of the preconditioned matrix: no bound on the digits of single weights when the damping is small.
 const TOLERANCE: f64 = 1e-8;
-/// What is added to the diagonals of the preconditioner, relative to their largest entry, against rounding.
+/// Ridge on the diagonals of the preconditioner, relative to their largest entry, against rounding.
 const RIDGE: f64 = 1e-13;
-/// A step that is not that good by then is taken as it is: it still lowers the error of the linearised network.
+/// Iterations after which the step is taken as it is, if its residual is below [`WORST_RESIDUAL`].
 const MOST_ITERATIONS: usize = 500;
+/// Largest relative residual of an inexact Gauss-Newton step (Dembo, Eisenstat and Steihaug 1982). Above it the solution is
+/// refused and the damping has to grow.
+const WORST_RESIDUAL: f64 = 1e-3;
 
 /// Solves S δ = r on W by preconditioned conjugate gradients (Hestenes and Stiefel 1952), never forming S. With P the
 /// vector as n1 × h,
@@ -40,7 +50,7 @@ const MOST_ITERATIONS: usize = 500;
 /// so a product costs two products with the samples and memory only for vectors. The preconditioner is made of the
 /// blocks of S of each hidden node with itself, factored: nodes share few directions, so that some tens of iterations
 /// are enough.
-pub(super) struct ConjugateGradient {
+pub(in crate::training) struct ConjugateGradient {
     shape: Shape,
     /// V̄V̄ᵀ.
     mixing: Mat<f64>,
@@ -49,8 +59,9 @@ pub(super) struct ConjugateGradient {
     /// F with the entries of each node together: n1 × h·(h+1).
     f: Mat<f64>,
     cholesky: Cholesky,
+    most_iterations: usize,
     /// One for each part of the samples; the first gets the sum.
-    parts: Vec<PartRoom>,
+    parts: Vec<PartBuffers>,
     /// FᵀP and that times V̄V̄ᵀ: (h+1) × h.
     eliminated: [Mat<f64>; 2],
     residual: Vec<f64>,
@@ -58,40 +69,30 @@ pub(super) struct ConjugateGradient {
     direction: Vec<f64>,
 }
 
-/// Room for one part of the samples.
-struct PartRoom {
+/// Buffers for one part of the samples.
+struct PartBuffers {
     /// n1 × h.
     sum: Mat<f64>,
     /// D ∘ AP, and that times V̄V̄ᵀ: block × h.
     hidden: [Mat<f64>; 2],
 }
 
-/// What the matrix S is made of.
-#[derive(Clone, Copy)]
-pub(super) struct System<'a> {
-    pub(super) mlp: &'a Mlp,
-    pub(super) examples: &'a Examples,
-    pub(super) sums: &'a Sums,
-    pub(super) elimination: &'a Elimination,
-    /// What is added to the diagonal of JwᵀJw.
-    pub(super) damping: f64,
-}
-
-impl ConjugateGradient {
-    /// Room for samples in so many `parts`.
-    pub(super) fn new(shape: Shape, parts: usize) -> Self {
+impl HiddenSolver for ConjugateGradient {
+    fn new(shape: Shape, examples: &Examples) -> Self {
         let (h, n1, order) = (shape.hidden, shape.inputs + 1, shape.hidden_weights());
-        let room = |_| PartRoom {
+        let part = |_| PartBuffers {
             sum: Mat::zeros(n1, h),
             hidden: [const { BLOCK }; 2].map(|block| Mat::zeros(block, h)),
         };
+        let parts = parts(shape, examples.blocks().len());
         Self {
             shape,
             mixing: Mat::zeros(h, h),
             blocks: Mat::zeros(n1, order),
             f: Mat::zeros(n1, h * (h + 1)),
             cholesky: Cholesky::new(n1),
-            parts: (0..parts).map(room).collect(),
+            most_iterations: MOST_ITERATIONS,
+            parts: (0..parts).map(part).collect(),
             eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
             residual: vec![0.0; order],
             preconditioned: vec![0.0; order],
@@ -99,34 +100,75 @@ impl ConjugateGradient {
         }
     }
 
-    /// About how many bytes each part of the samples takes.
-    pub(super) fn bytes(shape: Shape) -> usize {
-        size_of::<f64>() * (shape.hidden_weights() + 2 * BLOCK * shape.hidden)
+    /// Gathering BᵀB takes n1²/2 · h multiplications a sample; solving, with order = h·n1, S samples and k iterations,
+    /// k (S (2 n1 h + h²) + order (2 (h+1) + n1)).
+    fn cost(shape: Shape, samples: usize) -> Cost {
+        let (n1, h) = (shape.inputs + 1, shape.hidden);
+        let order = shape.hidden_weights();
+        let [n1_, h_, order_] = [n1, h, order].map(|size| size as f64);
+        let iteration = samples as f64 * iteration_per_sample(shape) as f64 + order_ * (2.0 * (h_ + 1.0) + n1_);
+        Cost {
+            shape,
+            samples,
+            gram_per_sample: n1_ * n1_ * h_ / 2.0,
+            solving: ITERATIONS * iteration,
+            entries: order.saturating_mul(2 * (h + 1) + n1),
+            gram: (n1, order),
+            pairs: 0,
+        }
     }
 
-    /// Replaces `right` by the solution; false if a block of S is not positive definite in the arithmetic.
-    pub(super) fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> bool {
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// Adds to the blocks AᵀDᵢ²A.
+    fn add_gram(
+        &self,
+        gram: &mut Mat<f64>,
+        now: &BlockNow<'_>,
+        slopes: MatRef<'_, f64>,
+        columns: MatMut<'_, f64>,
+        _: &mut PairsBuffer,
+    ) {
+        let inputs = now.block.inputs.as_ref();
+        let n1 = inputs.ncols();
+        let mut weighted = columns.subcols_mut(0, n1);
+        for i in 0..slopes.ncols() {
+            for a in 0..n1 {
+                multiply_into(column_mut(weighted.as_mut(), a), column(slopes, i), column(inputs, a));
+            }
+            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            let sum = gram.as_mut().subcols_mut(i * n1, n1);
+            let (left, right) = (weighted.as_ref().transpose(), weighted.as_ref());
+            triangular::matmul(sum, lower, Accum::Add, left, full, right, full, 1.0, Par::Seq);
+        }
+    }
+
+    fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()> {
         let v = output_weights(system.mlp);
         matmul(self.mixing.as_mut(), Accum::Replace, v, v.transpose(), 1.0, Par::Seq);
         // A rejected candidate was evaluated since.
         kept.evaluate(system.mlp, system.examples);
-        if !self.factor_blocks(system) {
-            return false;
-        }
+        self.factor_blocks(system)?;
         let solution = right;
         self.residual.copy_from_slice(solution);
         solution.fill(0.0);
         let mut length = self.precondition();
         self.direction.copy_from_slice(&self.preconditioned);
         let goal = TOLERANCE * TOLERANCE * length;
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..self.most_iterations {
+            if length <= goal {
+                return Some(());
+            }
             self.apply(system, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
             let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
-            // Rounding has taken over, or the right-hand side is zero.
-            if !(curvature > 0.0 && length > goal) {
-                break;
+            // Rounding has taken over. False for NaN.
+            let is_convex = curvature > 0.0;
+            if !is_convex {
+                return None;
             }
             let distance = length / curvature;
             for (value, direction) in solution.iter_mut().zip(&self.direction) {
@@ -137,16 +179,32 @@ impl ConjugateGradient {
             }
             let before = length;
             length = self.precondition();
-            if length <= goal {
-                break;
-            }
             for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {
                 *direction = value + length / before * *direction;
             }
         }
-        true
+        let worst = WORST_RESIDUAL / TOLERANCE;
+        (length <= worst * worst * goal).then_some(())
     }
+}
 
+/// Number of parts that the samples are divided into for each iteration. Iterations follow each other so quickly that
+/// threads stay awake, so less work is worth dividing.
+fn parts(shape: Shape, blocks: usize) -> usize {
+    let work = Work {
+        blocks,
+        multiplications: BLOCK * iteration_per_sample(shape),
+        bytes: size_of::<f64>() * (shape.hidden_weights() + 2 * BLOCK * shape.hidden),
+    };
+    work.parts(LARGE / 8)
+}
+
+/// Multiplications of one iteration per sample.
+fn iteration_per_sample(shape: Shape) -> usize {
+    2 * shape.hidden_weights() + shape.hidden * shape.hidden
+}
+
+impl ConjugateGradient {
     /// Writes S·direction to the first part's sum.
     fn apply(&mut self, system: System<'_>, kept: &mut KeptActivations) {
         let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
@@ -175,8 +233,9 @@ impl ConjugateGradient {
         }
     }
 
-    /// Gathers F by nodes, and factors the blocks of S of each node with itself.
-    fn factor_blocks(&mut self, system: System<'_>) -> bool {
+    /// Gathers F by nodes, and factors the blocks of S of each node with itself; `None` if one of them is not positive
+    /// definite in the arithmetic.
+    fn factor_blocks(&mut self, system: System<'_>) -> Option<()> {
         let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
         self.blocks.copy_from(&system.sums.gram);
         for node in 0..self.shape.hidden {
@@ -202,11 +261,9 @@ impl ConjugateGradient {
                 scale(&mut column_mut(block.as_mut(), index)[index..], weight);
                 block[(index, index)] += system.damping + RIDGE * weight * largest;
             }
-            if !self.cholesky.factor(block) {
-                return false;
-            }
+            self.cholesky.factor(block)?;
         }
-        true
+        Some(())
     }
 
     /// Solves with the preconditioner for the residual; returns the residual's square as the preconditioner measures it.
@@ -222,7 +279,7 @@ impl ConjugateGradient {
     }
 }
 
-impl PartRoom {
+impl PartBuffers {
     /// Adds Aᵀ(D ∘ ((D ∘ AP) V̄V̄ᵀ)) of one block.
     fn add(&mut self, now: &BlockNow<'_>, p: MatRef<'_, f64>, mixing: MatRef<'_, f64>) {
         let (inputs, samples) = (now.block.inputs.as_ref(), now.block.samples());
@@ -246,5 +303,42 @@ impl PartRoom {
             1.0,
             Par::Seq,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::{
+        examples::tests::{random_examples, random_mlp},
+        normal_equations::{elimination::Elimination, products::Products},
+    };
+
+    /// Solves at damping 1e-3 within so many iterations.
+    fn solve(most_iterations: usize) -> Option<()> {
+        let (mlp, examples) = (random_mlp(8, 12, 2, 1), random_examples(40, 8, 2, 2));
+        let shape = mlp.shape();
+        let mut solver = ConjugateGradient::new(shape, &examples);
+        solver.most_iterations = most_iterations;
+        let mut products = Products::new(&solver, &ConjugateGradient::cost(shape, 40), 1);
+        let mut kept = KeptActivations::new(shape, &examples, 1);
+        products.gather(&solver, &mlp, &examples, &mut kept);
+        let (mut elimination, mut right) = (Elimination::new(shape), vec![0.0; shape.hidden_weights()]);
+        elimination.factor(products.sums(), 1e-3)?;
+        elimination.reduce(products.sums(), &mlp, 0.0, &mut right);
+        let system = System {
+            mlp: &mlp,
+            examples: &examples,
+            sums: products.sums(),
+            elimination: &elimination,
+            damping: 1e-3,
+        };
+        solver.solve(system, &mut kept, &mut right)
+    }
+
+    #[test]
+    fn a_step_that_is_far_from_converged_is_refused() {
+        assert_eq!(solve(MOST_ITERATIONS), Some(()));
+        assert_eq!(solve(3), None);
     }
 }

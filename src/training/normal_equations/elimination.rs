@@ -1,3 +1,5 @@
+//! Elimination of the output layer from the equations.
+
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
 use super::{
@@ -6,8 +8,8 @@ use super::{
 };
 use crate::network::{Mlp, Shape};
 
-/// The output layer eliminated from the equations: what the hidden layer's right-hand side becomes by it, and what its
-/// own step is once the hidden layer's is known. Room used again for every damping.
+/// Eliminates the output layer: reduces the right-hand side of the hidden layer, and finds the step of the output layer
+/// once that of the hidden layer is known. The memory is used again for every damping.
 pub(super) struct Elimination {
     shape: Shape,
     /// Cholesky factor of G.
@@ -16,7 +18,7 @@ pub(super) struct Elimination {
     pub(super) f: Mat<f64>,
     /// G⁻¹ Jvᵀe, later the step of V: (h+1) × outputs.
     output: Mat<f64>,
-    /// (h+1) × h.
+    /// Buffer of (h+1) × h.
     small: Mat<f64>,
     cholesky: Cholesky,
 }
@@ -34,18 +36,16 @@ impl Elimination {
         }
     }
 
-    /// Factors G = H̃ᵀH̃ + `damping`·I; false if it is not positive definite in the arithmetic.
-    pub(super) fn factor(&mut self, sums: &Sums, damping: f64) -> bool {
+    /// Factors G = H̃ᵀH̃ + `damping`·I; `None` if it is not positive definite in the arithmetic.
+    pub(super) fn factor(&mut self, sums: &Sums, damping: f64) -> Option<()> {
         self.g_factor.copy_from(&sums.g);
         for node in 0..self.g_factor.nrows() {
             self.g_factor[(node, node)] += damping;
         }
-        if !self.cholesky.factor(self.g_factor.as_mut()) {
-            return false;
-        }
+        self.cholesky.factor(self.g_factor.as_mut())?;
         self.f.copy_from(sums.c());
         solve_rows(self.g_factor.as_ref(), self.f.as_mut());
-        true
+        Some(())
     }
 
     /// Writes the negative right-hand side of the hidden layer, (Jwᵀe + decay·w) − Σₜ diag(V̄ₜ ⊗ 1) C G⁻¹ (Jvᵀe +

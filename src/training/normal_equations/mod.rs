@@ -8,19 +8,22 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
-//! For the usual networks S is formed and factored. Its order is h·n1, so that for wide ones conjugate gradients are
-//! cheaper, to a relative residual of 1e-8, and S is never formed: [`Way`] decides by the number of multiplications.
+//! Two implementations of [`HiddenSolver`](hidden_solver::HiddenSolver) solve with S. For the usual networks S is formed
+//! and factored. Its order is h·n1, so for wide ones conjugate gradients, which never form S, are cheaper; the choice is
+//! made by the number of multiplications.
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
 mod cholesky;
 mod conjugate;
 mod cost;
+#[cfg(test)]
+mod dense;
 mod elimination;
 mod equations;
+mod hidden_solver;
 mod output_layer;
 mod products;
 mod schur;
 
-pub(super) use cost::Way;
-pub(super) use equations::NormalEquations;
+pub(super) use equations::{FactoredEquations, NormalEquations};

@@ -1,3 +1,5 @@
+//! The least-squares output layer.
+
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 
 use super::cholesky::{Cholesky, substitute};
@@ -8,8 +10,8 @@ use crate::{
 
 /// The linear least-squares problem of the output layer: G V = H̃ᵀT, G = H̃ᵀH̃.
 ///
-/// Solved as a correction of the present V from its errors, G δV = −H̃ᵀE, so that rounding in G is corrected and not
-/// repeated.
+/// It is solved as a correction of the present V, G δV = −H̃ᵀE, so that rounding errors in G are corrected at the next
+/// solution instead of repeated.
 pub(super) struct OutputLayer {
     /// One for each part of the samples; once gathered, the first has the sums of all.
     parts: Vec<Sums>,
@@ -24,7 +26,7 @@ struct Sums {
 }
 
 impl OutputLayer {
-    /// Room for samples in so many `parts`.
+    /// Allocates for samples in so many `parts`.
     pub(super) fn new(shape: Shape, parts: usize) -> Self {
         let h1 = shape.hidden + 1;
         let sums = || Sums {
@@ -37,7 +39,8 @@ impl OutputLayer {
         }
     }
 
-    pub(super) fn solve(&mut self, mlp: &mut Mlp, examples: &Examples, kept: &mut KeptActivations) -> bool {
+    /// Replaces the output layer of `mlp`; `None` if there is no solution in the arithmetic.
+    pub(super) fn solve(&mut self, mlp: &mut Mlp, examples: &Examples, kept: &mut KeptActivations) -> Option<()> {
         kept.evaluate(mlp, examples);
         for sums in &mut self.parts {
             sums.g.fill(0.0);
@@ -59,9 +62,7 @@ impl OutputLayer {
         for node in 0..g.nrows() {
             g[(node, node)] += ridge;
         }
-        if !self.cholesky.factor(g.as_mut()) {
-            return false;
-        }
+        self.cholesky.factor(g.as_mut())?;
         substitute(g.as_ref(), right.as_mut());
         let Shape { outputs, .. } = mlp.shape();
         let hidden_weights = mlp.shape().hidden_weights();
@@ -69,12 +70,12 @@ impl OutputLayer {
         for (index, weight) in v.iter_mut().enumerate() {
             *weight -= right[(index / outputs, index % outputs)];
         }
-        v.iter().all(|weight| weight.is_finite())
+        v.iter().all(|weight| weight.is_finite()).then_some(())
     }
 }
 
-/// What is added to the diagonal of G = H̃ᵀH̃ to keep it positive definite: 1e-13 of its largest entry, which is that of
-/// the ones.
+/// Ridge on the diagonal of G = H̃ᵀH̃ that keeps it positive definite: 1e-13 of its largest entry, which is the last,
+/// that of the ones.
 pub(super) fn ridge(g: &Mat<f64>) -> f64 {
     let last = g.nrows() - 1;
     1e-13 * g[(last, last)]

@@ -1,11 +1,8 @@
-use faer::{
-    Accum, Mat, MatMut, MatRef, Par,
-    linalg::matmul::{
-        matmul,
-        triangular::{self, BlockStructure},
-    },
-};
+//! The products that the equations are made of, gathered from the samples block by block.
 
+use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+
+use super::{cost::Cost, hidden_solver::HiddenSolver};
 use crate::{
     network::{Mlp, Shape},
     training::{
@@ -13,46 +10,24 @@ use crate::{
         activations::{BlockNow, KeptActivations},
         elementwise::{multiply, multiply_into, tanh_slopes_into},
         examples::{BLOCK, column, column_mut},
-        input_pairs::{InputPairs, PairsRoom},
+        input_pairs::PairsBuffer,
         parallel::{add_product, for_each_part},
     },
 };
 
-/// Columns that are filled at a time, so that they stay in the cache.
-const CHUNK: usize = 512;
+/// Number of columns that are filled at a time, so that they stay in the cache.
+pub(super) const CHUNK: usize = 512;
 
-/// How much of BᵀB is gathered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum GramPart {
-    /// All of it, packed: pairs of inputs × pairs of hidden nodes, pair (i, j ≤ i) at i(i+1)/2 + j. BᵀB is symmetric in
-    /// both, so it is one product of pairs: (pairs of columns of A)ᵀ × (pairs of columns of D).
-    All,
-    /// The block of each hidden node with itself, the lower triangle: n1 × h·n1.
-    NodeBlocks,
-}
-
-impl GramPart {
-    /// Rows and columns of what is gathered.
-    pub(super) fn size(self, shape: Shape) -> (usize, usize) {
-        let (h, n1) = (shape.hidden, shape.inputs + 1);
-        match self {
-            Self::All => (n1 * (n1 + 1) / 2, h * (h + 1) / 2),
-            Self::NodeBlocks => (n1, h * n1),
-        }
-    }
-}
-
-/// The products from which the equations are made, gathered from the samples.
+/// The products of all samples.
 pub(super) struct Products {
-    input_pairs: Option<InputPairs>,
     /// One for each part of the samples; once gathered, the first has the sums of all.
-    parts: Vec<(Sums, BlockRoom)>,
+    parts: Vec<(Sums, BlockBuffers)>,
 }
 
 /// Sums over samples.
 pub(super) struct Sums {
     shape: Shape,
-    /// As much of BᵀB as [`GramPart`] says.
+    /// The entries of BᵀB that the solver needs.
     pub(super) gram: Mat<f64>,
     /// C: h·n1 × (h+1), column by column without gaps, so that it is also n1 × h(h+1).
     c: Vec<f64>,
@@ -64,9 +39,9 @@ pub(super) struct Sums {
     pub(super) gradient_v: Mat<f64>,
 }
 
-/// Room for one block of samples.
-struct BlockRoom {
-    input_pairs: Option<PairsRoom>,
+/// Buffers for one block of samples.
+struct BlockBuffers {
+    pairs: PairsBuffer,
     /// D: block × h.
     slopes: Mat<f64>,
     /// Some columns that enter a product: block × up to [`CHUNK`] or a little more.
@@ -75,11 +50,11 @@ struct BlockRoom {
     delta: Mat<f64>,
 }
 
-impl BlockRoom {
-    fn new(shape: Shape, input_pairs: Option<&InputPairs>) -> Self {
+impl BlockBuffers {
+    fn new(shape: Shape, pairs: PairsBuffer) -> Self {
         let (h, n1) = (shape.hidden, shape.inputs + 1);
         Self {
-            input_pairs: input_pairs.map(|pairs| pairs.room(n1)),
+            pairs,
             slopes: Mat::zeros(BLOCK, h),
             columns: Mat::zeros(BLOCK, (h * (h + 1)).min(CHUNK + h).max(n1)),
             delta: Mat::zeros(BLOCK, h),
@@ -88,41 +63,43 @@ impl BlockRoom {
 }
 
 impl Products {
-    /// Room for samples in so many `parts`.
-    pub(super) fn new(shape: Shape, examples: &Examples, gram_part: GramPart, parts: usize) -> Self {
-        let input_pairs = (gram_part == GramPart::All).then(|| InputPairs::new(examples));
+    /// Allocates for samples in so many `parts`.
+    pub(super) fn new<S: HiddenSolver + ?Sized>(solver: &S, cost: &Cost, parts: usize) -> Self {
         let part = |_| {
-            let room = BlockRoom::new(shape, input_pairs.as_ref());
-            (Sums::new(shape, gram_part), room)
+            let buffers = BlockBuffers::new(cost.shape, solver.pairs_buffer());
+            (Sums::new(cost.shape, cost.gram), buffers)
         };
         Self {
             parts: (0..parts).map(part).collect(),
-            input_pairs,
         }
     }
 
     /// About how many bytes each part of the samples takes.
-    pub(super) fn bytes(shape: Shape, gram_part: GramPart) -> usize {
-        let (h, n1) = (shape.hidden, shape.inputs + 1);
-        let (rows, columns) = gram_part.size(shape);
-        let pairs = if gram_part == GramPart::All { rows } else { 0 };
-        let room = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + pairs);
-        size_of::<f64>() * (rows * columns + shape.hidden_weights() * (h + 1) + room)
+    pub(super) fn bytes(cost: &Cost) -> usize {
+        let (h, n1) = (cost.shape.hidden, cost.shape.inputs + 1);
+        let (rows, columns) = cost.gram;
+        let buffers = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + cost.pairs);
+        size_of::<f64>() * (rows * columns + cost.shape.hidden_weights() * (h + 1) + buffers)
     }
 
-    /// What was last gathered.
+    /// The sums last gathered.
     pub(super) fn sums(&self) -> &Sums {
         &self.parts[0].0
     }
 
     /// Gathers all products at the weights of `mlp`, block by block of samples.
-    pub(super) fn gather(&mut self, mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) -> Evaluation {
+    pub(super) fn gather<S: HiddenSolver + ?Sized>(
+        &mut self,
+        solver: &S,
+        mlp: &Mlp,
+        examples: &Examples,
+        kept: &mut KeptActivations,
+    ) -> Evaluation {
         let squares = kept.evaluate(mlp, examples);
         for_each_part(&mut self.parts, |(sums, _)| sums.clear());
-        let input_pairs = self.input_pairs.as_ref();
-        kept.for_each_block(mlp, examples, &mut self.parts, |(sums, room), now| {
-            sums.add_second_order(now, input_pairs, room);
-            sums.add_gradient(now, mlp, room);
+        kept.for_each_block(mlp, examples, &mut self.parts, |(sums, buffers), now| {
+            sums.add_second_order(solver, now, buffers);
+            sums.add_gradient(now, mlp, buffers);
         });
         if let [(sums, _), others @ ..] = self.parts.as_mut_slice() {
             others.iter().for_each(|(other, _)| sums.add(other));
@@ -137,9 +114,8 @@ impl Products {
 }
 
 impl Sums {
-    fn new(shape: Shape, gram_part: GramPart) -> Self {
+    fn new(shape: Shape, (rows, columns): (usize, usize)) -> Self {
         let (h, n1, h1) = (shape.hidden, shape.inputs + 1, shape.hidden + 1);
-        let (rows, columns) = gram_part.size(shape);
         Self {
             shape,
             gram: Mat::zeros(rows, columns),
@@ -172,58 +148,23 @@ impl Sums {
         self.gradient_v += &other.gradient_v;
     }
 
-    /// Adds a block to BᵀB, C and H̃ᵀH̃; leaves its slopes in their room.
-    fn add_second_order(&mut self, now: &BlockNow<'_>, input_pairs: Option<&InputPairs>, room: &mut BlockRoom) {
-        let h = self.shape.hidden;
+    /// Adds a block to BᵀB, C and H̃ᵀH̃; leaves its slopes in their buffer.
+    fn add_second_order<S: HiddenSolver + ?Sized>(
+        &mut self,
+        solver: &S,
+        now: &BlockNow<'_>,
+        buffers: &mut BlockBuffers,
+    ) {
         let (hidden, samples) = (now.hidden(), now.block.samples());
-        let mut slopes = room.slopes.as_mut().subrows_mut(0, samples);
-        for i in 0..h {
+        let mut slopes = buffers.slopes.as_mut().subrows_mut(0, samples);
+        for i in 0..self.shape.hidden {
             tanh_slopes_into(column_mut(slopes.as_mut(), i), column(hidden, i));
         }
         let slopes = slopes.as_ref();
-        let columns = room.columns.as_mut().subrows_mut(0, samples);
-        match input_pairs.zip(room.input_pairs.as_mut()) {
-            Some((pairs, room)) => self.add_all(pairs.of(now.number, now.block, room), slopes, columns),
-            None => self.add_node_blocks(now.block.inputs.as_ref(), slopes, columns),
-        }
-        let columns = room.columns.as_mut().subrows_mut(0, samples);
+        let mut columns = buffers.columns.as_mut().subrows_mut(0, samples);
+        solver.add_gram(&mut self.gram, now, slopes, columns.as_mut(), &mut buffers.pairs);
         self.add_c(now.block.inputs.as_ref(), hidden, slopes, columns);
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
-    }
-
-    /// Adds to BᵀB by pairs Dᵢ∘Dⱼ.
-    fn add_all(&mut self, input_pairs: MatRef<'_, f64>, slopes: MatRef<'_, f64>, mut columns: MatMut<'_, f64>) {
-        let (mut first, mut filled) = (0, 0);
-        for i in 0..slopes.ncols() {
-            for j in 0..=i {
-                multiply_into(
-                    column_mut(columns.as_mut(), filled + j),
-                    column(slopes, i),
-                    column(slopes, j),
-                );
-            }
-            filled += i + 1;
-            if filled >= CHUNK || i + 1 == slopes.ncols() {
-                let sum = self.gram.as_mut().subcols_mut(first, filled);
-                add_product(sum, input_pairs, columns.as_ref().subcols(0, filled), 1.0);
-                (first, filled) = (first + filled, 0);
-            }
-        }
-    }
-
-    /// Adds to the blocks AᵀDᵢ²A.
-    fn add_node_blocks(&mut self, inputs: MatRef<'_, f64>, slopes: MatRef<'_, f64>, columns: MatMut<'_, f64>) {
-        let n1 = inputs.ncols();
-        let mut weighted = columns.subcols_mut(0, n1);
-        for i in 0..slopes.ncols() {
-            for a in 0..n1 {
-                multiply_into(column_mut(weighted.as_mut(), a), column(slopes, i), column(inputs, a));
-            }
-            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            let sum = self.gram.as_mut().subcols_mut(i * n1, n1);
-            let (left, right) = (weighted.as_ref().transpose(), weighted.as_ref());
-            triangular::matmul(sum, lower, Accum::Add, left, full, right, full, 1.0, Par::Seq);
-        }
     }
 
     /// Adds to C by columns Dᵢ∘H̃_q, column q·h + i.
@@ -254,16 +195,16 @@ impl Sums {
         }
     }
 
-    /// Adds a block to Jwᵀe and Jvᵀe; its slopes are still in their room.
-    fn add_gradient(&mut self, now: &BlockNow<'_>, mlp: &Mlp, room: &mut BlockRoom) {
+    /// Adds a block to Jwᵀe and Jvᵀe; its slopes are still in their buffer.
+    fn add_gradient(&mut self, now: &BlockNow<'_>, mlp: &Mlp, buffers: &mut BlockBuffers) {
         let Shape { hidden: h, outputs, .. } = self.shape;
         let (hidden, errors, samples) = (now.hidden(), now.errors(), now.block.samples());
         let v = MatRef::from_row_major_slice(mlp.layers().1, h + 1, outputs);
         add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
-        let mut delta = room.delta.as_mut().subrows_mut(0, samples);
+        let mut delta = buffers.delta.as_mut().subrows_mut(0, samples);
         let v_without_bias = v.subrows(0, h).transpose();
         matmul(delta.as_mut(), Accum::Replace, errors, v_without_bias, 1.0, Par::Seq);
-        let slopes = room.slopes.as_ref().subrows(0, samples);
+        let slopes = buffers.slopes.as_ref().subrows(0, samples);
         for node in 0..h {
             multiply(column_mut(delta.as_mut(), node), column(slopes, node));
         }
@@ -273,5 +214,89 @@ impl Sums {
             delta.as_ref(),
             1.0,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{
+            conjugate::ConjugateGradient,
+            dense::{errors, jacobian},
+            elimination::output_weights,
+            schur::SchurComplement,
+        },
+        *,
+    };
+    use crate::training::{
+        examples::tests::{random_examples, random_mlp},
+        input_pairs::InputPairs,
+    };
+
+    /// The products gathered for one of the solvers.
+    fn gathered<S: HiddenSolver>(mlp: &Mlp, examples: &Examples) -> Products {
+        let solver = S::new(mlp.shape(), examples);
+        let cost = S::cost(mlp.shape(), examples.samples());
+        let mut products = Products::new(&solver, &cost, 2);
+        let mut kept = KeptActivations::new(mlp.shape(), examples, 2);
+        products.gather(&solver, mlp, examples, &mut kept);
+        products
+    }
+
+    /// JᵀJ and Jᵀe come back from the products, entry by entry, more than one block of samples in two parts.
+    #[test]
+    fn the_products_are_those_of_the_dense_jacobian() {
+        let (mlp, examples) = (random_mlp(5, 4, 3, 1), random_examples(2 * BLOCK + 44, 5, 3, 2));
+        let (h, h1, n1, outputs) = (4, 5, 6, 3);
+        let jacobian = jacobian(&mlp, &examples);
+        let normal = jacobian.transpose() * &jacobian;
+        let gradient = jacobian.transpose() * errors(&mlp, &examples);
+        let close = |what: &str, ours: f64, dense: f64| {
+            assert!(
+                (ours - dense).abs() < 1e-11 * normal.norm_max(),
+                "{what}: {ours} {dense}"
+            );
+        };
+        let (factored, iterated) = (
+            gathered::<SchurComplement>(&mlp, &examples),
+            gathered::<ConjugateGradient>(&mlp, &examples),
+        );
+        let v = output_weights(&mlp);
+        let mixing = v * v.transpose();
+        let (hidden, output) = (
+            |i: usize, a: usize| a * h + i,
+            |q: usize, t: usize| h * n1 + q * outputs + t,
+        );
+        for sums in [factored.sums(), iterated.sums()] {
+            for (i, a) in (0..h).flat_map(|i| (0..n1).map(move |a| (i, a))) {
+                close("gradient of W", sums.gradient_w[(a, i)], gradient[(hidden(i, a), 0)]);
+                for (q, t) in (0..h1).flat_map(|q| (0..outputs).map(move |t| (q, t))) {
+                    let ours = v[(i, t)] * sums.c()[(i * n1 + a, q)];
+                    close("C", ours, normal[(hidden(i, a), output(q, t))]);
+                }
+            }
+            for (q, t) in (0..h1).flat_map(|q| (0..outputs).map(move |t| (q, t))) {
+                close("gradient of V", sums.gradient_v[(q, t)], gradient[(output(q, t), 0)]);
+                for p in 0..h1 {
+                    close("G", sums.g[(p, q)], normal[(output(p, t), output(q, t))]);
+                }
+            }
+        }
+        let mut square = vec![0.0; n1 * n1];
+        for (i, j) in (0..h).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            InputPairs::unpack(
+                column(factored.sums().gram.as_ref(), i * (i + 1) / 2 + j),
+                n1,
+                &mut square,
+            );
+            for (a, b) in (0..n1).flat_map(|a| (0..n1).map(move |b| (a, b))) {
+                let dense = normal[(hidden(i, a), hidden(j, b))];
+                close("all of BᵀB", mixing[(i, j)] * square[b * n1 + a], dense);
+                if i == j && a >= b {
+                    let ours = mixing[(i, i)] * iterated.sums().gram[(a, i * n1 + b)];
+                    close("blocks of BᵀB", ours, dense);
+                }
+            }
+        }
     }
 }

@@ -1,3 +1,5 @@
+//! The Schur complement S on W, formed and factored.
+
 use faer::{
     Accum, Mat, MatMut, MatRef, Par,
     linalg::{
@@ -14,22 +16,31 @@ use pulp::{Simd, WithSimd};
 
 use super::{
     cholesky::{Cholesky, substitute},
-    elimination::{Elimination, fill},
-    products::Sums,
+    cost::Cost,
+    elimination::{Elimination, fill, output_weights},
+    hidden_solver::{HiddenSolver, System},
+    products::{CHUNK, Sums},
 };
 use crate::{
     network::Shape,
     training::{
+        Examples,
+        activations::{BlockNow, KeptActivations},
+        elementwise::multiply_into,
         examples::{column, column_mut},
-        input_pairs::InputPairs,
-        parallel::is_large,
+        input_pairs::{InputPairs, PairsBuffer, pairs},
+        parallel::{add_product, is_large},
     },
 };
 
-/// The Schur complement S on W, formed and factored, with room used again for every damping.
-pub(super) struct SchurComplement {
+/// Solves with the Cholesky factor of S, in memory that is used again for every damping.
+///
+/// All of BᵀB is gathered, packed: pairs of inputs × pairs of hidden nodes, pair (i, j ≤ i) at i(i+1)/2 + j. BᵀB is
+/// symmetric in both, so it is one product of pairs: (pairs of columns of A)ᵀ × (pairs of columns of D).
+pub(in crate::training) struct SchurComplement {
     shape: Shape,
-    /// For each hidden node an n1 × n1 block of BᵀB, unpacked.
+    input_pairs: InputPairs,
+    /// An unpacked n1 × n1 block of BᵀB for each hidden node.
     squares: Vec<f64>,
     /// S, then its Cholesky factor; the lower triangle.
     s: Mat<f64>,
@@ -37,11 +48,12 @@ pub(super) struct SchurComplement {
     inverse: Option<Inverse>,
 }
 
-impl SchurComplement {
-    pub(super) fn new(shape: Shape) -> Self {
+impl HiddenSolver for SchurComplement {
+    fn new(shape: Shape, examples: &Examples) -> Self {
         let order = shape.hidden_weights();
         Self {
             shape,
+            input_pairs: InputPairs::new(examples),
             squares: vec![0.0; order * (shape.inputs + 1)],
             s: Mat::zeros(order, order),
             cholesky: Cholesky::new(order),
@@ -49,9 +61,72 @@ impl SchurComplement {
         }
     }
 
-    /// Factors S for a damping of W, with V̄ (h × outputs) and F; false if it is not positive definite in the
+    /// Gathering BᵀB takes n1²/2 · h²/2 multiplications a sample, solving order² (h+1)/2 + order³/6, order = h·n1.
+    fn cost(shape: Shape, samples: usize) -> Cost {
+        let (n1, h) = (shape.inputs + 1, shape.hidden);
+        let order = shape.hidden_weights();
+        let [n1_, h_, order_] = [n1, h, order].map(|size| size as f64);
+        Cost {
+            shape,
+            samples,
+            gram_per_sample: n1_ * n1_ * h_ * h_ / 4.0,
+            solving: order_ * order_ * ((h_ + 1.0) / 2.0 + order_ / 6.0),
+            entries: order.saturating_mul(order + h + 1 + n1),
+            gram: (pairs(n1), h * (h + 1) / 2),
+            pairs: pairs(n1),
+        }
+    }
+
+    fn pairs_buffer(&self) -> PairsBuffer {
+        self.input_pairs.buffer(self.shape.inputs + 1)
+    }
+
+    fn add_gram(
+        &self,
+        gram: &mut Mat<f64>,
+        now: &BlockNow<'_>,
+        slopes: MatRef<'_, f64>,
+        mut columns: MatMut<'_, f64>,
+        pairs: &mut PairsBuffer,
+    ) {
+        let input_pairs = self.input_pairs.of(now.number, now.block, pairs);
+        let (mut first, mut filled) = (0, 0);
+        for i in 0..slopes.ncols() {
+            for j in 0..=i {
+                multiply_into(
+                    column_mut(columns.as_mut(), filled + j),
+                    column(slopes, i),
+                    column(slopes, j),
+                );
+            }
+            filled += i + 1;
+            if filled >= CHUNK || i + 1 == slopes.ncols() {
+                let sum = gram.as_mut().subcols_mut(first, filled);
+                add_product(sum, input_pairs, columns.as_ref().subcols(0, filled), 1.0);
+                (first, filled) = (first + filled, 0);
+            }
+        }
+    }
+
+    fn solve(&mut self, system: System<'_>, _: &mut KeptActivations, right: &mut [f64]) -> Option<()> {
+        let System {
+            mlp,
+            sums,
+            elimination,
+            damping,
+            ..
+        } = system;
+        self.factor(sums, elimination.f.as_ref(), output_weights(mlp), damping)?;
+        let order = right.len();
+        substitute(self.s.as_ref(), MatMut::from_column_major_slice_mut(right, order, 1));
+        Some(())
+    }
+}
+
+impl SchurComplement {
+    /// Factors S for a damping of W, with V̄ (h × outputs) and F; `None` if it is not positive definite in the
     /// arithmetic.
-    pub(super) fn factor(&mut self, sums: &Sums, f: MatRef<'_, f64>, v: MatRef<'_, f64>, damping: f64) -> bool {
+    pub(super) fn factor(&mut self, sums: &Sums, f: MatRef<'_, f64>, v: MatRef<'_, f64>, damping: f64) -> Option<()> {
         let terms = Terms {
             gram: sums.gram.as_ref(),
             v,
@@ -65,36 +140,30 @@ impl SchurComplement {
         self.cholesky.factor(self.s.as_mut())
     }
 
-    /// Replaces `right` by the solution with what was last factored.
-    pub(super) fn solve(&self, right: &mut [f64]) {
-        let order = right.len();
-        substitute(self.s.as_ref(), MatMut::from_column_major_slice_mut(right, order, 1));
-    }
-
-    /// The trace of the inverse of the whole matrix, with what was last factored. By the blocks of the inverse it is
+    /// Returns the trace of the inverse of the whole matrix that was last factored. By the blocks of the inverse it is
     /// `tr S⁻¹ + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ that
     /// is `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius).
     pub(super) fn trace_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> f64 {
         let (n1, h1) = (self.shape.inputs + 1, self.shape.hidden + 1);
         let Elimination { g_factor, f, .. } = elimination;
-        let room = self.inverse.get_or_insert_with(|| Inverse::new(self.s.nrows(), h1));
-        invert_lower_triangular(room.s.as_mut(), self.s.as_ref(), Par::Seq);
-        invert_lower_triangular(room.g.as_mut(), g_factor.as_ref(), Par::Seq);
-        let mut trace = squared_lower(&room.s) + self.shape.outputs as f64 * squared_lower(&room.g);
+        let inverse = self.inverse.get_or_insert_with(|| Inverse::new(self.s.nrows(), h1));
+        invert_lower_triangular(inverse.s.as_mut(), self.s.as_ref(), Par::Seq);
+        invert_lower_triangular(inverse.g.as_mut(), g_factor.as_ref(), Par::Seq);
+        let mut trace = squared_lower(&inverse.s) + self.shape.outputs as f64 * squared_lower(&inverse.g);
         // F = C Lg⁻ᵀ becomes C G⁻¹.
         solve_upper_triangular_in_place(g_factor.as_ref().transpose(), f.as_mut().transpose_mut(), Par::Seq);
         for output in 0..self.shape.outputs {
-            fill(room.r.as_mut(), |index, column| {
+            fill(inverse.r.as_mut(), |index, column| {
                 v[(index / n1, output)] * f[(index, column)]
             });
-            solve_lower_triangular_in_place(self.s.as_ref(), room.r.as_mut(), Par::Seq);
-            trace += room.r.squared_norm_l2();
+            solve_lower_triangular_in_place(self.s.as_ref(), inverse.r.as_mut(), Par::Seq);
+            trace += inverse.r.squared_norm_l2();
         }
         trace
     }
 }
 
-/// Room for the trace of the inverse, made when first asked for.
+/// Memory for the trace of the inverse, allocated when it is first needed.
 struct Inverse {
     s: Mat<f64>,
     g: Mat<f64>,
@@ -111,7 +180,7 @@ impl Inverse {
     }
 }
 
-/// The sum of squares of the lower triangle.
+/// Returns the sum of squares of the lower triangle.
 fn squared_lower(matrix: &Mat<f64>) -> f64 {
     let columns = (0..matrix.ncols()).map(|index| &column(matrix.as_ref(), index)[index..]);
     columns.flatten().map(|value| value * value).sum()
@@ -158,7 +227,7 @@ fn fill_schur(terms: &Terms<'_>, first: usize, s: MatMut<'_, f64>, squares: &mut
     });
 }
 
-/// What S is made of.
+/// The parts that S is made of.
 struct Terms<'a> {
     gram: MatRef<'a, f64>,
     v: MatRef<'a, f64>,
@@ -166,13 +235,13 @@ struct Terms<'a> {
     n1: usize,
 }
 
-/// Turns F Fᵀ, in the columns of `s`, into S without its damping. A type rather than a closure, which would be too long to
-/// be moved into the code for vector registers.
+/// Turns F Fᵀ, in the columns of `s`, into S without its damping. A struct instead of a closure so that the body is
+/// inlined into the SIMD-dispatched function.
 struct Completion<'a, 'b> {
     terms: &'a Terms<'b>,
     first: usize,
     s: MatMut<'a, f64>,
-    /// Room for n1 × n1.
+    /// Buffer of n1 × n1.
     square: &'a mut [f64],
 }
 
