@@ -117,7 +117,7 @@ fn the_reference_takes_each_sample_at_its_own_row_wire() {
     let set = noisy_test(&scene, &model);
     let reference = |set: &Dataset| {
         let mut rng = Seed(1).rng(Stream::Expectation);
-        reference_errors(&model, &scene, set, &mut rng).unwrap().z_mm
+        reference_errors(&model, &scene, set, &mut rng).unwrap().unwrap().z_mm
     };
     let whole = reference(&set);
     // As a fold dealt by samples would have them: no whole snapshots, and in another order.

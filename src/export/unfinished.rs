@@ -67,6 +67,7 @@ impl Unfinished {
 }
 
 /// Ends the program with this exit status, from any thread. Files in the making leave nothing.
+#[cfg(feature = "cli")]
 pub fn exit_leaving_nothing(status: i32) -> ! {
     // Held to the end, so that no other thread begins one meanwhile.
     let all = all();
