@@ -58,8 +58,8 @@ pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, rng: &mut i
         let (error, ridge) = held_out(&regressors(&candidate, x.view()), &targets);
         (error, candidate, ridge)
     };
-    let pilot = affordable.iter().copied().filter(|&rules| rules <= PILOT_RULES);
-    let pilot = pilot.last().unwrap_or(1);
+    let pilot = affordable.iter().rfind(|&&rules| rules <= PILOT_RULES);
+    let pilot = pilot.copied().unwrap_or(1);
     let errors = COMPONENTS.map(|components| (validated(pilot, components).0, components));
     let components = errors.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let components = components.map_or(COMPONENTS[0], |(_, components)| components);
