@@ -3,13 +3,13 @@ use std::fmt;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 
-/// The one number from which everything random in a run follows.
+/// Seed of a run, from which all its randomness follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Seed(pub u64);
 
-/// What randomness is for. Each use has a stream of its own, so that, say, more training samples change neither the
-/// test set nor the start of the network.
+/// Purpose of a random stream. Each purpose has its own stream, so that, for example, more training samples change
+/// neither the test set nor the initial weights of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
     /// Deformations of the training (and validation) set.
@@ -18,30 +18,31 @@ pub enum Stream {
     Test,
     /// Initial weights of the network.
     Start,
-    /// Which samples are held out for validation.
+    /// Selection of held-out samples, and division into folds.
     Split,
-    /// Which samples are in which fold of a cross-validation.
+    /// Seeds of the repeats and folds of a cross-validation.
     Folds,
-    /// What disturbs the readings of the training (and validation) set.
+    /// Noise in the readings of the training (and validation) set.
     TrainingNoise,
-    /// What disturbs the readings of the test set.
+    /// Noise in the readings of the test set.
     TestNoise,
-    /// Draws that estimate an expectation, such as the spread of a scene.
+    /// Monte Carlo estimates of expectations, such as the spread of a scene.
     Expectation,
 }
 
-/// Streams from here on are those of the starts after the first.
+/// First stream of the restarts after the first.
 const FURTHER_STARTS: u64 = 1 << 32;
 
 impl Seed {
-    /// The generator of one use.
+    /// Returns the random generator for one purpose.
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.0);
         rng.set_stream(stream as u64);
         rng
     }
 
-    /// The generator of the initial weights of start number `start`, from 0. Start 0 has that of [`Stream::Start`].
+    /// Returns the random generator for the initial weights of restart `start`, from 0. Restart 0 uses
+    /// [`Stream::Start`].
     pub fn start_rng(self, start: usize) -> ChaCha8Rng {
         let mut rng = self.rng(Stream::Start);
         if start > 0 {
