@@ -4,20 +4,20 @@ use crate::{
     sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
 };
 
-/// What can be hoped for in a scene, before anything is trained.
+/// Identifiability of a scene, assessed before anything is trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Of the worst conditioned row-wire of those read, its nodes half way down.
+    /// Identifiability of the worst-conditioned row-wire read, with its nodes at half the stroke.
     pub worst_row: Identifiability,
-    /// What stands in the way, and what to change.
+    /// Problems to expect, and what to change.
     pub warnings: Vec<IdentifiabilityWarning>,
 }
 
 impl Outlook {
-    /// Looks at every row-wire that the simulated scene reads.
+    /// Assesses every row-wire that the simulated scene reads.
     ///
     /// # Errors
-    /// An impossible sensor or scene, or singular values that do not converge.
+    /// If the sensor or scene is invalid, or singular values do not converge.
     pub fn of(simulation: &Simulation) -> Result<Self, OutlookError> {
         let Simulation { sensor, scene, .. } = simulation;
         sensor.check().map_err(IdentifiabilityError::from)?;
@@ -42,14 +42,14 @@ impl Outlook {
     }
 }
 
-/// Why there is no outlook.
+/// Error in assessing a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutlookError {
-    /// An impossible scene.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] crate::scene::SceneError),
-    /// An impossible sensor.
+    /// The sensor is invalid.
     #[error(transparent)]
     Identifiability(#[from] IdentifiabilityError),
 }
