@@ -10,7 +10,7 @@ pub struct TradePoint {
     pub settings: SimulatedSettings,
     /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
-    /// Training or fitting time in seconds, summed over all rows.
+    /// Training or fitting time in seconds, summed over all rows and restarts.
     pub training_seconds: f64,
     /// Errors of the Bayesian reference in this scene.
     pub reference: Errors,
