@@ -6,14 +6,14 @@ use thiserror::Error;
 
 use super::Dataset;
 
-/// What is dealt to the folds of a cross-validation.
+/// Unit of the folds of a cross-validation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FoldUnit {
-    /// Single samples, as the paper does. Rows of one snapshot then stand on both sides.
+    /// Single samples, as in the paper. Rows of one snapshot can then be in both the training and the test set.
     #[default]
     Sample,
-    /// Whole snapshots, so that no test sample shares its moment with a training sample.
+    /// Whole snapshots, so that no test sample was read at the same moment as a training sample.
     Snapshot,
 }
 
@@ -26,31 +26,31 @@ impl fmt::Display for FoldUnit {
     }
 }
 
-/// The k subsets of a k-fold cross-validation: every sample is in exactly one. Their sizes differ by at most one
+/// Random folds of a k-fold cross-validation: every sample is in exactly one, and their sizes differ by at most one
 /// sample (or snapshot).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Folds {
-    /// The samples of each fold, in ascending order.
+    /// Indices of the samples in each fold, ascending.
     folds: Vec<Vec<usize>>,
 }
 
-/// A number of folds that the set cannot be divided into.
+/// Error for a number of folds into which the set cannot be divided.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
 pub struct FoldsError {
-    /// Folds asked for.
+    /// Number of folds requested.
     pub folds: usize,
-    /// What there is to deal.
+    /// Number of units in the set.
     pub units: usize,
-    /// Of what kind.
+    /// Unit of the folds.
     pub unit: FoldUnit,
 }
 
 impl Folds {
-    /// Deals the samples of `set` to `folds` subsets at random.
+    /// Shuffles the samples of `set` and divides them into `folds` folds.
     ///
     /// # Errors
-    /// Fewer than two folds, or more than there are units.
+    /// If there are fewer than two folds, or more folds than units.
     pub fn deal(set: &Dataset, folds: usize, unit: FoldUnit, rng: &mut impl Rng) -> Result<Self, FoldsError> {
         let units: Vec<Vec<usize>> = match unit {
             FoldUnit::Sample => (0..set.samples()).map(|sample| vec![sample]).collect(),
@@ -73,17 +73,17 @@ impl Folds {
         })
     }
 
-    /// k, the number of folds.
+    /// Number of folds, k.
     pub fn count(&self) -> usize {
         self.folds.len()
     }
 
-    /// The samples that fold `fold` is tested on.
+    /// Indices of the test samples of fold `fold`.
     pub fn test(&self, fold: usize) -> &[usize] {
         &self.folds[fold]
     }
 
-    /// The samples of all folds but those named, in ascending order.
+    /// Indices of the samples in all folds except those given, ascending.
     pub fn without(&self, folds: &[usize]) -> Vec<usize> {
         let kept = self.folds.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
         let mut samples: Vec<usize> = kept.flat_map(|(_, samples)| samples).copied().collect();

@@ -3,24 +3,24 @@ use thiserror::Error;
 
 use super::Dataset;
 
-/// Whole frames, each all row-wires read at one moment: what a decoder is given in use.
+/// Whole frames, each with the readings of all row-wires at one moment: the input of a decoder in use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames {
     /// Snapshots × rows × channels.
     readings: Array3<f64>,
-    /// The sample of the set behind each row of each snapshot: snapshot by snapshot.
+    /// Index of the sample behind each row of each snapshot, snapshot by snapshot.
     samples: Vec<usize>,
 }
 
-/// A set that is not of whole frames.
+/// Error for a set that does not consist of whole frames.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the snapshot of sample {} is not whole: {found} samples of row-wire {}, where each row-wire read needs one", .sample + 1, .row_wire + 1)]
 pub struct FramesError {
-    /// The first sample of the snapshot, from 0.
+    /// Index of the first sample of the snapshot, from 0.
     pub sample: usize,
-    /// The row-wire, from 0.
+    /// Row-wire at fault, from 0.
     pub row_wire: usize,
-    /// Samples of it in the snapshot.
+    /// Number of samples of this row-wire in the snapshot.
     pub found: usize,
 }
 
@@ -30,7 +30,7 @@ impl Frames {
         self.readings.len_of(Axis(0))
     }
 
-    /// Row-wires of a frame.
+    /// Number of row-wires in a frame.
     pub fn rows(&self) -> usize {
         self.readings.len_of(Axis(1))
     }
@@ -40,24 +40,24 @@ impl Frames {
         self.readings.index_axis(Axis(0), snapshot)
     }
 
-    /// Readings of one frame, row by row.
+    /// Readings of one frame as a slice, row by row.
     pub fn frame(&self, snapshot: usize) -> &[f64] {
         let all = self.readings.as_slice().expect("built in standard layout");
         let length = all.len() / self.count();
         &all[snapshot * length..(snapshot + 1) * length]
     }
 
-    /// The samples of the set behind the rows of one frame.
+    /// Indices of the samples behind the rows of one frame.
     pub fn samples(&self, snapshot: usize) -> &[usize] {
         &self.samples[snapshot * self.rows()..(snapshot + 1) * self.rows()]
     }
 }
 
 impl Dataset {
-    /// The set as whole frames, in the order in which snapshots first occur; rows from first to last.
+    /// Groups the samples into whole frames, in the order in which snapshots first occur, rows in ascending order.
     ///
     /// # Errors
-    /// A snapshot that lacks a row-wire, or has one twice.
+    /// If a snapshot lacks a row-wire, or has one twice.
     pub fn frames(&self) -> Result<Frames, FramesError> {
         let rows = self.row_count();
         let mut samples = Vec::with_capacity(self.samples());

@@ -1,6 +1,9 @@
-//! Samples for training and testing. One sample is one row-wire at one moment: its readings, its targets, which row-wire
-//! it is of and which snapshot it belongs to. Simulated samples are resistances and the absolute coordinates of the
-//! row's nodes, drawn as whole snapshots; measured ones are built from their parts by [`Dataset::new`].
+//! Samples for training and testing. A sample is one row-wire at one moment: its readings, its targets, its row-wire
+//! and the snapshot it belongs to.
+//!
+//! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
+//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`] and [`Folds`]
+//! divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
 
 mod folds;
 mod frames;

@@ -1,32 +1,32 @@
 use super::Dataset;
 use crate::scene::RowModel;
 
-/// One value for every row-wire read, or one for each.
+/// One value shared by all row-wires read, or one value per row-wire.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PerRow<T>(
-    /// Never empty. A single value serves every row-wire.
+    /// Never empty. A single value is shared by all row-wires.
     Vec<T>,
 );
 
 impl<T> PerRow<T> {
-    /// One for every row-wire.
+    /// Creates a value shared by all row-wires.
     pub fn shared(value: T) -> Self {
         Self(vec![value])
     }
 
-    /// One for each row-wire read, in ascending order. A single one serves every row-wire.
+    /// Creates one value per row-wire read, in ascending order. A single value is shared by all row-wires.
     ///
     /// # Panics
-    /// If there is none.
+    /// If `values` is empty.
     pub fn each(values: Vec<T>) -> Self {
         assert!(!values.is_empty(), "at least one row-wire is read");
         Self(values)
     }
 
-    /// Makes one value from all samples of `training`, or one from those of each row-wire.
+    /// Fits one value to all samples of `training`, or one value per row-wire to its samples.
     ///
     /// # Errors
-    /// What `fit` says.
+    /// If `fit` fails.
     pub fn fit<E>(
         training: &Dataset,
         model: RowModel,
@@ -41,26 +41,26 @@ impl<T> PerRow<T> {
         }
     }
 
-    /// The value for the row-wire with this index among those read: the only index rule.
+    /// Returns the value for the row-wire with this index among those read; a shared value serves every index.
     ///
     /// # Panics
-    /// If each row-wire has a value of its own and there is no such row-wire.
+    /// If there is one value per row-wire and no row-wire with this index.
     #[inline]
     pub fn at(&self, row_index: usize) -> &T {
         &self.0[if self.0.len() == 1 { 0 } else { row_index }]
     }
 
-    /// As [`Self::at`], to be changed.
+    /// Returns the same value as [`Self::at`], mutably.
     ///
     /// # Panics
-    /// If each row-wire has a value of its own and there is no such row-wire.
+    /// If there is one value per row-wire and no row-wire with this index.
     #[inline]
     pub fn at_mut(&mut self, row_index: usize) -> &mut T {
         let index = if self.0.len() == 1 { 0 } else { row_index };
         &mut self.0[index]
     }
 
-    /// The one that serves every row-wire, if there is only one.
+    /// Returns the shared value, if there is only one.
     pub fn only(&self) -> Option<&T> {
         match &self.0[..] {
             [only] => Some(only),
@@ -68,12 +68,12 @@ impl<T> PerRow<T> {
         }
     }
 
-    /// All values: one, or one for each row-wire read.
+    /// Returns all values: one, or one per row-wire read.
     pub fn values(&self) -> &[T] {
         &self.0
     }
 
-    /// Makes another value of each.
+    /// Applies `make` to each value.
     pub fn map<U>(&self, make: impl FnMut(&T) -> U) -> PerRow<U> {
         PerRow(self.0.iter().map(make).collect())
     }

@@ -4,100 +4,99 @@ use csv::{ByteRecord, ReaderBuilder};
 use ndarray::Array2;
 use thiserror::Error;
 
-/// Reads resistances from CSV, block by block, so that large files need little memory.
+/// Reads resistances from CSV block by block, so that large files need little memory.
 ///
 /// The file has columns named `r_1` to `r_M4`, in any order and among others, or M4 columns without names.
 pub struct ResistanceReader<R> {
     rows: Rows<R>,
-    /// Position in the file of each resistance, in the order r_1 to r_M4.
+    /// Column index of each resistance, in the order r_1 to r_M4.
     columns: Vec<usize>,
-    /// Position of the column `row`, if there is one.
+    /// Column index of `row`, if there is such a column.
     row_column: Option<usize>,
-    /// Row-wires of the array, if their numbers are wanted.
+    /// Number of row-wires of the array, if row-wires are to be read.
     row_wires: Option<usize>,
-    /// Columns of the file.
+    /// Number of columns in the file.
     width: usize,
-    /// Whether the row at hand was read while looking for names.
+    /// `true` if the current row was already read while looking for names.
     waiting: bool,
 }
 
-/// The rows of a CSV file with their lines. The reader of `csv` would miscount where lines are empty, so it is given
+/// Rows of a CSV file with their line numbers. The reader of `csv` would miscount where lines are empty, so it is given
 /// one line at a time.
 struct Rows<R> {
     source: R,
     text: Vec<u8>,
-    /// Line of the row at hand, from 1.
+    /// Line number of the current row, from 1.
     line: u64,
-    /// The row at hand.
     record: ByteRecord,
 }
 
-/// Some rows of resistances.
+/// A block of rows of resistances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// Resistances in ohm: rows × M4.
     pub resistances_ohm: Array2<f64>,
-    /// Line of the file of each row, from 1.
+    /// Line number of each row in the file, from 1.
     pub lines: Vec<u64>,
-    /// Row-wire of each row, from 0, where they are wanted and the file has a column `row`.
+    /// Row-wire of each row, from 0, if requested and the file has a column `row`.
     pub row_wires: Option<Vec<usize>>,
 }
 
-/// What is wrong with a file of resistances. Lines and columns are counted from 1.
+/// Error in a file of resistances. Lines and columns are counted from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// Nothing to read.
+    /// The file has no rows of resistances.
     #[error("there are no rows of resistances in it")]
     Empty,
     /// A column is missing.
     #[error("there is no column r_{0}; name the columns r_1 to r_{1}, or give {1} columns without names")]
     Missing(usize, usize),
-    /// A name occurs twice.
+    /// A column name occurs twice.
     #[error("there are two columns r_{0}; keep one")]
     Twice(usize),
-    /// A row is too short or too long.
+    /// The number of columns in a row is wrong.
     #[error("line {line}: {found} columns where {expected} are needed, separated by commas")]
     Width {
-        /// Line.
+        /// Line number.
         line: u64,
-        /// Columns found.
+        /// Number of columns found.
         found: usize,
-        /// Columns needed.
+        /// Number of columns expected.
         expected: usize,
     },
     /// A field is not a resistance.
     #[error("line {line}, column {column}: '{text}' is not a resistance; give a finite number of ohm above 0")]
     Value {
-        /// Line.
+        /// Line number.
         line: u64,
-        /// Column.
+        /// Column number.
         column: usize,
-        /// What stands there.
+        /// Text of the field.
         text: String,
     },
-    /// A field is not the number of a row-wire.
+    /// A field is not a valid row-wire number.
     #[error("line {line}, column {column}: '{text}' is not a row-wire; give a number from 1 to {rows}")]
     RowWire {
-        /// Line.
+        /// Line number.
         line: u64,
-        /// Column.
+        /// Column number.
         column: usize,
-        /// What stands there.
+        /// Text of the field.
         text: String,
-        /// Row-wires of the array.
+        /// Number of row-wires of the array.
         rows: usize,
     },
-    /// A line break that ends no row: within quotes, or a carriage return alone.
+    /// A line break does not end a row: it is within quotes, or a carriage return alone.
     #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
     LineBreak(u64),
-    /// The file cannot be read on.
+    /// The file could not be read.
     #[error(transparent)]
     Io(#[from] io::Error),
 }
 
 impl<R: BufRead> Rows<R> {
-    /// Goes to the next row that is not blank; false at the end.
+    /// Advances to the next row that is not blank; returns `false` at the end.
     fn advance(&mut self) -> Result<bool, ReadError> {
         loop {
             self.text.clear();
@@ -127,10 +126,10 @@ impl<R: BufRead> Rows<R> {
 }
 
 impl<R: BufRead> ResistanceReader<R> {
-    /// Begins reading; `channels` is M4.
+    /// Creates a reader and reads the column names, if there are any; `channels` is M4.
     ///
     /// # Errors
-    /// The columns are not as they must be.
+    /// If the file cannot be read or is empty, or a column is missing or duplicated.
     pub fn new(source: R, channels: usize) -> Result<Self, ReadError> {
         let mut rows = Rows {
             source,
@@ -161,7 +160,7 @@ impl<R: BufRead> ResistanceReader<R> {
         })
     }
 
-    /// Also reads the column `row`, if there is one: the number of the row-wire, from 1 to `row_wires`.
+    /// Also reads the column `row`, if there is one: the row-wire number, from 1 to `row_wires`.
     #[must_use]
     pub fn with_row_wires(self, row_wires: usize) -> Self {
         Self {
@@ -170,10 +169,10 @@ impl<R: BufRead> ResistanceReader<R> {
         }
     }
 
-    /// The next rows, at most `most` of them; `None` at the end.
+    /// Reads at most `most` further rows; returns `None` at the end.
     ///
     /// # Errors
-    /// A row that is not as it must be.
+    /// If the file cannot be read, or a row is malformed.
     pub fn read(&mut self, most: usize) -> Result<Option<Reading>, ReadError> {
         let mut resistances_ohm = Vec::with_capacity(most * self.columns.len());
         let mut lines = Vec::new();
@@ -197,7 +196,7 @@ impl<R: BufRead> ResistanceReader<R> {
         }))
     }
 
-    /// Appends the resistances of the row at hand; returns its line.
+    /// Appends the resistances of the current row and returns its line number.
     fn parse(&self, resistances_ohm: &mut Vec<f64>) -> Result<u64, ReadError> {
         let Rows { line, ref record, .. } = self.rows;
         let (found, expected) = (record.len(), self.width);
@@ -216,7 +215,7 @@ impl<R: BufRead> ResistanceReader<R> {
         Ok(line)
     }
 
-    /// The row-wire of the row at hand, from 0, where it is wanted and said.
+    /// Returns the row-wire of the current row, from 0, if requested and given in the file.
     fn parse_row_wire(&self) -> Result<Option<usize>, ReadError> {
         let Some((column, rows)) = self.row_column.zip(self.row_wires) else {
             return Ok(None);
@@ -235,7 +234,7 @@ impl<R: BufRead> ResistanceReader<R> {
     }
 }
 
-/// What stands in a field, as far as a message can show it.
+/// Returns the text of a field, shortened to 40 characters for a message.
 fn excerpt(field: &[u8]) -> String {
     String::from_utf8_lossy(field).chars().take(40).collect()
 }
@@ -244,7 +243,7 @@ fn number(field: &[u8]) -> Option<f64> {
     std::str::from_utf8(field).ok()?.trim().parse().ok()
 }
 
-/// k of a column named `r_k`, k from 1 to `channels`.
+/// Returns k for a column named `r_k`, with k from 1 to `channels`.
 fn channel_of(name: &[u8], channels: usize) -> Option<usize> {
     let number = std::str::from_utf8(name).ok()?.strip_prefix("r_")?;
     number.parse().ok().filter(|channel| (1..=channels).contains(channel))

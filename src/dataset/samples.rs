@@ -3,63 +3,63 @@ use std::{collections::HashMap, sync::Arc};
 use ndarray::{Array2, ArrayView2, Axis};
 use thiserror::Error;
 
-/// The most samples of one set: what fits in memory with room to work.
+/// Largest number of samples in a set, chosen to fit in memory with room to work.
 pub const LARGEST_SAMPLES: usize = 1_000_000;
 
-/// Samples to learn from or to be judged by, simulated or measured. Each is one row-wire at one moment (or all that a
-/// sensor without row-wires reads at one moment), and knows which row-wire that is and which snapshot it belongs to.
+/// Samples for training or testing, simulated or measured. A sample is one row-wire at one moment (or, for a sensor
+/// without row-wires, everything read at one moment) and knows its row-wire and its snapshot.
 ///
-/// Of a simulated array the readings are resistances in ohm (M4 of them), the targets the absolute coordinates of the
-/// row's nodes in millimetres (3·M2: each node's x, y, z together). Measured samples have whatever was measured.
+/// For a simulated array, the readings are the M4 resistances in ohm and the targets the 3·M2 absolute coordinates of
+/// the row's nodes in millimetres (x, y, z node by node). Measured samples have whatever was measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     /// Samples × channels, in standard (row-major) layout.
     readings: Array2<f64>,
     /// Samples × outputs, in standard layout.
     targets: Array2<f64>,
-    /// `None` where there are no row-wires, or nobody knows which one a sample is of.
+    /// `None` if there are no row-wires, or those of the samples are unknown.
     rows: Option<SampleRows>,
-    /// The snapshot each sample belongs to: equal numbers, equal moments.
+    /// Snapshot of each sample; equal numbers mean the same moment.
     groups: Vec<usize>,
 }
 
-/// The row-wires of samples.
+/// Row-wires of the samples.
 #[derive(Clone, Debug, PartialEq)]
 struct SampleRows {
-    /// The row-wires read, in ascending order. A selection keeps them all, also those it has no sample of.
+    /// Row-wires read, in ascending order. A selection keeps all of them, even those without samples.
     read: Arc<[usize]>,
-    /// The index in `read` of each sample's row-wire.
+    /// Index in `read` of each sample's row-wire.
     indices: Vec<usize>,
 }
 
-/// Parts that do not make a set.
+/// Error in the parts of a set.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DatasetError {
-    /// No samples, channels or targets.
+    /// There are no samples, channels or targets.
     #[error("the {what} are {samples} × {columns}: give at least one sample and one column")]
     Empty {
-        /// Readings or targets.
+        /// Part at fault: readings or targets.
         what: &'static str,
-        /// Samples found.
+        /// Number of samples found.
         samples: usize,
-        /// Columns found.
+        /// Number of columns found.
         columns: usize,
     },
-    /// As many parts as there are samples are needed.
+    /// A part does not have one entry per sample.
     #[error("there are {found} {what} for {samples} samples: give one for each")]
     Length {
-        /// Targets, row-wires or groups.
+        /// Part at fault: targets, row-wires or groups.
         what: &'static str,
-        /// How many were found.
+        /// Number of entries found.
         found: usize,
-        /// Samples of the readings.
+        /// Number of samples in the readings.
         samples: usize,
     },
-    /// A sample is of a row-wire that is not read.
+    /// A sample belongs to a row-wire that is not read.
     #[error("sample {}: row-wire {} is not among the rows read; name every row-wire once, in ascending order", .sample + 1, .row_wire + 1)]
     RowWire {
-        /// Sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
         /// Row-wire, from 0.
         row_wire: usize,
@@ -67,12 +67,12 @@ pub enum DatasetError {
 }
 
 impl Dataset {
-    /// Builds a set from its parts: `readings` (samples × channels), `targets` (samples × outputs), each sample's
-    /// row-wire (from 0) where it is known, and each sample's group, the snapshot it belongs to. Samples of one group
-    /// are never divided between training and test where folds are dealt by snapshots.
+    /// Creates a set from `readings` (samples × channels), `targets` (samples × outputs), the row-wire of each sample
+    /// (from 0) if known, and the group of each sample, the snapshot it belongs to. Cross-validation by snapshots never
+    /// divides a group between training and test set.
     ///
     /// # Errors
-    /// Nothing in it, or parts of different lengths.
+    /// If a part is empty, or the parts differ in length.
     pub fn new(
         readings: Array2<f64>,
         targets: Array2<f64>,
@@ -107,11 +107,11 @@ impl Dataset {
         set.with_row_wires(&read, row_wires)
     }
 
-    /// The same samples as part of a sensor whose row-wires `read` are read: for a set that has no sample of some of
-    /// them. Sets that train and test one network must agree on them.
+    /// Declares all row-wires `read` of the sensor, for a set without samples of some of them. The sets that train and
+    /// test a network must agree on the row-wires read.
     ///
     /// # Errors
-    /// A sample of another row-wire, or row-wires out of order.
+    /// If a sample belongs to another row-wire, or `read` is not in ascending order.
     pub fn among_rows(self, read: &[usize]) -> Result<Self, DatasetError> {
         let row_wires: Option<Vec<usize>> = (0..self.samples()).map(|sample| self.row_wire(sample)).collect();
         match row_wires {
@@ -156,7 +156,7 @@ impl Dataset {
         contiguous(&self.targets, sample)
     }
 
-    /// Readings of all samples one after another, to be changed.
+    /// Readings of all samples as one mutable slice, sample by sample.
     pub(super) fn readings_mut(&mut self) -> &mut [f64] {
         self.readings.as_slice_mut().expect("kept in standard layout")
     }
@@ -166,42 +166,42 @@ impl Dataset {
         self.readings.nrows()
     }
 
-    /// Readings of a sample.
+    /// Number of readings per sample.
     pub fn channels(&self) -> usize {
         self.readings.ncols()
     }
 
-    /// Targets of a sample.
+    /// Number of targets per sample.
     pub fn outputs(&self) -> usize {
         self.targets.ncols()
     }
 
-    /// The row-wires read, from 0 in ascending order; `None` where samples do not know theirs.
+    /// Row-wires read, from 0 in ascending order; `None` if unknown.
     pub fn row_wires_read(&self) -> Option<&[usize]> {
         self.rows.as_ref().map(|rows| &*rows.read)
     }
 
-    /// Number of row-wires read; 1 where samples do not know theirs.
+    /// Number of row-wires read; 1 if unknown.
     pub fn row_count(&self) -> usize {
         self.row_wires_read().map_or(1, <[usize]>::len)
     }
 
-    /// The row-wire of a sample, from 0, where it is known.
+    /// Row-wire of a sample, from 0; `None` if unknown.
     pub fn row_wire(&self, sample: usize) -> Option<usize> {
         self.rows.as_ref().map(|rows| rows.read[rows.indices[sample]])
     }
 
-    /// The index of a sample's row-wire among those read; 0 where it is not known.
+    /// Index of a sample's row-wire among those read; 0 if unknown.
     pub fn row_index(&self, sample: usize) -> usize {
         self.rows.as_ref().map_or(0, |rows| rows.indices[sample])
     }
 
-    /// The group of each sample: the snapshot it belongs to.
+    /// Group of each sample, the snapshot it belongs to.
     pub fn groups(&self) -> &[usize] {
         &self.groups
     }
 
-    /// The samples of each snapshot, in the order in which snapshots first occur.
+    /// Returns the indices of the samples of each snapshot, in the order in which snapshots first occur.
     pub fn snapshots(&self) -> Vec<Vec<usize>> {
         let mut order = HashMap::new();
         let mut snapshots: Vec<Vec<usize>> = Vec::new();
@@ -215,7 +215,7 @@ impl Dataset {
         snapshots
     }
 
-    /// The samples with these numbers, in this order; each keeps its row-wire and its group.
+    /// Returns the samples with these indices, in this order; each keeps its row-wire and its group.
     #[must_use]
     pub fn select(&self, samples: &[usize]) -> Self {
         Self {
@@ -229,8 +229,8 @@ impl Dataset {
         }
     }
 
-    /// The samples of the row-wire with this index among those read, in their order; all samples where none knows its
-    /// row-wire.
+    /// Returns the samples of the row-wire with this index among those read, in order; all samples if row-wires are
+    /// unknown.
     #[must_use]
     pub fn of_row(&self, row_index: usize) -> Self {
         let samples: Vec<usize> = (0..self.samples())
@@ -249,7 +249,7 @@ fn contiguous(values: &Array2<f64>, sample: usize) -> &[f64] {
 mod tests {
     use super::*;
 
-    /// Readings and targets that name their sample.
+    /// Readings and targets that identify their sample.
     fn set(row_wires: Option<&[usize]>, groups: Vec<usize>) -> Result<Dataset, DatasetError> {
         let samples = groups.len();
         let readings = Array2::from_shape_fn((samples, 2), |(s, c)| (10 * s + c) as f64);

@@ -20,9 +20,9 @@ pub enum Stream {
     Test = 1,
     /// Initial weights of the network.
     Start = 2,
-    /// Choice of the samples held out for validation.
+    /// Selection of held-out samples, and division into folds.
     Split = 3,
-    /// Assignment of snapshots to the folds of a cross-validation.
+    /// Seeds of the repeats and folds of a cross-validation.
     Folds = 4,
     /// Noise of the training (and validation) set.
     TrainingNoise = 5,

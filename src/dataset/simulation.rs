@@ -8,7 +8,7 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Why samples cannot be drawn.
+/// Error in drawing simulated samples.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulationError {
@@ -18,23 +18,23 @@ pub enum SimulationError {
     /// The array has no such row-wire.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The model gives no resistance for a drawn deformation.
+    /// The model has no resistance for a drawn deformation.
     #[error("snapshot {}: {source}", .snapshot + 1)]
     Sensor {
-        /// Snapshot, from 0.
+        /// Index of the snapshot, from 0.
         snapshot: usize,
-        /// What the model said.
+        /// Error of the sensor model.
         source: SensorError,
     },
 }
 
 impl Dataset {
     /// Draws at least `samples` samples of the row-wires that the scene reads, as whole snapshots: 101 samples of 10
-    /// rows become 110. Snapshots come one after another, in each the rows from first to last.
+    /// rows become 110. Snapshots follow one another, each with its rows in ascending order.
     ///
     /// # Errors
-    /// A number of samples out of range, a row that the array does not have, or a deformation for which the model has
-    /// no resistance.
+    /// If the number of samples is out of range, the array lacks a row of the scene, or the model has no resistance for
+    /// a drawn deformation.
     pub fn simulate(
         model: &SensorModel,
         scene: &Scene,
@@ -77,11 +77,11 @@ impl Dataset {
         Ok(set.expect("one row-wire and one group for each sample"))
     }
 
-    /// Disturbs the readings, snapshot by snapshot; consecutive samples of one group are one snapshot. Targets stay as
-    /// they are, so sets with different noise compare.
+    /// Adds noise to the readings, snapshot by snapshot; consecutive samples of one group are one snapshot. The targets
+    /// do not change, so sets with different noise are comparable.
     ///
     /// # Errors
-    /// A model without resistances at rest.
+    /// If the model has no resistances at rest.
     pub fn disturb(&mut self, model: &SensorModel, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
         if noise.is_none() {
             return Ok(());
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(noisy.targets(), clean.targets());
         let ratio = (&noisy.readings() / &clean.readings()).mapv(|ratio| (ratio - 1.0).abs());
         let mean = ratio.mean().unwrap();
-        // Mean of the absolute value of a normal deviate.
+        // Mean absolute value of a normal deviate.
         let expected = 1e-3 * (2.0 / std::f64::consts::PI).sqrt();
         assert!((mean / expected - 1.0).abs() < 0.1, "{mean}");
     }

@@ -2,17 +2,17 @@ use rand::{Rng, seq::SliceRandom};
 
 use super::Dataset;
 
-/// A set divided for training: what the method fits, and what tells it when to stop.
+/// A set split into training and validation samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    /// Samples that the method fits.
+    /// Samples that the training method fits.
     pub training: Dataset,
-    /// Samples held out to judge each epoch; `None` if nothing was held out.
+    /// Held-out samples that judge each epoch; `None` if nothing is held out.
     pub validation: Option<Dataset>,
 }
 
-/// Holds out `held_out` snapshots for validation, drawn by `rng`; at least one snapshot stays for training. Whole
-/// snapshots are held out, so that no validation sample shares its moment with a training sample.
+/// Holds out `held_out` snapshots for validation, chosen by `rng`; at least one snapshot remains for training. Whole
+/// snapshots are held out, so that no validation sample was read at the same moment as a training sample.
 pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
     let snapshots = set.snapshots();
     let held_out = held_out.min(snapshots.len().saturating_sub(1));

@@ -6,28 +6,28 @@ use crate::{
     network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError},
 };
 
-/// An affine map from readings to targets, the scalings on both sides folded into its matrix.
+/// An affine map from readings to targets, with the scalings on both sides folded into its matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineMap {
     quantity: Quantity,
-    /// What each channel is taken relative to.
+    /// Centre of each channel, subtracted from its values.
     centre: Vec<f64>,
-    /// Targets from centred channels: channels × varying targets, in standard layout.
+    /// Matrix from centred channels to targets (channels × varying targets), in standard layout.
     matrix: Array2<f64>,
-    /// Every target where all channels are at their centre.
+    /// Targets for all channels at their centres.
     base: Vec<f64>,
-    /// Which targets vary.
+    /// Indices of the varying targets.
     varying: Vec<usize>,
     penalty: f64,
-    /// Room for one row's changes of the varying targets.
+    /// Buffer for the changes of the varying targets in one row.
     changes: Vec<f64>,
 }
 
 impl AffineMap {
-    /// The map that fits `training` best in the least-squares sense, on `quantity` of the readings.
+    /// Fits the map to `training` by least squares, on `quantity` of the readings.
     ///
     /// # Errors
-    /// Values that cannot be scaled.
+    /// If values cannot be scaled.
     pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
         let values = training.readings().mapv(|reading| quantity.of(reading));
         let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
@@ -36,11 +36,11 @@ impl AffineMap {
         Ok(Self::folded(&inputs, &coefficients, &outputs, 0.0))
     }
 
-    /// The map with a ridge penalty, whose size is chosen by generalised cross-validation. `noise` as in
-    /// [`Inputs::fit`].
+    /// Fits the map to `training` by ridge regression, with the penalty chosen by generalised cross-validation. `noise`
+    /// is as in [`Inputs::fit`].
     ///
     /// # Errors
-    /// Values that cannot be scaled.
+    /// If values cannot be scaled.
     pub fn ridge(training: &Dataset, choice: InputChoice, noise: f64) -> Result<Self, ScalingError> {
         let inputs = Inputs::fit(choice, training.readings(), noise)?;
         let outputs = MinMax::fit(training.targets())?;
@@ -74,7 +74,7 @@ impl AffineMap {
         }
     }
 
-    /// The penalty chosen, in units of squared singular values of the centred inputs; 0 for plain least squares.
+    /// Ridge penalty, in units of squared singular values of the centred inputs; 0 for plain least squares.
     pub fn penalty(&self) -> f64 {
         self.penalty
     }
@@ -125,7 +125,7 @@ mod tests {
         Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap()
     }
 
-    /// `set` with another third target: a function of the readings.
+    /// Returns `set` with its third target replaced by a function of the readings.
     fn with_target(set: &Dataset, target: impl Fn(&[f64]) -> f64) -> Dataset {
         let mut targets = set.targets().to_owned();
         for sample in 0..set.samples() {

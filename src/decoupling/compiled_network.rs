@@ -7,25 +7,25 @@ use crate::{
     network::{DecouplingNetwork, Networks, Quantity},
 };
 
-/// Networks made ready to decode frames fast, in double or single precision, without allocating: the scalings are
+/// Networks prepared to decode frames fast and without allocation, in double or single precision: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.
 ///
 /// Inputs are taken relative to a resistance R₀ in the middle of each channel, subtracted in double precision:
-/// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. So single precision loses nothing where readings differ little.
+/// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. Single precision therefore loses nothing where readings differ little.
 ///
-/// Whitening without noise amplifies patterns that hardly vary a million times, so large products nearly cancel. Where
-/// single precision would show there, the hidden layer's sums are made in double precision; the rest is not.
+/// Whitening without noise amplifies weak patterns a million times, so large products nearly cancel. Where this would
+/// show in single precision, the sums of the hidden layer are computed in double precision, and the rest in single.
 #[derive(Clone, Debug)]
 pub struct CompiledNetworks<T> {
     rows: usize,
     channels: usize,
     outputs_per_row: usize,
     networks: PerRow<Compiled<T>>,
-    /// Of one row.
+    /// Inputs of one row.
     inputs: Vec<T>,
-    /// Of all rows, so that hyperbolic tangents fill the vector registers.
+    /// Hidden nodes of all rows, so that hyperbolic tangents fill the vector registers.
     hidden: Vec<T>,
-    /// Of one row.
+    /// Outputs of one row.
     outputs: Vec<T>,
     /// Inputs and sums of one row in double precision.
     wide_inputs: Vec<f64>,
@@ -35,35 +35,35 @@ pub struct CompiledNetworks<T> {
 #[derive(Clone, Debug)]
 struct Compiled<T> {
     quantity: Quantity,
-    /// R₀ of each channel.
+    /// Reference resistance R₀ of each channel.
     centre_ohm: Vec<f64>,
     /// (channels + 1) × padded hidden nodes, the bias last.
     hidden_layer: Vec<T>,
-    /// The same in double precision, where sums need it.
+    /// Hidden layer in double precision, if its sums need it.
     wide_hidden_layer: Option<Vec<f64>>,
     /// (padded hidden nodes + 1) × padded outputs, the bias last.
     output_layer: Vec<T>,
-    /// The middle of every target, which constant ones keep.
+    /// Middle of the range of every target; constant targets stay there.
     middles: Vec<f64>,
-    /// Which target each output moves.
+    /// Index of the target that each output changes.
     varying: Vec<usize>,
     padded_hidden: usize,
     padded_outputs: usize,
 }
 
-/// Rounding of the hidden layer's sums from which they are made in double precision.
+/// Rounding error of the hidden sums above which they are computed in double precision.
 const LARGEST_ROUNDING: f64 = 1e-5;
-/// How far readings are from R₀, in proportion, for the estimate of rounding.
+/// Typical relative deviation of readings from R₀, for the estimate of rounding errors.
 const USUAL_CHANGE: f64 = 0.1;
 
-/// Layers are padded to a multiple of this.
+/// Layers are padded to a multiple of this number.
 const LANES: usize = 4;
 
 impl<T: Real> CompiledNetworks<T> {
     /// Prepares `networks` to decode frames of `rows` row-wires.
     ///
     /// # Panics
-    /// If their channels or outputs differ.
+    /// If the networks differ in channels or outputs.
     pub fn new(networks: &Networks, rows: usize) -> Self {
         let networks = networks.map(Compiled::new);
         let (channels, outputs) = (networks.at(0).centre_ohm.len(), networks.at(0).middles.len());
@@ -97,7 +97,7 @@ impl<T: Real> Compiled<T> {
             shape.outputs.next_multiple_of(LANES),
         );
         let channels = centre_ohm.len();
-        // What is computed of a reading is (R − R₀)/R for a conductance; the rest is folded into the weights.
+        // For a conductance, (R − R₀)/R is computed from the reading; the rest is folded into the weights.
         let per_computed = |channel: usize| match quantity {
             Quantity::Conductance => -1.0 / centre_ohm[channel],
             Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => 1.0,
@@ -191,7 +191,7 @@ impl<T: Real> Decoder for CompiledNetworks<T> {
 }
 
 impl<T: Real> CompiledNetworks<T> {
-    /// Decodes rows that follow upon each other from `first_row` on.
+    /// Decodes consecutive rows, beginning with `first_row`.
     fn decode_from(&mut self, first_row: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         pulp::Arch::new().dispatch(Decoding {
             decoder: self,
@@ -235,7 +235,7 @@ impl<T: Real> WithSimd for Decoding<'_, T> {
 }
 
 impl<T: Real> CompiledNetworks<T> {
-    /// Sums of all hidden nodes.
+    /// Computes the sums of all hidden nodes.
     #[inline(always)]
     fn feed_hidden_nodes(&mut self, first_row: usize, readings: &[f64]) {
         let width = self.hidden.len() / self.rows;
@@ -257,7 +257,7 @@ impl<T: Real> CompiledNetworks<T> {
         }
     }
 
-    /// Targets from the hidden nodes' outputs.
+    /// Computes the targets from the outputs of the hidden nodes.
     #[inline(always)]
     fn write_targets(&mut self, first_row: usize, targets: &mut [f64]) {
         let width = self.hidden.len() / self.rows;
@@ -276,8 +276,8 @@ impl<T: Real> CompiledNetworks<T> {
     }
 }
 
-/// `output = [input, 1] · layer`, the layer row by row with its biases last and as many columns as outputs, a multiple
-/// of [`LANES`]. Blocks of columns stay in registers.
+/// Computes `output = [input, 1] · layer`. The layer is stored row by row with its biases last; its number of columns
+/// is that of the outputs, a multiple of [`LANES`]. Blocks of columns stay in registers.
 #[inline(always)]
 fn affine<T: Real>(input: &[T], layer: &[T], output: &mut [T]) {
     let width = output.len();
@@ -292,7 +292,8 @@ fn affine<T: Real>(input: &[T], layer: &[T], output: &mut [T]) {
     }
 }
 
-/// The outputs `first..first + B`. Even and odd inputs are summed apart, so that additions need not wait for each other.
+/// Computes the outputs `first..first + B` and returns B. Even and odd inputs are summed separately, so that additions
+/// need not wait for each other.
 #[inline(always)]
 fn block<T: Real, const B: usize>(input: &[T], layer: &[T], width: usize, first: usize, output: &mut [T]) -> usize {
     let weights = |row: usize| -> &[T; B] {

@@ -3,34 +3,35 @@ use thiserror::Error;
 
 use crate::dataset::{Dataset, PerRow};
 
-/// A way from readings to targets: of a simulated array, from resistances in ohm to coordinates of nodes in millimetres.
+/// A method of decoding readings into targets; for a simulated array, resistances in ohm into coordinates of nodes in
+/// millimetres.
 ///
-/// Every decoder answers for single rows and for whole frames; both give the same bits.
+/// Every decoder decodes single rows and whole frames, with bit-identical results.
 pub trait Decoder: Send {
-    /// Readings of a row.
+    /// Number of readings per row.
     fn channels(&self) -> usize;
 
-    /// Targets of a row.
+    /// Number of targets per row.
     fn outputs(&self) -> usize;
 
-    /// Decodes one row: `readings` (channels) of the row-wire with this index among those read; writes `targets`
-    /// (outputs).
+    /// Decodes one row: reads `readings` (channels) of the row-wire with this index among those read, and writes
+    /// `targets` (outputs).
     ///
     /// # Errors
-    /// A reading that cannot be decoded; then nothing is written.
+    /// If a reading cannot be decoded; nothing is then written.
     ///
     /// # Panics
-    /// If the slices are of other lengths, or there is no such row-wire.
+    /// If the slices have other lengths, or there is no such row-wire.
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError>;
 
-    /// Decodes a frame, all row-wires read at one moment: `readings` are rows × channels, row by row, `targets` rows ×
-    /// outputs.
+    /// Decodes a frame, the readings of all row-wires at one moment: `readings` are rows × channels, row by row, and
+    /// `targets` rows × outputs.
     ///
     /// # Errors
-    /// A reading that cannot be decoded; what `targets` then hold means nothing.
+    /// If a reading cannot be decoded; the contents of `targets` are then unspecified.
     ///
     /// # Panics
-    /// If the slices are not of whole rows.
+    /// If the slices do not consist of whole rows.
     fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(readings.len() / channels, targets.len() / outputs);
@@ -43,26 +44,26 @@ pub trait Decoder: Send {
     }
 }
 
-/// A reading that cannot be decoded.
+/// Error for a reading that cannot be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("row {}, reading {}: {value} is not a resistance; give a finite number of ohm above 0", .row_index + 1, .channel + 1)]
 pub struct DecodeError {
-    /// The row's index in its frame or set, from 0.
+    /// Index of the row in its frame or set, from 0.
     pub row_index: usize,
-    /// The reading's index in its row, from 0.
+    /// Index of the reading in its row, from 0.
     pub channel: usize,
-    /// Its value.
+    /// Value of the reading.
     pub value: f64,
 }
 
 impl DecodeError {
-    /// Refuses readings of a row that are not above 0 and finite.
+    /// Checks that all readings of a row are finite and above 0.
     pub(crate) fn check(readings: &[f64]) -> Result<(), Self> {
         Self::check_that(readings, |value| (value > 0.0) & (value < f64::INFINITY))
     }
 
-    /// Refuses readings of a row that `is_sound` does not hold for. All are looked at in one sweep of the vector
-    /// registers, since bad ones are rare.
+    /// Checks that `is_sound` holds for all readings of a row, in a single vectorised pass, since bad readings are
+    /// rare.
     #[inline(always)]
     pub(crate) fn check_that(readings: &[f64], is_sound: impl Fn(f64) -> bool) -> Result<(), Self> {
         if readings.iter().fold(true, |all, &value| all & is_sound(value)) {
@@ -77,13 +78,13 @@ impl DecodeError {
     }
 }
 
-/// Decodes every sample of a set, each as of its own row-wire: samples × outputs.
+/// Decodes every sample of a set, each with the index of its own row-wire. Returns samples × outputs.
 ///
 /// # Errors
-/// A reading that cannot be decoded; its `row_index` is the sample.
+/// If a reading cannot be decoded; `row_index` is then the index of the sample.
 ///
 /// # Panics
-/// If the set has other channels, or row-wires that the decoder does not know.
+/// If the set has another number of channels, or row-wires unknown to the decoder.
 pub fn decode_set(decoder: &mut dyn Decoder, set: &Dataset) -> Result<Array2<f64>, DecodeError> {
     let mut answers = Array2::zeros((set.samples(), decoder.outputs()));
     for (sample, mut answer) in answers.rows_mut().into_iter().enumerate() {

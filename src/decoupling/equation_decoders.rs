@@ -4,18 +4,18 @@ use crate::{
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
-/// The row-wire of each row of a frame, found by trying where the scene's decoders are not told.
+/// Finds the row-wire of each row of a frame by trial, where the scene's decoders are not told.
 #[derive(Clone, Debug)]
 struct RowSearch {
     scale: ArrayScale,
-    /// The row-wires read.
+    /// Row-wires read.
     rows: Vec<usize>,
-    /// ln R of each of `rows` at rest; empty where rows are known.
+    /// Logarithms of the resistances of each of `rows` at rest; empty if rows are known.
     rest: Vec<Vec<f64>>,
     trial_mm: Vec<f64>,
 }
 
-/// An answer whose readings are explained to this relative error (rms) is the right row's: others are not tried.
+/// Relative misfit (root mean square) below which a row-wire is accepted without trying the others.
 const EXPLAINED: f64 = 1e-10;
 
 impl RowSearch {
@@ -37,9 +37,10 @@ impl RowSearch {
         })
     }
 
-    /// Solves one row by `solve`, which answers for one row-wire and gives the rms relative misfit. Where rows are not
-    /// known, row-wires are tried in the order of how alike their readings at rest are, and the one that explains the
-    /// readings best is taken: rows that mirror each other then come back as either of them.
+    /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit.
+    ///
+    /// If rows are not known, row-wires are tried in the order of similarity of their readings at rest, and the one
+    /// that fits the readings best is taken; rows that mirror each other may then be confused.
     fn solve(
         &mut self,
         row_index: usize,
@@ -72,7 +73,8 @@ impl RowSearch {
     }
 }
 
-/// Newton's method on every row of a frame. Where rows are not known, the one that explains the readings best is taken.
+/// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the one that fits the readings best
+/// is taken.
 #[derive(Clone, Debug)]
 pub struct NewtonDecoder {
     newton: Newton,
@@ -80,10 +82,10 @@ pub struct NewtonDecoder {
 }
 
 impl NewtonDecoder {
-    /// For `rows` of `model` in `scene`.
+    /// Creates a decoder for `rows` of `model` in `scene`.
     ///
     /// # Errors
-    /// A sensor without resistances at rest.
+    /// If the sensor has no resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rules: NewtonRules) -> Result<Self, SensorError> {
         Ok(Self {
             newton: Newton::new(model, scene, rules),
@@ -110,8 +112,8 @@ impl Decoder for NewtonDecoder {
     }
 }
 
-/// Newton's method with noise and prior on every row of a frame. Where rows are not known, the one that explains the
-/// readings best is taken.
+/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the one that
+/// fits the readings best is taken.
 #[derive(Clone, Debug)]
 pub struct PosteriorDecoder {
     posterior: Posterior,
@@ -119,10 +121,10 @@ pub struct PosteriorDecoder {
 }
 
 impl PosteriorDecoder {
-    /// Decodes `rows` of `model` in `scene`, which must be among those that `posterior` was made for.
+    /// Creates a decoder for `rows` of `model` in `scene`, which must be among the rows of `posterior`.
     ///
     /// # Errors
-    /// A sensor without resistances at rest.
+    /// If the sensor has no resistances at rest.
     pub fn new(posterior: Posterior, model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         Ok(Self {
             posterior,
@@ -149,7 +151,7 @@ impl Decoder for PosteriorDecoder {
     }
 }
 
-/// Another decoder's answer, improved by a few steps of Newton's method: with noise and prior where the scene has noise.
+/// Improves the answer of another decoder by a few Gauss-Newton steps, with noise and prior if the scene has noise.
 pub struct PolishedDecoder {
     first: Box<dyn Decoder>,
     model: SensorModel,
@@ -160,8 +162,8 @@ pub struct PolishedDecoder {
 }
 
 impl PolishedDecoder {
-    /// `steps` steps after `first`, for `rows` of `model` in `scene`, all of which `posterior` was made for. Where rows
-    /// are not known, the row-wire nearest to the first answer is taken.
+    /// Creates a decoder that takes `steps` steps after `first`, for `rows` of `model` in `scene`, which must be among
+    /// the rows of `posterior`. If rows are not known, the row-wire nearest to the first answer is taken.
     pub fn new(
         first: Box<dyn Decoder>,
         posterior: Posterior,
@@ -180,7 +182,7 @@ impl PolishedDecoder {
         }
     }
 
-    /// The row-wire whose x is nearest to the mean of the coordinates.
+    /// Returns the row-wire whose x is nearest to the mean x of the coordinates.
     fn nearest_row(&self, coordinates_mm: &[f64]) -> usize {
         let x_mm = coordinates_mm.iter().step_by(3).sum::<f64>() / (coordinates_mm.len() / 3) as f64;
         let distance = |row: usize| (self.model.geometry.row_x_mm(row) - x_mm).abs();

@@ -2,13 +2,13 @@ use faer::{Mat, linalg::solvers::SolveLstsq};
 
 use super::row_problem::{Range, RowProblem};
 
-/// Equations for a step.
+/// Linearised equations for one step.
 pub(super) struct Linearised {
     /// Unknowns that may move: all, or those not held at a bound.
     pub(super) free: Vec<usize>,
-    /// Readings × free unknowns, 1/mm.
+    /// Jacobian (readings × free unknowns), in 1/mm.
     pub(super) jacobian: Mat<f64>,
-    /// −ρ.
+    /// Right-hand side, −ρ.
     pub(super) right: Vec<f64>,
     /// Largest diagonal entry of JᵀJ.
     pub(super) scale: f64,
@@ -43,7 +43,7 @@ impl Linearised {
     }
 }
 
-/// `min ‖J δ − right‖² + damping ‖δ‖²` by QR of J with √damping · I below it.
+/// Minimises `‖J δ − right‖² + damping ‖δ‖²` by a QR decomposition of J stacked on √damping · I.
 pub(super) fn damped_step(jacobian: &Mat<f64>, right: &[f64], damping: f64) -> Vec<f64> {
     let (equations, unknowns) = (jacobian.nrows(), jacobian.ncols());
     let below = if damping > 0.0 || equations < unknowns {

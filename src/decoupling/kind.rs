@@ -2,33 +2,33 @@ use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
-/// A way from the readings of a frame to deformation.
+/// Method of decoding the readings of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DecoderKind {
-    /// The mean of the training set.
+    /// Mean of the training set, whatever the readings.
     Mean,
-    /// The best affine map, ridge-regularised.
+    /// Affine map fitted by ridge regression.
     Ridge,
-    /// The trained network.
+    /// Network trained on the samples.
     Network,
-    /// Gaussians around centres.
+    /// Radial-basis network: Gaussians around centres.
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
     Fuzzy,
-    /// Newton's method on Eq. (2); with noise and prior where the scene has noise.
+    /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise.
     Newton,
-    /// The network, then at most [`DecoderKind::POLISH_STEPS`] of Newton's steps.
+    /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
     Polish,
 }
 
-/// The colour of a decoder in charts, on screen and in print.
+/// Colour of a decoder in charts, on screen and in print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ColourKey {
-    /// For what is only there to be compared with.
+    /// Grey, for decoders that serve only as a comparison.
     Grey,
     /// Violet.
     Violet,
-    /// The network's own colour.
+    /// Blue, the network's own colour.
     Blue,
     /// Orange.
     Orange,
@@ -40,7 +40,7 @@ pub enum ColourKey {
     Cyan,
 }
 
-/// The precision in which a network computes.
+/// Floating-point precision in which a network computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Precision {
     /// 64 bits.
@@ -50,15 +50,15 @@ pub enum Precision {
     Single,
 }
 
-/// A word that is none of the decoders.
+/// Error for a word that names no decoder.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{text}' is not a decoder: give {words}", words = words())]
 pub struct DecoderKindError {
-    /// The word.
+    /// Word given.
     pub text: String,
 }
 
-/// All that is said of a decoder, in one place.
+/// Properties of a decoder, all in one place.
 struct Entry {
     word: &'static str,
     name: &'static str,
@@ -67,7 +67,7 @@ struct Entry {
     needs: Needs,
 }
 
-/// What a decoder needs beside training samples.
+/// Requirements of a decoder beyond training samples.
 #[derive(Clone, Copy, PartialEq)]
 enum Needs {
     Nothing,
@@ -77,7 +77,7 @@ enum Needs {
 }
 
 impl DecoderKind {
-    /// All of them, in the order offered.
+    /// All decoders, in the order offered to the user.
     pub const ALL: [Self; 7] = [
         Self::Mean,
         Self::Ridge,
@@ -88,7 +88,7 @@ impl DecoderKind {
         Self::Polish,
     ];
 
-    /// The most steps of [`DecoderKind::Polish`].
+    /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;
 
     const fn entry(self) -> Entry {
@@ -145,7 +145,7 @@ impl DecoderKind {
         }
     }
 
-    /// Its name in tables, charts and forms; that of a network in single precision says so.
+    /// Returns the name in tables, charts and forms; a network in single precision is named as such.
     pub fn name(self, precision: Precision) -> &'static str {
         match (self, precision) {
             (Self::Network, Precision::Single) => "Network f32",
@@ -153,27 +153,27 @@ impl DecoderKind {
         }
     }
 
-    /// A sentence on how it decodes.
+    /// Returns a sentence on the method of decoding.
     pub fn meaning(self) -> &'static str {
         self.entry().meaning
     }
 
-    /// Its colour in charts.
+    /// Returns the colour in charts.
     pub fn colour(self) -> ColourKey {
         self.entry().colour
     }
 
-    /// Whether it decodes by the trained network.
+    /// Returns `true` if the decoder uses the trained network.
     pub fn needs_network(self) -> bool {
         matches!(self.entry().needs, Needs::Network | Needs::NetworkAndSensor)
     }
 
-    /// Whether it solves the sensor's equations, so that measured samples alone are not enough.
+    /// Returns `true` if the decoder solves the equations of the sensor, so that measured samples alone are not enough.
     pub fn needs_sensor(self) -> bool {
         matches!(self.entry().needs, Needs::Sensor | Needs::NetworkAndSensor)
     }
 
-    /// The precisions it computes in.
+    /// Returns the precisions in which the decoder computes.
     pub fn precisions(self) -> &'static [Precision] {
         match self {
             Self::Network => &[Precision::Double, Precision::Single],
@@ -182,7 +182,7 @@ impl DecoderKind {
     }
 }
 
-/// The words of all decoders: `mean, ridge … or polish`.
+/// Lists the words of all decoders: `mean, ridge … or polish`.
 fn words() -> String {
     let words = DecoderKind::ALL.map(|kind| kind.entry().word);
     let [others @ .., last] = &words;
@@ -190,7 +190,7 @@ fn words() -> String {
 }
 
 impl fmt::Display for DecoderKind {
-    /// The word for it in the terminal and in files.
+    /// Writes the word used in the terminal and in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.entry().word)
     }

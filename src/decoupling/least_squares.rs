@@ -6,17 +6,17 @@ use crate::{
     network::{Inputs, MinMax},
 };
 
-/// Coefficients (inputs + 1 × varying outputs, the constant last) of the affine map from scaled inputs to scaled outputs
-/// that fits `training` best in the least-squares sense.
+/// Fits the affine map from scaled inputs to scaled outputs to `training` by least squares, and returns its
+/// coefficients (inputs + 1 × varying outputs, the constant last).
 ///
-/// By the singular value decomposition; directions that the training set does not resolve (singular values below
-/// rounding) are left out, which gives the smallest map among equals.
+/// Uses the singular value decomposition. Directions that the training set does not resolve (singular values below
+/// rounding) are left out, which gives the least-squares solution of minimum norm.
 pub(super) fn fit_least_squares(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Array2<f64> {
     let (n1, m) = (inputs.count() + 1, outputs.varying().len());
     let triangle = triangle(training, inputs, outputs);
     let rows = n1.min(triangle.nrows());
     let (a, y) = triangle.as_ref().subrows(0, rows).split_at_col(n1);
-    // Finite input always converges; a zero map is the honest answer if it ever does not.
+    // Finite values always converge; if they ever do not, a zero map is the honest answer.
     let fitted = a.thin_svd().ok().map(|svd| {
         let singular = svd.S().column_vector();
         let smallest = f64::EPSILON * training.samples().max(n1) as f64 * singular[0];
@@ -30,11 +30,11 @@ pub(super) fn fit_least_squares(training: &Dataset, inputs: &Inputs, outputs: &M
     Array2::from_shape_fn((n1, m), |(i, t)| fitted.as_ref().map_or(0.0, |b| b[(i, t)]))
 }
 
-/// The triangular factor of [inputs, 1, outputs], all scaled: its least-squares problems are those of the whole set. Found
-/// a chunk of samples at a time, each joined to the factor of those before it, so that memory does not grow with
-/// their number (Golub and Van Loan, Matrix Computations, section 6.5.2).
+/// Returns the triangular factor of [inputs, 1, outputs], all scaled, which has the same least-squares solutions as the
+/// whole set. Each chunk of samples is joined to the factor of those before it, so that memory does not grow with their
+/// number (Golub and Van Loan, Matrix Computations, section 6.5.2).
 fn triangle(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Mat<f64> {
-    /// Samples of a chunk.
+    /// Number of samples per chunk.
     const CHUNK: usize = 512;
     let columns = inputs.count() + 1 + outputs.varying().len();
     let mut factor = Mat::<f64>::zeros(0, columns);

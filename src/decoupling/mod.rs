@@ -1,21 +1,21 @@
-//! Decoupling: readings in, deformation (or whatever was measured) out, by every way we know. Every way is a
-//! [`Decoder`], of single rows and of whole frames.
+//! Decoupling: from readings to deformation (or other measured targets), by several methods. Each is a [`Decoder`] of
+//! single rows and of whole frames.
 //!
 //! | decoder | how it decodes |
 //! |---|---|
-//! | [`TrainingMean`] | knows nothing: the baseline |
-//! | [`AffineMap`] | an affine map, by least squares or with a ridge penalty chosen by cross-validation |
+//! | [`TrainingMean`] | always answers the mean of the training set: the baseline |
+//! | [`AffineMap`] | an affine map, by least squares or ridge regression with generalised cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
-//! | [`NewtonDecoder`] | solves Eq. (2) |
-//! | [`PolishedDecoder`] | another decoder's answer, then a few Newton steps |
-//! | [`PosteriorDecoder`] | Newton's method with noise and prior |
+//! | [`NewtonDecoder`] | solves Eq. (2) by the Gauss-Newton method |
+//! | [`PolishedDecoder`] | another decoder's answer, improved by a few Gauss-Newton steps |
+//! | [`PosteriorDecoder`] | the Gauss-Newton method with noise and prior |
 //!
-//! [`DecoderKind`] lists them with all that is said of each.
-//! Decoders of readings alone come as [`PerRow`](crate::dataset::PerRow): one for every row-wire, or one for each.
-//! [`resistance_residual`] tells how well an answer explains the readings, without ground truth.
+//! [`DecoderKind`] lists them with their names, meanings and colours. Decoders of readings alone come as
+//! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`] tells
+//! how well an answer explains the readings, without ground truth.
 
 mod affine_map;
 mod box_posterior;

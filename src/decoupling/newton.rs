@@ -6,31 +6,32 @@ use super::{
 };
 use crate::{scene::Scene, sensor::SensorModel};
 
-/// Gauss-Newton with Levenberg's damping and bounds on Eq. (2) for one known row-wire. Unknown is only what the scene
-/// moves.
+/// Gauss-Newton method with Levenberg's damping and bounds for Eq. (2) of one known row-wire. The unknowns are only
+/// what the scene moves.
 ///
-/// Plain steps first; where they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that are not held at a bound, and is cut off at
-/// the bounds. μ is 0 until a step fails to lower the misfit; then it grows tenfold, and shrinks again after steps that do.
+/// Plain steps are tried first. If they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that
+/// are not held at a bound, and is cut off at the bounds. μ is 0 until a step fails to lower the misfit; then it grows
+/// tenfold, and shrinks again after steps that succeed.
 #[derive(Clone, Debug)]
 pub struct Newton {
     problem: RowProblem,
     ranges: Vec<Range>,
-    /// Where iterates may wander.
+    /// Ranges that plain steps may not leave.
     wide: Vec<Range>,
     rules: NewtonRules,
 }
 
-/// Damping relative to the largest diagonal entry of JᵀJ at which a failed step begins again.
+/// Damping of the first retry after a failed step, relative to the largest diagonal entry of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-12;
-/// Plain steps tried before damped ones.
+/// Largest number of plain steps before damped ones.
 const MOST_PLAIN_STEPS: usize = 25;
-/// A plain step that would have to be shortened further leads out of the sensor.
+/// Smallest fraction of a plain step; one that must be shortened further leads out of the sensor.
 const SHORTEST_SHARE: f64 = 1e-3;
-/// Damping beyond which steps only get shorter.
+/// Relative damping beyond which steps only get shorter.
 const LARGEST_DAMPING: f64 = 1e6;
 
 impl Newton {
-    /// Solves rows of `model` in `scene`.
+    /// Creates a solver for rows of `model` in `scene`.
     pub fn new(model: &SensorModel, scene: &Scene, rules: NewtonRules) -> Self {
         Self {
             problem: RowProblem::new(model, scene.movement.axes()),
@@ -40,21 +41,21 @@ impl Newton {
         }
     }
 
-    /// Changes when to end.
+    /// Replaces the stopping rules.
     pub(super) fn set_rules(&mut self, rules: NewtonRules) {
         self.rules = rules;
     }
 
-    /// Unknowns of a row.
+    /// Number of unknowns per row.
     pub fn unknowns(&self) -> usize {
         self.problem.unknowns()
     }
 
-    /// Solves row-wire `row` from its readings in ohm (M4), starting from the undeformed row; writes absolute
+    /// Solves row-wire `row` for its readings in ohm (M4), starting from the undeformed row, and writes absolute
     /// coordinates (3·M2).
     ///
     /// # Errors
-    /// Readings that are no resistances.
+    /// If readings are not resistances.
     pub fn solve(
         &mut self,
         row: usize,
@@ -66,10 +67,11 @@ impl Newton {
         Ok(self.run(&start, coordinates_mm))
     }
 
-    /// As [`Self::solve`], starting from the answer of another decoder in `coordinates_mm`, which is replaced.
+    /// Solves as [`Self::solve`], starting from the answer of another decoder in `coordinates_mm`, which is
+    /// overwritten.
     ///
     /// # Errors
-    /// Readings that are no resistances.
+    /// If readings are not resistances.
     pub fn polish(
         &mut self,
         row: usize,
@@ -88,8 +90,8 @@ impl Newton {
         Ok(())
     }
 
-    /// Plain Gauss-Newton first: it converges from anywhere nearby, though its misfit may rise on the way. If it ends
-    /// out of bounds or nowhere, as with noise, damped steps within the bounds follow.
+    /// Runs plain Gauss-Newton steps first, which converge from anywhere nearby, though the misfit may rise on the way.
+    /// If they end out of bounds or do not converge, as with noise, damped steps within the bounds follow.
     fn run(&mut self, start: &[f64], coordinates_mm: &mut [f64]) -> NewtonReport {
         let mut unknowns = start.to_vec();
         self.clamp(&mut unknowns);
@@ -123,7 +125,7 @@ impl Newton {
         }
     }
 
-    /// Plain steps, each shortened to end where the model still means something.
+    /// Takes plain steps, each shortened to stay where the model is valid.
     fn wander(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
         let most = self.rules.steps.min(MOST_PLAIN_STEPS);
         for steps in 1..=most {
@@ -142,7 +144,7 @@ impl Newton {
                 }
                 length = length.max(step.abs());
             }
-            // Written so that NaN ends it too.
+            // Written so that NaN also ends the iteration.
             if !(share >= SHORTEST_SHARE && length.is_finite()) {
                 return (NewtonStop::NoStepHelps, steps - 1);
             }
@@ -157,7 +159,7 @@ impl Newton {
         (NewtonStop::StepsTaken, most)
     }
 
-    /// Damped steps within the bounds, each of which lowers the misfit.
+    /// Takes damped steps within the bounds, each of which lowers the misfit.
     fn descend(&mut self, unknowns: &mut Vec<f64>, most_steps: usize) -> NewtonReport {
         let mut residual = self.problem.evaluate(unknowns);
         let mut damping = 0.0;

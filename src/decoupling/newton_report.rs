@@ -1,17 +1,17 @@
 use std::fmt;
 
-/// When to end Newton's method.
+/// Stopping rules of the Gauss-Newton method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonRules {
-    /// Most steps. A step that was rejected and shortened counts as one.
+    /// Largest number of steps. A step that is rejected and shortened counts as one.
     pub steps: usize,
-    /// Length of a step, in millimetres, below which the deformation is known.
+    /// Step length in millimetres below which the method has converged.
     pub tolerance_mm: f64,
 }
 
 impl Default for NewtonRules {
-    /// A tenth of a picometre: where rounding of the readings begins to show in the worst-seen pattern of the paper's
-    /// largest array (singular value 1e-5 per mm).
+    /// Returns a limit of 50 steps and a tolerance of a tenth of a picometre, where rounding of the readings begins to
+    /// show in the least visible pattern of the paper's largest array (singular value 1e-5 per mm).
     fn default() -> Self {
         Self {
             steps: 50,
@@ -20,12 +20,12 @@ impl Default for NewtonRules {
     }
 }
 
-/// Why Newton's method ended.
+/// Reason for stopping the Gauss-Newton method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NewtonStop {
     /// The last step was shorter than the tolerance.
     Converged,
-    /// All steps were taken.
+    /// All allowed steps were taken.
     StepsTaken,
     /// No damping gives a step that lowers the misfit.
     NoStepHelps,
@@ -43,13 +43,13 @@ impl fmt::Display for NewtonStop {
     }
 }
 
-/// How a row was solved.
+/// Outcome of solving a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonReport {
-    /// Why it ended.
+    /// Reason for stopping.
     pub stop: NewtonStop,
-    /// Steps taken.
+    /// Number of steps taken.
     pub steps: usize,
-    /// rms over readings of the relative misfit m/R − 1.
+    /// Root mean square over readings of the relative misfit m/R − 1.
     pub residual: f64,
 }

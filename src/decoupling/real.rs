@@ -2,17 +2,17 @@ use std::ops::{Add, Div, Mul};
 
 use crate::network::{tanh_in_place, tanh_in_place_single};
 
-/// A precision in which networks decode.
+/// Floating-point type in which networks decode.
 pub trait Real: Copy + Send + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
-    /// 0.
+    /// Zero.
     const ZERO: Self;
-    /// The relative spacing of numbers.
+    /// Machine epsilon, the relative spacing of numbers.
     const EPSILON: f64;
 
-    /// The nearest value to a double.
+    /// Rounds a double to the nearest value.
     fn of(value: f64) -> Self;
 
-    /// As a double.
+    /// Converts to a double.
     fn to_f64(self) -> f64;
 
     /// Replaces each value by its hyperbolic tangent.

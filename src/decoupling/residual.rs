@@ -1,16 +1,17 @@
 use super::row_problem::RowProblem;
 use crate::sensor::{Axes, SensorModel};
 
-/// How well an answer explains the readings of a row: rms over readings of m/R − 1, with R the model's resistances at
-/// the decoded coordinates. It needs no ground truth, so it tells how far to trust any decoder; 1 and above is no
-/// explanation at all. Infinite if the model has no resistance there.
+/// Root mean square of m/R − 1 over the readings m of a row, with R the model's resistances at the decoded coordinates.
+///
+/// It needs no ground truth, so it tells how far to trust any decoder; 1 and above explains nothing. Infinite if the
+/// model has no resistance at these coordinates.
 ///
 /// # Panics
 /// If there are not M4 readings and 3·M2 coordinates.
 pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinates_mm: &[f64]) -> f64 {
     assert_eq!(coordinates_mm.len(), model.scale.coordinates_per_row());
     let mut problem = RowProblem::new(model, Axes::Xyz);
-    // Displacements are taken from the first row, wherever the nodes are.
+    // Displacements are measured from the first row, wherever the nodes are.
     problem.read(0, readings_ohm);
     let mut unknowns = vec![0.0; problem.unknowns()];
     problem.unknowns_of(coordinates_mm, &mut unknowns);

@@ -3,9 +3,11 @@ use ndarray::{Array2, ArrayView2, Axis, Slice};
 
 use crate::network::ScalingError;
 
-/// Coefficients (inputs + 1 × outputs, the constant last) of the ridge regression of `y` on `x`, and the penalty with
-/// the least generalised cross-validation error `‖residual‖² / (S − effective parameters)²` (Golub, Heath and Wahba 1979) of
-/// a grid of powers of ten.
+/// Fits the ridge regression of `y` on `x` and returns its coefficients (inputs + 1 × outputs, the constant last) and
+/// penalty.
+///
+/// The penalty is chosen from a grid of powers of ten by the least generalised cross-validation error
+/// `‖residual‖² / (S − effective parameters)²` (Golub, Heath and Wahba 1979).
 pub(super) fn fit_ridge(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>) -> Result<(Array2<f64>, f64), ScalingError> {
     let (samples, n) = x.dim();
     let outputs = y.ncols();
@@ -40,7 +42,7 @@ pub(super) fn fit_ridge(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>) -> Resul
             residual -= power * (1.0 - (1.0 - kept).powi(2));
         }
         let free = samples as f64 - effective;
-        // Rounding may leave a residual below 0 where the fit is exact.
+        // Rounding may make the residual negative where the fit is exact.
         if free > 0.5 {
             residual.max(f64::EPSILON * f64::EPSILON * total) / (free * free)
         } else {

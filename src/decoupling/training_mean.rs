@@ -3,7 +3,7 @@ use ndarray::{Array1, Axis};
 use super::{DecodeError, Decoder};
 use crate::dataset::Dataset;
 
-/// Answers with the mean targets of the training set, whatever it reads: what knowing nothing scores.
+/// Decoder that always answers the mean targets of the training set, the score of knowing nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingMean {
     channels: usize,
@@ -11,7 +11,7 @@ pub struct TrainingMean {
 }
 
 impl TrainingMean {
-    /// Takes the mean over all samples.
+    /// Computes the mean targets over all samples.
     ///
     /// # Panics
     /// If there are no samples.

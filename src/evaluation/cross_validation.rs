@@ -10,23 +10,23 @@ use crate::{
     decoupling::decode_set,
 };
 
-/// A k-fold cross-validation, repeated with the samples shuffled anew.
+/// A k-fold cross-validation, repeated with the samples reshuffled.
 ///
-/// Fold by fold, the network is tested on the fold, the next fold chooses the best weights and ends the training, and
-/// the others are fitted. With two folds none is left to choose by.
+/// Each fold in turn is the test set and the fold after it the validation set, which selects the best weights and ends
+/// the training; the others are the training set. With two folds there is no validation set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CrossValidation {
-    /// k.
+    /// Number of folds, k.
     pub folds: usize,
-    /// How often the samples are shuffled anew.
+    /// Number of repeats, each with the samples reshuffled.
     pub repeats: usize,
     /// Unit of the folds.
     pub unit: FoldUnit,
 }
 
 impl Default for CrossValidation {
-    /// As the paper: 10 folds of samples, 10 repeats.
+    /// Returns the cross-validation of the paper: 10 folds of samples, 10 repeats.
     fn default() -> Self {
         Self {
             folds: 10,
@@ -36,38 +36,38 @@ impl Default for CrossValidation {
     }
 }
 
-/// Answers for every sample of a set, each by what was fitted without it: samples × outputs.
+/// Held-out answers for every sample of a set, each by models fitted without it: samples × outputs.
 #[derive(Clone, Debug)]
 pub struct CrossValidated {
-    /// The folds.
+    /// Folds of the cross-validation.
     pub folds: Folds,
-    /// Of the networks.
+    /// Answers of the networks.
     pub network: Array2<f64>,
-    /// Of the training means.
+    /// Answers of the training means.
     pub mean: Array2<f64>,
-    /// Of the linear maps.
+    /// Answers of the linear maps.
     pub linear: Array2<f64>,
-    /// What the trainings took.
+    /// Epochs and time of the trainings.
     pub effort: Effort,
 }
 
-/// Epochs and the time for them.
+/// Number and time of the epochs trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Epochs run, of all starts and folds together.
+    /// Number of epochs, over all restarts and folds.
     pub epochs: usize,
     /// Time spent on them.
     pub seconds: f64,
-    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub least_epoch_seconds: f64,
 }
 
 impl CrossValidation {
-    /// Cross-validates on `set`: repeat number `repeat` (from 0), which has a seed of its own that follows from that of
-    /// `settings`. `None` if cancelled.
+    /// Runs repeat `repeat` (from 0) of the cross-validation on `set`; each repeat has its own seed, derived from that
+    /// of `settings`. Returns `None` if cancelled.
     ///
     /// # Errors
-    /// Folds that cannot be filled, or settings that are impossible, with the reason.
+    /// If the folds cannot be filled, or the settings are invalid.
     pub fn run(
         &self,
         settings: &RunSettings,
@@ -108,12 +108,12 @@ impl CrossValidation {
 }
 
 impl CrossValidated {
-    /// The samples of `set`, the set that was cross-validated on, that were fitted when fold `fold` was tested.
+    /// Returns the training samples for test fold `fold` of `set`, the set that was cross-validated.
     pub(super) fn training(&self, set: &Dataset, fold: usize) -> Dataset {
         split(set, &self.folds, fold).training
     }
 
-    /// The errors of each target on all samples of `set`, the set that was cross-validated on.
+    /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.
     ///
     /// # Panics
     /// If the set has another shape.
@@ -141,7 +141,7 @@ impl Default for Effort {
 }
 
 impl Effort {
-    /// Steps `run` to its end; `None` if cancelled before.
+    /// Trains `run` to its end; returns `None` if cancelled.
     pub(super) fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Self> {
         let mut effort = Self::default();
         while run.stop_reason().is_none() {
@@ -168,7 +168,7 @@ impl Effort {
     }
 }
 
-/// The sets of fold `fold`: the fold after it chooses the best weights.
+/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set.
 fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
     let chooses = (fold + 1) % folds.count();
     if folds.count() < 3 {
@@ -183,13 +183,13 @@ fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
     }
 }
 
-/// Seed number `n` of those that follow from `seed`.
+/// Returns the `n`th seed derived from `seed`.
 fn nth_seed(seed: Seed, n: usize) -> Seed {
     let mut seeds = seed.rng(Stream::Folds).random_iter();
     Seed(seeds.nth(n).expect("a generator never ends"))
 }
 
-/// Writes the rows of `answers` to the rows `samples` of `pooled`.
+/// Copies the rows of `answers` to the rows `samples` of `pooled`.
 fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
     for (&sample, answer) in samples.iter().zip(answers.axis_iter(Axis(0))) {
         pooled.row_mut(sample).assign(&answer);

@@ -16,46 +16,46 @@ use crate::{
     sensor::SensorModel,
 };
 
-/// What a decoder is worth on the nodes of a test set.
+/// Errors and cost of a decoder on the nodes of a test set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecoderReport {
-    /// Which.
+    /// Kind of decoder.
     pub kind: DecoderKind,
-    /// Of the network; everything else computes in double precision.
+    /// Precision of the network; all other decoders compute in double precision.
     pub precision: Precision,
-    /// On the test set.
+    /// Errors on the test set.
     pub errors: Errors,
-    /// Root mean square over the test set's readings of m/R − 1, with R the resistances of the answer; it needs no
-    /// ground truth.
+    /// Root mean square of m/R − 1 over the readings m of the test set, with R the resistances at the decoded
+    /// coordinates; it needs no ground truth.
     pub residual: f64,
-    /// What it takes.
+    /// Computing time.
     pub cost: DecoderCost,
 }
 
-/// What a decoder is worth on targets of any meaning.
+/// Errors and cost of a decoder on targets of any meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetReport {
-    /// Which.
+    /// Kind of decoder.
     pub kind: DecoderKind,
-    /// Of the network; everything else computes in double precision.
+    /// Precision of the network; all other decoders compute in double precision.
     pub precision: Precision,
-    /// On the test set, target by target.
+    /// Errors on the test set, target by target.
     pub targets: Vec<TargetErrors>,
-    /// What it takes.
+    /// Computing time.
     pub cost: DecoderCost,
 }
 
-/// The time a decoder takes.
+/// Computing time of a decoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecoderCost {
-    /// Time to decode a frame on one thread, in microseconds: the median of many.
+    /// Median time to decode a frame on one thread, in microseconds.
     pub frame_us: f64,
-    /// Time to fit it to the training set in seconds, the network's own training not counted.
+    /// Time to fit the decoder to the training set in seconds, without the training of the network.
     pub fit_seconds: f64,
 }
 
 impl DecoderReport {
-    /// Its name in files, such as `network_f32`.
+    /// Returns the name in files, such as `network_f32`.
     pub fn name(&self) -> String {
         match self.precision {
             Precision::Double => self.kind.to_string(),
@@ -64,7 +64,7 @@ impl DecoderReport {
     }
 }
 
-/// Builds decoders for the source of a run and measures them.
+/// Builds and measures decoders for the source of a run.
 pub struct DecoderSet {
     settings: RunSettings,
     training: Dataset,
@@ -72,16 +72,16 @@ pub struct DecoderSet {
 }
 
 impl DecoderSet {
-    /// Draws the training set of `settings`; `networks` are those trained with them.
+    /// Draws the training set of `settings`; `networks` are those trained with these settings.
     ///
     /// # Errors
-    /// Settings that are impossible, with the reason.
+    /// If the settings are invalid.
     pub fn new(settings: &SimulatedSettings, networks: Option<Networks>) -> Result<Self, RunError> {
         let training = settings.draw()?.0.training;
         Ok(Self::on_set((*settings).into(), training, networks))
     }
 
-    /// As [`Self::new`], with a training set that comes from elsewhere.
+    /// Uses an existing training set instead of drawing one; see [`Self::new`].
     pub fn on_set(settings: RunSettings, training: Dataset, networks: Option<Networks>) -> Self {
         Self {
             settings,
@@ -90,16 +90,16 @@ impl DecoderSet {
         }
     }
 
-    /// The same set with other networks, or none.
+    /// Replaces the networks.
     pub fn set_networks(&mut self, networks: Option<Networks>) {
         self.networks = networks;
     }
 
-    /// Fits a decoder; only networks know another precision than double. `None` if it needs networks or a sensor, and
-    /// there are none.
+    /// Fits a decoder; `precision` applies to networks only. Returns `None` if the decoder needs networks or a sensor
+    /// and there are none.
     ///
     /// # Errors
-    /// Samples that cannot be scaled, or a sensor without resistances at rest.
+    /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
         let Self { settings, training, .. } = self;
         let (row_model, noise) = (settings.source.row_model(), unseen_noise(&settings.source)?);
@@ -145,7 +145,7 @@ impl DecoderSet {
         }))
     }
 
-    /// The networks, ready to decode.
+    /// Compiles the networks for decoding.
     fn network(&self, precision: Precision) -> Option<Box<dyn Decoder>> {
         let networks = self.networks.as_ref()?;
         let rows = self.training.row_count();
@@ -155,11 +155,11 @@ impl DecoderSet {
         })
     }
 
-    /// Fits a decoder, and measures its errors on the nodes of `test` and its speed. `None` as in [`Self::decoder`], and
-    /// for a measured source: see [`Self::measure_targets`].
+    /// Fits a decoder and measures its speed and its errors on the nodes of `test`. Returns `None` as [`Self::decoder`]
+    /// does, and for a measured source: see [`Self::measure_targets`].
     ///
     /// # Errors
-    /// As [`Self::decoder`], or a reading that cannot be decoded.
+    /// As [`Self::decoder`], or if a reading cannot be decoded.
     pub fn measure(
         &self,
         kind: DecoderKind,
@@ -181,10 +181,11 @@ impl DecoderSet {
         }))
     }
 
-    /// Fits a decoder, and measures its errors on each target of `test` and its speed. `None` as in [`Self::decoder`].
+    /// Fits a decoder and measures its speed and its errors on each target of `test`. Returns `None` as
+    /// [`Self::decoder`] does.
     ///
     /// # Errors
-    /// As [`Self::decoder`], or a reading that cannot be decoded.
+    /// As [`Self::decoder`], or if a reading cannot be decoded.
     pub fn measure_targets(
         &self,
         kind: DecoderKind,
@@ -200,7 +201,7 @@ impl DecoderSet {
         Ok(self.answer(kind, precision, test)?.map(report))
     }
 
-    /// What a decoder makes of `test`, and what it takes.
+    /// Fits a decoder and returns its answers to `test` with its computing time.
     fn answer(
         &self,
         kind: DecoderKind,
@@ -218,7 +219,7 @@ impl DecoderSet {
     }
 }
 
-/// Root mean square over all readings of `test` of m/R − 1, with R the resistances of `answers` (samples × 3·M2, mm).
+/// Root mean square of m/R − 1 over all readings m of `test`, with R the resistances of `answers` (samples × 3·M2, mm).
 fn rms_residual(sensor: &SensorModel, test: &Dataset, answers: &Array2<f64>) -> f64 {
     let mut squares = 0.0;
     for (sample, answer) in answers.rows().into_iter().enumerate() {

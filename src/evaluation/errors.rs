@@ -3,35 +3,35 @@ use serde::{Deserialize, Serialize};
 
 use crate::dataset::Dataset;
 
-/// How far decoupled coordinates are from the true ones.
+/// Errors of decoupled coordinates on the nodes of a test set.
 ///
-/// The paper's errors (AveZerr and its sisters) are the mean over samples and nodes of |decoupled − true| / |true| in
-/// percent of the **coordinate**. That flatters, for a node is never lower than 80 % of the height, so the same error
-/// also stands in millimetres and in percent of full scale.
+/// The paper's errors (AveZerr, AveXerr and AveYerr) are the mean over samples and nodes of |decoupled − true| / |true|
+/// in percent of the **coordinate**. That denominator flatters, because a node is never lower than 80 % of the height,
+/// so the error is also given in millimetres and in percent of full scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// AveZerr. `None` if a true z is 0, where it has no meaning; likewise below.
+    /// AveZerr, in percent of the coordinate. `None` if a true z is 0, where it is undefined; likewise below.
     pub z_percent: Option<f64>,
-    /// AveXerr.
+    /// AveXerr, in percent of the coordinate.
     pub x_percent: Option<f64>,
-    /// AveYerr.
+    /// AveYerr, in percent of the coordinate.
     pub y_percent: Option<f64>,
-    /// Mean |decoupled z − z|.
+    /// Mean |decoupled z − z|, in millimetres.
     pub z_mm: f64,
     /// [`Self::z_mm`] in percent of the stroke, the distance a node can travel.
     pub z_full_scale_percent: f64,
-    /// Largest |decoupled z − z|.
+    /// Largest |decoupled z − z|, in millimetres.
     pub worst_mm: f64,
-    /// Where it is.
+    /// Node with the largest error.
     pub worst_node: NodeAddress,
 }
 
-/// A node of one snapshot; all counted from 0.
+/// A node of one snapshot; all indices are from 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NodeAddress {
-    /// The group of its sample: of a simulated set the number of the snapshot.
+    /// Group of its sample; in a simulated set, the index of the snapshot.
     pub snapshot: usize,
     /// Row-wire of the array.
     pub row: usize,
@@ -40,7 +40,7 @@ pub struct NodeAddress {
 }
 
 impl Errors {
-    /// Compares `decoupled_mm` (samples × 3·M2) with the coordinates of `truth`, whose nodes can travel `stroke_mm`.
+    /// Measures `decoupled_mm` (samples × 3·M2) against the coordinates of `truth`, whose nodes can travel `stroke_mm`.
     ///
     /// # Panics
     /// If the shapes differ.

@@ -6,16 +6,16 @@ use crate::{
     decoupling::{CompiledNetworks, DecodeError, Decoder},
 };
 
-/// Time to decode a frame of the test set by the best network so far, in double precision on one thread. `None` if the
-/// test set has readings that cannot be decoded.
+/// Returns the time to decode a frame of the test set with the best network so far, in double precision on one thread;
+/// `None` if the test set has readings that cannot be decoded.
 pub fn network_frame_time(run: &Run) -> Option<Duration> {
     let mut decoder = CompiledNetworks::<f64>::new(&run.network(), run.test().row_count());
     let microseconds = frame_us(&mut decoder, run.test()).ok()?;
     Some(Duration::from_secs_f64(1e-6 * microseconds))
 }
 
-/// Microseconds to decode a frame of `test`, or a sample where `test` is not of whole frames: the median over blocks of
-/// frames, each long enough for the clock.
+/// Returns the time in microseconds to decode a frame of `test`, or a sample if `test` does not consist of whole
+/// frames: the median over blocks of frames, each long enough for the clock.
 pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {
     const FEWEST_BLOCKS: usize = 3;
     const MOST_BLOCKS: usize = 101;
@@ -43,7 +43,7 @@ pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64,
         }
         Ok(begun.elapsed().as_secs_f64())
     };
-    // The first fills the caches.
+    // The first call fills the caches.
     decode(1)?;
     let once = decode(1)?.max(1e-9);
     let frames_in_block = (BLOCK_SECONDS / once).ceil() as usize;

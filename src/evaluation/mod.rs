@@ -1,5 +1,8 @@
-//! What a decoupler is worth: axis errors as the paper defines them and beyond, the published figures, and a whole
-//! run from settings to report.
+//! Evaluation of decoders: errors as the paper defines them and beyond, beside baselines, a Bayesian reference and the
+//! published figures.
+//!
+//! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
+//! [`measure_trade`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings.
 
 mod baselines;
 mod cross_validation;

@@ -2,8 +2,8 @@ use ndarray::Array2;
 
 use crate::dataset::Dataset;
 
-/// How far each node is off on z in general: the root mean square of decoupled z − z over the snapshots of `truth`, in
-/// millimetres, row by row (M1·M2 of them). `decoupled_mm` has the shape of its coordinates.
+/// Root mean square of decoupled z − z for each node over the snapshots of `truth`, in millimetres, row by row (M1·M2
+/// values). `decoupled_mm` has the shape of its coordinates.
 ///
 /// # Panics
 /// If the shapes differ.

@@ -19,7 +19,7 @@ impl Outlook {
     /// Analyses every row-wire that the simulated scene reads.
     ///
     /// # Errors
-    /// An impossible sensor or scene, or singular values that do not converge.
+    /// If the sensor or scene is invalid, or singular values do not converge.
     pub fn of(simulation: &Simulation) -> Result<Self, OutlookError> {
         let Simulation { sensor, scene, .. } = simulation;
         sensor.check().map_err(IdentifiabilityError::from)?;
@@ -53,10 +53,10 @@ impl Outlook {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutlookError {
-    /// An impossible scene.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] crate::scene::SceneError),
-    /// An impossible sensor.
+    /// The sensor is invalid.
     #[error(transparent)]
     Identifiability(#[from] IdentifiabilityError),
 }

@@ -9,32 +9,32 @@ use crate::{
     training::{StoppingRules, TrainingSettings},
 };
 
-/// Where the settings of a run begin.
+/// Preset settings of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Preset {
-    /// As the paper: all rows by one network, resistances between −1 and 1.
+    /// As in the paper: one network for all rows, resistances scaled to [−1, 1].
     #[default]
     Paper,
-    /// What measurement found best: known rows, whitened conductances, more samples, more patience.
+    /// The best settings measured: known rows, whitened conductances, more samples, and later early stopping.
     Best,
 }
 
-/// A word that is none of the presets.
+/// Error for a word that names no preset.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not a preset: give paper or best")]
 pub struct PresetError(String);
 
 impl Preset {
-    /// All of them, in the order offered.
+    /// All presets, in the order offered to the user.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Best];
 
-    /// The settings it stands for, without noise.
+    /// Returns the settings of the preset, without noise.
     pub fn settings(self) -> SimulatedSettings {
         self.settings_in(Noise::default())
     }
 
-    /// The settings it stands for where readings bear `noise`: then a network is as good as its samples are many, and
-    /// it has learnt what it can after few epochs.
+    /// Returns the settings of the preset for readings with `noise`. Accuracy then depends on the number of samples,
+    /// and few epochs suffice.
     pub fn settings_in(self, noise: Noise) -> SimulatedSettings {
         let mut paper = SimulatedSettings::default();
         paper.source.scene.noise = noise;

@@ -9,19 +9,19 @@ pub struct PublishedErrors {
     pub table: u8,
     /// Array scale.
     pub array: ArrayScale,
-    /// Hidden nodes.
+    /// Number of hidden nodes.
     pub hidden: usize,
-    /// Training samples; in Table 2 all samples, each tested once.
+    /// Number of training samples; in Table 2, of all samples, each tested once.
     pub training_samples: usize,
-    /// AveZerr.
+    /// AveZerr, in percent.
     pub z_percent: f64,
-    /// AveXerr.
+    /// AveXerr, in percent.
     pub x_percent: f64,
-    /// AveYerr.
+    /// AveYerr, in percent.
     pub y_percent: f64,
 }
 
-/// All rows of the paper's Tables 1 to 3.
+/// Returns all rows of the paper's Tables 1 to 3.
 pub fn published_errors() -> Vec<PublishedErrors> {
     let text = include_str!("../../assets/published_errors.csv");
     let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
@@ -30,15 +30,15 @@ pub fn published_errors() -> Vec<PublishedErrors> {
 }
 
 impl PublishedErrors {
-    /// The table that was made by cross-validation.
+    /// Number of the table obtained by cross-validation.
     const CROSS_VALIDATION: u8 = 2;
 
-    /// What the paper reports for this configuration outside cross-validation, if it does.
+    /// Returns the errors reported for this configuration without cross-validation, if there are any.
     pub fn of(array: ArrayScale, hidden: usize, training_samples: usize) -> Option<Self> {
         Self::find(array, hidden, training_samples, |table| table != Self::CROSS_VALIDATION)
     }
 
-    /// What the paper reports for this configuration by cross-validation of all `samples`, if it does.
+    /// Returns the errors reported for this configuration by cross-validation of all `samples`, if there are any.
     pub fn of_cross_validation(array: ArrayScale, hidden: usize, samples: usize) -> Option<Self> {
         Self::find(array, hidden, samples, |table| table == Self::CROSS_VALIDATION)
     }

@@ -12,24 +12,24 @@ use crate::{
 /// Errors of the Bayesian reference on a test set whose readings have the scene's noise: the limit that physics sets to
 /// decoders that know of the loading its range, or its mean and covariance.
 ///
-/// For each row, Eq. (2) is linearised at the true deformation; with the noise of the scene and its prior this has a
-/// posterior, whose medians are the answers of least expected distance. No decoder that knows as much does better on
-/// average; one that must find out where to linearise can come close.
+/// For each row, Eq. (2) is linearised at the true deformation; with the noise and prior of the scene this has a
+/// posterior, whose medians are the answers with the least expected absolute error. No decoder with the same knowledge
+/// does better on average; one that has to find where to linearise can come close.
 ///
-/// The prior of random nodes is the uniform one, cut at 0 and at the stroke, which a Gaussian of the same spread would
-/// get wrong by up to a quarter of the error. Other loadings enter by mean and covariance, cut likewise: there a
-/// decoder that learns the loading's shape may fall below the reference. Each row is judged by its own readings and is
-/// taken as known, also in scenes whose decoders are not told the row; those cannot reach it entirely.
+/// The prior of random nodes is uniform, cut at 0 and at the stroke; a Gaussian of the same spread would misjudge the
+/// error by up to a quarter. Other loadings enter by mean and covariance, cut likewise: a decoder that learns the shape
+/// of such a loading may fall below the reference. Each row is judged by its own readings and taken as known, even in
+/// scenes whose decoders are not told the row; those cannot quite reach it.
 ///
 /// Without noise the reference is exact and its errors are 0. `None` if the posterior of any row did not converge: with
 /// noise of 1e-7 or less and a condition number near 1e14, as of nodes that move sideways, rounding hides it. `rng` draws
 /// the samples that estimate a prior without closed form.
 ///
 /// # Errors
-/// A sensor without resistances at rest.
+/// If the sensor has no resistances at rest.
 ///
 /// # Panics
-/// If a sample of `test` is not of a row-wire that the scene reads, or knows none.
+/// If a sample of `test` has no row-wire, or one that the scene does not read.
 pub fn reference_errors(
     model: &SensorModel,
     scene: &Scene,
@@ -89,8 +89,8 @@ mod tests {
         assert!(errors(&model, 1e-3, Movement::SIDEWAYS, 2).is_some());
     }
 
-    /// One node: the posterior is normal with deviation ε/s while that is small against the stroke, and readings tell
-    /// nothing when it is large, where the middle of the stroke is off by a quarter of it.
+    /// One node: the posterior is normal with standard deviation ε/s while that is small against the stroke; when it is
+    /// large, readings tell nothing, and the middle of the stroke is off by a quarter of it.
     #[test]
     fn one_node_has_the_closed_form_at_both_ends() {
         let mut model = SensorModel::new("1x1_1x4".parse().unwrap());

@@ -18,11 +18,11 @@ use crate::{
     training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState},
 };
 
-/// A run: sets of samples, one training for each start, and what the best network is worth.
+/// A run: its sets of samples, one training per restart, and the errors of the best network.
 ///
-/// The starts share sets and scaling and differ in their first weights only. The *leader* is the start whose best
-/// network has the lowest validation error so far (training error where nothing is held out); the test set never
-/// decides.
+/// Restarts share the sets and scalings and differ only in their random initialisation. The *leader* is the restart
+/// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
+/// never decides.
 pub struct Run {
     settings: RunSettings,
     test: Arc<Dataset>,
@@ -30,36 +30,36 @@ pub struct Run {
     starts: Vec<StartTrainer>,
     /// Errors of the training mean and of the linear map, target by target.
     target_baselines: [TargetRow; 2],
-    /// The same on nodes, with the reference, where the targets are nodes.
+    /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
     baselines: Option<Baselines>,
 }
 
-/// What networks and baselines are worth on the nodes of a test set.
+/// Errors of networks and baselines on the nodes of a test set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeScores {
-    /// Of the leader's best networks.
+    /// Errors of the leader's best networks.
     pub network: Errors,
-    /// What stands beside them.
+    /// Errors of the baselines.
     pub baselines: Baselines,
 }
 
-/// The most memory that the equations of all starts may take.
+/// Largest memory for the equations of all restarts together.
 const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
 
 impl Run {
-    /// Draws the sets, scales them, starts the networks and measures the baselines.
+    /// Draws and scales the sets, initialises the networks and measures the baselines.
     ///
     /// # Errors
-    /// Settings that are impossible, with the reason.
+    /// If the settings are invalid.
     pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
         let (split, test) = settings.draw()?;
         Self::on_sets(settings.into(), split, test)
     }
 
-    /// As [`Self::prepare`], on sets that come from elsewhere: measured ones, or the folds of a cross-validation.
+    /// Prepares a run on existing sets, measured or from a cross-validation; see [`Self::prepare`].
     ///
     /// # Errors
-    /// Settings that are impossible or sets that do not belong together, with the reason.
+    /// If the settings are invalid, or the sets do not belong together.
     pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
         Self::with_sets(settings, split, test, |tasks| {
             let starts = (0..settings.starts).into_par_iter().map(|number| {
@@ -77,10 +77,10 @@ impl Run {
         })
     }
 
-    /// Goes on where the states of all starts were taken from a run of these settings.
+    /// Resumes a run of these settings from the states of all its trainings.
     ///
     /// # Errors
-    /// Settings that are impossible, or states that are damaged or not theirs.
+    /// If the settings are invalid, or the states are damaged or from another run.
     pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
         settings.check_counts()?;
         check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
@@ -88,10 +88,10 @@ impl Run {
         Self::resume_on_sets(settings.into(), states, split, test)
     }
 
-    /// As [`Self::resume`], on the sets that the run was begun on.
+    /// Resumes a run on the sets it was started on; see [`Self::resume`].
     ///
     /// # Errors
-    /// As [`Self::on_sets`], or states that are damaged or not of these settings and sets.
+    /// As [`Self::on_sets`], or if the states are damaged or do not match these settings and sets.
     pub fn resume_on_sets(
         settings: RunSettings,
         states: Vec<TrainerState>,
@@ -142,7 +142,7 @@ impl Run {
             targets: TargetErrors::measure(test.targets(), answers.view()),
         });
         let tasks = tasks(&settings, &split, &test)?;
-        // They are in the tasks, scaled: large sets need not be held twice.
+        // The tasks hold the samples scaled; large sets need not be held twice.
         drop(split);
         let first = tasks.at(0);
         let samples = first.problem.training.samples();
@@ -159,16 +159,16 @@ impl Run {
         })
     }
 
-    /// What was asked for.
+    /// Settings of the run.
     pub fn settings(&self) -> &RunSettings {
         &self.settings
     }
 
-    /// Runs one epoch of every start that has not ended, side by side. Returns why the run has ended, once every
-    /// start has. The bits do not depend on the number of threads.
+    /// Runs one epoch of every restart that has not ended, in parallel. Returns the reason for stopping once every
+    /// restart has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
         match self.starts.as_mut_slice() {
-            // Stays on this thread, which saves handing it over each epoch.
+            // Stays on this thread, which saves a hand-over every epoch.
             [only] => only.step(),
             all => {
                 all.par_iter_mut().for_each(|start| {
@@ -179,13 +179,13 @@ impl Run {
         }
     }
 
-    /// Ends every start by the user's wish.
+    /// Stops every restart at the user's request.
     pub fn stop(&mut self) {
         self.starts.iter_mut().for_each(StartTrainer::stop);
     }
 
-    /// Why the run has ended, once every start has ended: the leader's reason, or the user's wish if any start could
-    /// have gone on.
+    /// Returns the reason for stopping once every restart has ended: the leader's, or [`StopReason::Stopped`] if the
+    /// user stopped any restart before its end.
     pub fn stop_reason(&self) -> Option<StopReason> {
         let reasons = self.starts.iter().map(StartTrainer::stop_reason);
         let reasons: Vec<_> = reasons.collect::<Option<_>>()?;
@@ -195,16 +195,16 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Goes on with another method from the present weights of every start: [`Trainer::continue_with`].
+    /// Continues every restart from its present weights with another method: [`Trainer::continue_with`].
     ///
     /// # Errors
-    /// A setting out of range, or networks too wide for the method; then nothing has changed.
+    /// If a setting is out of range, or the networks are too wide for the method; nothing is then changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), RunError> {
         let rows = self.leader().rows();
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
         check_memory(&method, rows[0].present().shape(), samples, trainings)?;
-        // The starts have the same shapes, so the first is refused or none.
+        // Restarts have the same shapes, so either the first is refused or none.
         for start in &mut self.starts {
             start.continue_with(method)?;
         }
@@ -212,10 +212,10 @@ impl Run {
         Ok(())
     }
 
-    /// Changes when every start stops: [`Trainer::set_stopping`].
+    /// Changes the stopping rules of every restart: [`Trainer::set_stopping`].
     ///
     /// # Errors
-    /// A setting out of range; then nothing has changed.
+    /// If a setting is out of range; nothing is then changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
         for start in &mut self.starts {
             start.set_stopping(stopping)?;
@@ -224,22 +224,22 @@ impl Run {
         Ok(())
     }
 
-    /// The trainings of all starts.
+    /// Trainings of all restarts.
     pub fn trainers(&self) -> &[StartTrainer] {
         &self.starts
     }
 
-    /// The number of the leader, from 0.
+    /// Index of the leader, from 0.
     pub fn leader_number(&self) -> usize {
         lowest(self.starts.iter().map(StartTrainer::best_mse)).unwrap_or(0)
     }
 
-    /// The training of the leader.
+    /// Training of the leader.
     pub fn leader(&self) -> &StartTrainer {
         &self.starts[self.leader_number()]
     }
 
-    /// How each start stands. Costs a decoupling of the test set for each.
+    /// Returns a record of each restart. Decodes the test set once per restart.
     pub fn starts(&self) -> Vec<StartRecord> {
         let record = |trainer: &StartTrainer| {
             let best = trainer.best_records();
@@ -257,7 +257,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// The states of all trainings, from which [`Self::resume`] goes on: start by start, in each its rows.
+    /// Returns the states of all trainings for [`Self::resume`]: restart by restart, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts.iter().flat_map(StartTrainer::states).collect()
     }
@@ -267,7 +267,7 @@ impl Run {
         &self.test
     }
 
-    /// The leader's best networks so far, ready to decode readings.
+    /// Returns the leader's best networks so far, ready to decode readings.
     pub fn network(&self) -> Networks {
         self.network_of(self.leader())
     }
@@ -280,19 +280,19 @@ impl Run {
         Networks::each(rows.map(network).collect())
     }
 
-    /// What [`Self::network`] makes of the test set: samples × outputs, in the units of the targets.
+    /// Returns the answers of [`Self::network`] to the test set: samples × outputs, in the units of the targets.
     pub fn decouple_test(&self) -> Array2<f64> {
         self.network().decouple(&self.test)
     }
 
-    /// The errors of answers to the test set (samples × 3·M2, mm) on its nodes; `None` for a measured run.
+    /// Returns the errors of answers to the test set (samples × 3·M2, mm) on its nodes; `None` for a measured run.
     pub fn errors_of(&self, answers: &Array2<f64>) -> Option<Errors> {
         let simulation = self.settings.source.simulation()?;
         Some(Errors::measure(&self.test, answers, simulation.stroke_mm()))
     }
 
-    /// What [`Self::network`] and the baselines are worth on the nodes of the test set; `None` for a measured run, whose
-    /// targets are judged by [`Self::target_table`].
+    /// Returns the errors of [`Self::network`] and the baselines on the nodes of the test set; `None` for a measured
+    /// run, which has [`Self::target_table`].
     pub fn node_scores(&self) -> Option<NodeScores> {
         Some(NodeScores {
             network: self.errors_of(&self.decouple_test())?,
@@ -300,12 +300,12 @@ impl Run {
         })
     }
 
-    /// The baselines on the nodes of the test set; `None` for a measured run.
+    /// Errors of the baselines on the nodes of the test set; `None` for a measured run.
     pub fn baselines(&self) -> Option<&Baselines> {
         self.baselines.as_ref()
     }
 
-    /// The errors of the baselines and of [`Self::network`] on each target of the test set, whatever it means.
+    /// Returns the errors of the baselines and of [`Self::network`] on each target of the test set, of any meaning.
     pub fn target_table(&self) -> Vec<TargetRow> {
         let mut rows = self.target_baselines.to_vec();
         rows.push(TargetRow {
@@ -316,7 +316,7 @@ impl Run {
     }
 }
 
-/// Refuses another number of saved trainings than is needed.
+/// Checks the number of saved trainings.
 fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError> {
     let found = states.len();
     if found == expected {
@@ -333,7 +333,7 @@ pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<
     Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
 }
 
-/// Refuses starts whose equations would not fit into memory together; one alone is the trainer's to judge.
+/// Checks that the equations of all restarts fit into memory together; a single one is checked by the trainer.
 fn check_memory(method: &Method, shape: Shape, samples: usize, starts: usize) -> Result<(), RunError> {
     let bytes = method.equations_bytes(shape, samples).saturating_mul(starts);
     if starts > 1 && bytes > LARGEST_EQUATIONS_BYTES {

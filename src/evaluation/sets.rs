@@ -4,7 +4,7 @@ use crate::{
     scene::RowModel,
 };
 
-/// Checks that the sets of a run belong together and have what its settings need.
+/// Checks that the sets of a run belong together and meet its settings.
 pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<(), RunError> {
     let training = &split.training;
     if matches!(settings.source, Source::Simulated(_)) && training.row_wires_read().is_none() {
@@ -32,7 +32,7 @@ pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) 
         }
     }
     if settings.source.row_model() == RowModel::Each {
-        // A test set may lack a row; a network that cannot be fitted or chosen may not.
+        // A test set may lack a row, but not the sets that fit a network and select its weights.
         for (name, set) in [("training", training)].into_iter().chain(sets) {
             let mut has_samples = vec![name == "test"; set.row_count()];
             (0..set.samples()).for_each(|sample| has_samples[set.row_index(sample)] = true);
@@ -45,7 +45,7 @@ pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) 
     Ok(())
 }
 
-/// The row-wires of a set, counted from 1.
+/// Lists the row-wires of a set, counted from 1.
 fn describe_rows(set: &Dataset) -> String {
     match set.row_wires_read() {
         None => "no row-wires".to_owned(),

@@ -12,53 +12,53 @@ use crate::{
     training::TrainingSettings,
 };
 
-/// Everything a run needs; the same settings (and the same sets, where they were measured) give the same network, bit
-/// for bit.
+/// Settings of a run. The same settings (and the same sets, if measured) give the same network, bit for bit.
 ///
-/// `S` is where the samples come from: any [`Source`], or [`Simulation`] where only that will do.
+/// `S` is the source of the samples: any [`Source`], or [`Simulation`] where only that is possible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSettings<S = Source> {
-    /// Where the samples come from.
+    /// Source of the samples.
     pub source: S,
-    /// What the network is given of the readings.
+    /// Input quantity and its scaling.
     pub inputs: InputChoice,
-    /// Hidden nodes.
+    /// Number of hidden nodes.
     pub hidden: usize,
-    /// Trainings from different random weights, of which the best by its validation error is kept.
+    /// Number of restarts: trainings from different random initialisations, the best of which by validation error is
+    /// kept.
     pub starts: usize,
-    /// Method, its settings, and when to stop.
+    /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
-    /// From which everything random follows.
+    /// Seed from which all randomness follows.
     pub seed: Seed,
 }
 
 /// Settings of a run on simulated samples.
 pub type SimulatedSettings = RunSettings<Simulation>;
 
-/// The most starts of one run: enough to know the distribution of its results, and what memory allows.
+/// Largest number of restarts in a run: enough for the distribution of its results, and within memory.
 pub const MOST_STARTS: usize = 100;
 
-/// A number out of its range.
+/// Error for a number out of its range.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
 pub struct CountError {
-    /// What is counted.
+    /// Name of the number.
     pub what: &'static str,
-    /// The number given.
+    /// Number given.
     pub count: usize,
-    /// What is possible.
+    /// Range allowed.
     pub allowed: RangeInclusive<usize>,
 }
 
 impl Default for SimulatedSettings {
-    /// The paper's main experiment: 10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples.
+    /// Returns the paper's main experiment: 10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples.
     fn default() -> Self {
         Self::of(Simulation::default(), InputChoice::PAPER)
     }
 }
 
 impl From<Measured> for RunSettings {
-    /// Settings for measured samples: readings as they are, between −1 and 1.
+    /// Returns the settings for measured samples: raw readings scaled to [−1, 1].
     fn from(measured: Measured) -> Self {
         Self::of(measured.into(), InputChoice::MEASURED)
     }
@@ -101,10 +101,10 @@ impl<S> RunSettings<S> {
         }
     }
 
-    /// Checks hidden nodes and starts; the other parts check themselves where they are used.
+    /// Checks the numbers of hidden nodes and restarts; the other parts are checked where they are used.
     ///
     /// # Errors
-    /// The first count out of range.
+    /// The first number out of range.
     pub fn check_network(&self) -> Result<(), CountError> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
@@ -114,7 +114,7 @@ impl<S> RunSettings<S> {
 }
 
 impl RunSettings {
-    /// The settings as those of a simulation, if they are.
+    /// Returns these settings as those of a simulation, if they are.
     pub fn simulated(&self) -> Option<SimulatedSettings> {
         let simulation = self.source.simulation()?;
         Some(self.with_source(*simulation))
@@ -122,10 +122,10 @@ impl RunSettings {
 }
 
 impl SimulatedSettings {
-    /// Checks the counts; the parts check themselves where they are used.
+    /// Checks all numbers; the other parts are checked where they are used.
     ///
     /// # Errors
-    /// The first count out of range.
+    /// The first number out of range.
     pub fn check_counts(&self) -> Result<(), CountError> {
         self.check_network()?;
         check([
@@ -139,13 +139,13 @@ impl SimulatedSettings {
         ])
     }
 
-    /// What the paper reports for this configuration, if it does.
+    /// Returns the errors that the paper reports for this configuration, if there are any.
     pub fn published(&self) -> Option<PublishedErrors> {
         let published = PublishedErrors::of(self.source.sensor.scale, self.hidden, self.source.samples);
         published.filter(|_| self.is_papers_scene())
     }
 
-    /// Whether scene and inputs are those of the paper's experiments.
+    /// Returns `true` if scene and inputs are those of the paper's experiments.
     pub fn is_papers_scene(&self) -> bool {
         self.source.scene == Scene::default() && self.inputs == InputChoice::PAPER
     }
@@ -158,7 +158,7 @@ fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); 
     }
 }
 
-/// How settings of a simulation are written: in one record.
+/// File format of the settings of a simulation: a single record.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {
@@ -176,7 +176,7 @@ struct Record {
     seed: Seed,
 }
 
-/// Files written before there were several starts.
+/// Default for files written before there were several restarts.
 fn one_start() -> usize {
     1
 }

@@ -5,10 +5,10 @@ use crate::{
 };
 
 impl SimulatedSettings {
-    /// Draws the training and validation set of these settings, and their test set.
+    /// Draws the training, validation and test sets of these settings.
     ///
     /// # Errors
-    /// Settings that are impossible, with the reason.
+    /// If the settings are invalid.
     pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
         self.check_counts()?;
         self.training.check().map_err(TrainingError::from)?;
@@ -19,10 +19,10 @@ impl SimulatedSettings {
         Ok((hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split)), test))
     }
 
-    /// Draws as many samples as are asked for, disturbed as those that a network is trained on.
+    /// Draws at least `samples` samples with the noise of the training set.
     ///
     /// # Errors
-    /// An impossible sensor, scene, or number of samples.
+    /// If the sensor, scene, or number of samples is invalid.
     pub fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
         let Simulation { sensor, scene, .. } = &self.source;
         sensor.check()?;
@@ -36,10 +36,10 @@ impl SimulatedSettings {
         Ok(set)
     }
 
-    /// Draws the test set of these settings: what the window shows before anything is trained.
+    /// Draws the test set of these settings, which the window shows before anything is trained.
     ///
     /// # Errors
-    /// An impossible sensor, scene, or number of samples.
+    /// If the sensor, scene, or number of samples is invalid.
     pub fn draw_test(&self) -> Result<Dataset, RunError> {
         let Simulation { sensor, scene, .. } = &self.source;
         sensor.check()?;

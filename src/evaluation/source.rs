@@ -5,48 +5,48 @@ use crate::{
     sensor::{ArrayScale, SensorModel},
 };
 
-/// Where the samples of a run come from.
+/// Source of the samples of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Source {
-    /// Drawn from a model of the sensor.
+    /// Samples drawn from a model of the sensor.
     Simulated(Simulation),
-    /// Given as sets that were measured.
+    /// Sets of measured samples.
     Measured(Measured),
 }
 
-/// A simulated sensor, what happens to it, and how many samples are drawn.
+/// A simulated sensor, its scene, and the numbers of samples to draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Simulation {
-    /// The sensor.
+    /// Model of the sensor.
     pub sensor: SensorModel,
-    /// The scene.
+    /// Rows, axes, loading and noise that are modelled.
     pub scene: Scene,
-    /// Samples that the method fits, of all row-wires read together.
+    /// Number of training samples, of all row-wires read together.
     pub samples: usize,
-    /// Samples drawn beside them and held out, to choose the best weights and to stop; 0 for none.
+    /// Number of held-out samples, drawn in addition to choose the best weights and to stop the training; 0 for none.
     pub validation_samples: usize,
-    /// Samples drawn for the test.
+    /// Number of test samples.
     pub test_samples: usize,
 }
 
-/// Measured samples. Nothing is known of the sensor but its readings.
+/// Measured samples; only the readings of the sensor are known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
-    /// One network for every row-wire, or one for each; without row-wires there is one either way.
+    /// One network shared by all row-wires or one per row-wire; without row-wires both are the same.
     pub rows: RowModel,
 }
 
-/// What a scene comes to: nothing that does not vary in it is counted, nor modelled.
+/// Size of the model of a scene; coordinates that do not vary are not counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ModelSize {
-    /// Row-wires read.
+    /// Number of row-wires read.
     pub rows: usize,
-    /// Coordinates to be found in a frame, all rows read at one moment.
+    /// Number of unknown coordinates in a frame, over all rows.
     pub unknowns: usize,
-    /// Resistances read in a frame.
+    /// Number of resistances in a frame.
     pub equations: usize,
-    /// Networks: one, or one for each known row.
+    /// Number of networks: one, or one per known row.
     pub networks: usize,
 }
 
@@ -63,7 +63,7 @@ impl From<Measured> for Source {
 }
 
 impl Source {
-    /// The simulation, if it is one.
+    /// Returns the simulation, if there is one.
     pub fn simulation(&self) -> Option<&Simulation> {
         match self {
             Self::Simulated(simulation) => Some(simulation),
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// One network for every row-wire, or one for each.
+    /// Returns the row model: one network shared by all row-wires, or one per row-wire.
     pub fn row_model(&self) -> RowModel {
         match self {
             Self::Simulated(simulation) => simulation.scene.rows.model(),
@@ -81,7 +81,7 @@ impl Source {
 }
 
 impl Default for Simulation {
-    /// The paper's main experiment: 10×10_5×30, 1000 training and 100 test samples.
+    /// Returns the paper's main experiment: 10×10_5×30, 1000 training and 100 test samples.
     fn default() -> Self {
         Self {
             sensor: SensorModel::new(ArrayScale::default()),
@@ -94,10 +94,10 @@ impl Default for Simulation {
 }
 
 impl Simulation {
-    /// Number of unknowns, equations and networks.
+    /// Counts the unknowns, equations and networks.
     ///
     /// # Errors
-    /// A row that the array does not have.
+    /// If the array lacks a row of the scene.
     pub fn model_size(&self) -> Result<ModelSize, SceneError> {
         let scale = self.sensor.scale;
         let rows = self.scene.rows.read(scale.rows())?.len();
@@ -112,7 +112,7 @@ impl Simulation {
         })
     }
 
-    /// The distance a node can travel: the full scale of its deformation.
+    /// Largest travel of a node in millimetres, the full scale of its deformation.
     pub fn stroke_mm(&self) -> f64 {
         self.scene.stroke_mm(&self.sensor.geometry)
     }

@@ -1,20 +1,20 @@
-/// How numbers spread: smallest, quartiles, largest.
+/// Minimum, quartiles and maximum of a set of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// The smallest.
+    /// Minimum of the numbers.
     pub smallest: f64,
-    /// A quarter is below.
+    /// Value below which a quarter of the numbers lie.
     pub lower_quartile: f64,
-    /// Half is below.
+    /// Value below which half of the numbers lie.
     pub median: f64,
-    /// Three quarters are below.
+    /// Value below which three quarters of the numbers lie.
     pub upper_quartile: f64,
-    /// The largest.
+    /// Maximum of the numbers.
     pub largest: f64,
 }
 
 impl Spread {
-    /// The spread of the finite ones among `values`; `None` if there are none. Between two values it interpolates
+    /// Summarises the finite numbers among `values`; returns `None` if there are none. Quartiles are interpolated
     /// linearly (Hyndman and Fan 1996, definition 7).
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();

@@ -9,20 +9,20 @@ use crate::{
     },
 };
 
-/// The trainings of one start: one for all row-wires, or one for each where the row is known, side by side.
+/// Trainings of one restart: one shared by all row-wires, or one per row-wire where the row is known, in parallel.
 ///
-/// What is told of several of them together, epoch by epoch, is their mean; a training that has ended stays as it is.
+/// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
 pub struct StartTrainer {
     rows: Vec<Trainer>,
-    /// Of all rows together; empty where there is one training, whose own history it is.
+    /// History averaged over all rows; empty for a single training, which has its own.
     history: Vec<EpochRecord>,
 }
 
 impl StartTrainer {
-    /// Joins the trainings of a start.
+    /// Combines the trainings of one restart.
     ///
     /// # Panics
-    /// If there is none.
+    /// If `rows` is empty.
     pub(super) fn new(rows: Vec<Trainer>) -> Self {
         assert!(!rows.is_empty());
         let mut joined = Self {
@@ -33,14 +33,14 @@ impl StartTrainer {
         joined
     }
 
-    /// The training of each row-wire, or the one for all.
+    /// Training of each row-wire, or the one shared by all.
     pub fn rows(&self) -> &[Trainer] {
         &self.rows
     }
 
-    /// Runs one epoch of every training that has not ended. Returns why they have ended, once all have.
+    /// Runs one epoch of every training that has not ended. Returns the reason for stopping once all have ended.
     pub(super) fn step(&mut self) -> Option<StopReason> {
-        // Stays on this thread, which saves handing it over each epoch.
+        // Stays on this thread, which saves a hand-over every epoch.
         if let [only] = self.rows.as_mut_slice() {
             return only.step();
         }
@@ -72,8 +72,8 @@ impl StartTrainer {
         self.rows.iter_mut().for_each(Trainer::stop);
     }
 
-    /// Why they have ended, once all have: the user's wish if any could have gone on, or else the reason of the one
-    /// that ran longest.
+    /// Returns the reason for stopping once all trainings have ended: [`StopReason::Stopped`] if the user stopped any
+    /// before its end, otherwise that of the longest training.
     pub fn stop_reason(&self) -> Option<StopReason> {
         let reasons: Vec<_> = self.rows.iter().map(Trainer::stop_reason).collect::<Option<_>>()?;
         if reasons.contains(&StopReason::Stopped) {
@@ -82,7 +82,7 @@ impl StartTrainer {
         self.longest().stop_reason()
     }
 
-    /// The first of those with the most epochs.
+    /// Returns the first training with the most epochs.
     fn longest(&self) -> &Trainer {
         let mut longest = &self.rows[0];
         for trainer in &self.rows[1..] {
@@ -94,7 +94,7 @@ impl StartTrainer {
     }
 
     pub(super) fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        // They may differ in inputs, so each is asked before any is changed.
+        // Rows may differ in inputs, so all are checked before any is changed.
         for trainer in &self.rows {
             trainer.check_method(&method)?;
         }
@@ -104,7 +104,7 @@ impl StartTrainer {
     }
 
     pub(super) fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        // All have the same rules, so the first is refused or none.
+        // All rows have the same rules, so either the first is refused or none.
         self.rows
             .iter_mut()
             .try_for_each(|trainer| trainer.set_stopping(stopping))
@@ -114,7 +114,7 @@ impl StartTrainer {
         self.rows.iter().map(Trainer::state)
     }
 
-    /// Every epoch so far, the start first.
+    /// Records of all epochs so far, beginning with the initialisation.
     pub fn history(&self) -> &[EpochRecord] {
         match &self.rows[..] {
             [only] => only.history(),
@@ -122,47 +122,46 @@ impl StartTrainer {
         }
     }
 
-    /// The latest epoch.
+    /// Record of the latest epoch.
     pub fn latest(&self) -> &EpochRecord {
         self.history()
             .last()
             .expect("the start is recorded when the trainer is made")
     }
 
-    /// The epoch of the best network; of several, the latest of their best.
+    /// Epoch of the best network; of several, the latest.
     pub fn best_epoch(&self) -> usize {
         self.rows.iter().map(Trainer::best_epoch).max().unwrap_or(0)
     }
 
-    /// The error of the best networks, their mean: on the validation set, or on the training set where nothing is held
-    /// out.
+    /// Mean error of the best networks on the validation set, or on the training set if nothing is held out.
     pub fn best_mse(&self) -> f64 {
         mean(self.rows.iter().map(Trainer::best_mse))
     }
 
-    /// The best network of each row-wire, or the one for all.
+    /// Best network of each row-wire, or the one shared by all.
     pub fn best(&self) -> impl Iterator<Item = &Mlp> {
         self.rows.iter().map(Trainer::best)
     }
 
-    /// The record of each training at its best.
+    /// Mean record of the trainings, each at its best epoch.
     pub(super) fn best_records(&self) -> EpochRecord {
         let best = |trainer: &Trainer| trainer.history()[trainer.best_epoch()];
         let records: Vec<EpochRecord> = self.rows.iter().map(best).collect();
         mean_record(self.best_epoch(), &records)
     }
 
-    /// The methods so far, the first one first.
+    /// Methods used so far, in order.
     pub fn stages(&self) -> &[Stage] {
         self.longest().stages()
     }
 
-    /// Time spent in training, pauses not counted; of all rows together.
+    /// Training time of all rows together, without pauses.
     pub fn elapsed(&self) -> Duration {
         self.rows.iter().map(Trainer::elapsed).sum()
     }
 
-    /// Weights of all networks.
+    /// Total number of weights in all networks.
     pub fn weights(&self) -> usize {
         self.rows.iter().map(|trainer| trainer.present().weights().len()).sum()
     }
@@ -173,7 +172,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// Several records as one, whose errors are their means. One stays as it is, bit by bit.
+/// Averages the errors of several records; a single record keeps its exact bits.
 fn mean_record(epoch: usize, records: &[EpochRecord]) -> EpochRecord {
     let of = |value: fn(&EpochRecord) -> f64| mean(records.iter().map(value));
     let of_known = |value: fn(&EpochRecord) -> Option<f64>| {

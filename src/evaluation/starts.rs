@@ -2,38 +2,38 @@ use serde::{Deserialize, Serialize};
 
 use crate::training::StopReason;
 
-/// How one start of a run went.
+/// Result of one restart of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartRecord {
-    /// Training error (mse, scaled) of its best network.
+    /// Training error (mse, scaled) of the best network.
     pub train_mse: f64,
-    /// Validation error of its best network, if anything was held out.
+    /// Validation error (mse, scaled) of the best network, if anything was held out.
     pub validation_mse: Option<f64>,
-    /// AveZerr of its best network on the test set; it decides nothing.
+    /// AveZerr of the best network on the test set, in percent; never used for selection.
     pub z_percent: Option<f64>,
-    /// Epochs run.
+    /// Number of epochs run.
     pub epochs: usize,
-    /// The epoch of its best network.
+    /// Epoch of the best network.
     pub best_epoch: usize,
-    /// Why it ended; `None` while it runs.
+    /// Reason for stopping; `None` while running.
     pub stop_reason: Option<StopReason>,
 }
 
 impl StartRecord {
-    /// The error that decides which start is best: on the validation set, or on the training set where nothing is
-    /// held out.
+    /// Returns the error by which the best restart is selected: on the validation set, or on the training set if
+    /// nothing is held out.
     pub fn deciding_mse(&self) -> f64 {
         self.validation_mse.unwrap_or(self.train_mse)
     }
 }
 
-/// The number of the best start, from 0: the first of lowest deciding error.
+/// Returns the index of the best restart, from 0: the first with the lowest selection error.
 pub fn best_start(starts: &[StartRecord]) -> Option<usize> {
     lowest(starts.iter().map(StartRecord::deciding_mse))
 }
 
-/// The place of the first lowest of some errors.
+/// Returns the index of the first of the lowest errors.
 pub(super) fn lowest(errors: impl IntoIterator<Item = f64>) -> Option<usize> {
     let numbered = errors.into_iter().enumerate();
     numbered

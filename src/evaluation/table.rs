@@ -1,27 +1,27 @@
 use super::{Baselines, Errors, PublishedErrors};
 
-/// A row of an error table; the same columns in the window, the terminal and files. `None` where there is no such
-/// figure: the paper gives percentages of the coordinate only.
+/// A row of an error table, with the same columns in the window, the terminal and files. A figure is `None` if it does
+/// not exist: the paper gives percentages of the coordinate only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorRow {
-    /// Whose errors.
+    /// Name of the decoder or baseline.
     pub name: &'static str,
-    /// AveZerr.
+    /// AveZerr, in percent.
     pub z_percent: Option<f64>,
-    /// AveXerr.
+    /// AveXerr, in percent.
     pub x_percent: Option<f64>,
-    /// AveYerr.
+    /// AveYerr, in percent.
     pub y_percent: Option<f64>,
-    /// Mean |decoupled z − z|.
+    /// Mean |decoupled z − z|, in millimetres.
     pub z_mm: Option<f64>,
-    /// The same in percent of the stroke.
+    /// [`Self::z_mm`] in percent of the stroke.
     pub z_full_scale_percent: Option<f64>,
-    /// Largest |decoupled z − z|.
+    /// Largest |decoupled z − z|, in millimetres.
     pub worst_mm: Option<f64>,
 }
 
 impl ErrorRow {
-    /// The names of the figures, in the order of [`Self::values`].
+    /// Names of the figures, in the order of [`Self::values`].
     pub const COLUMNS: [&'static str; 6] = [
         "z_percent",
         "x_percent",
@@ -31,7 +31,7 @@ impl ErrorRow {
         "worst_mm",
     ];
 
-    /// The figures.
+    /// Returns the figures, in the order of [`Self::COLUMNS`].
     pub fn values(&self) -> [Option<f64>; 6] {
         let Self {
             name: _,
@@ -70,8 +70,8 @@ impl ErrorRow {
     }
 }
 
-/// The rows of an error table: the baselines, the network, the Bayesian reference below which no decoder comes, and
-/// what the paper reports if it does.
+/// Returns the rows of an error table: the baselines, the network, the Bayesian reference as the limit of any decoder,
+/// and the published errors, if there are any.
 pub fn error_rows(network: &Errors, baselines: &Baselines, published: Option<&PublishedErrors>) -> Vec<ErrorRow> {
     let measured = [
         ErrorRow::measured("training mean", &baselines.mean),

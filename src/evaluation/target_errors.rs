@@ -1,7 +1,7 @@
 use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// How far answers are from one target, in the target's own unit.
+/// Errors of answers for one target, in the unit of the target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetErrors {
@@ -10,25 +10,25 @@ pub struct TargetErrors {
     /// Mean absolute error.
     pub mae: f64,
     /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these very targets,
-    /// below 0 for worse. `None` where the target is constant.
+    /// negative for worse. `None` if the target is constant.
     pub r2: Option<f64>,
     /// Largest absolute error.
     pub worst: f64,
-    /// [`Self::mae`] in percent of the target's range. `None` where the target is constant.
+    /// [`Self::mae`] in percent of the range of the target. `None` if the target is constant.
     pub percent_of_range: Option<f64>,
 }
 
 /// A row of an error table for targets of any meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetRow {
-    /// Whose errors.
+    /// Name of the decoder or baseline.
     pub name: &'static str,
-    /// Errors of each target.
+    /// Errors, target by target.
     pub targets: Vec<TargetErrors>,
 }
 
 impl TargetErrors {
-    /// Compares `answers` with `targets` (both samples × outputs), target by target.
+    /// Measures `answers` against `targets` (both samples × outputs), target by target.
     ///
     /// # Panics
     /// If the shapes differ.

@@ -6,7 +6,7 @@ use crate::{
     training::{Examples, Problem},
 };
 
-/// A network's task: what it is to learn, of one row-wire or of all.
+/// Training problem of one network, for one row-wire or for all.
 pub(super) struct Task {
     pub(super) problem: Problem,
     pub(super) shape: Shape,
@@ -14,7 +14,7 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// From the sets, unscaled.
+    /// Scales the sets into a training problem.
     pub(super) fn new(
         settings: &RunSettings,
         training: &Dataset,
@@ -45,7 +45,7 @@ impl Task {
     }
 }
 
-/// The tasks of a run: one, or one for each row-wire.
+/// Returns the tasks of a run: one, or one per row-wire.
 pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<PerRow<Task>, RunError> {
     let Split { training, validation } = split;
     match settings.source.row_model() {

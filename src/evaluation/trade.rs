@@ -1,28 +1,28 @@
 use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, run::reference};
 use crate::decoupling::{DecoderKind, Precision};
 
-/// One choice, with what it costs and gains.
+/// One decoder on the trade-off between speed and accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TradePoint {
-    /// Where its settings began.
+    /// Preset from which the settings were derived.
     pub preset: Preset,
-    /// What was run; its hidden nodes count only where the decoder has a network.
+    /// Settings of the run; the hidden nodes matter only if the decoder has a network.
     pub settings: SimulatedSettings,
-    /// The decoder, its errors, and its time for a frame.
+    /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
-    /// Time of training or fitting in seconds, of all rows together, as if one after another.
+    /// Training or fitting time in seconds, summed over all rows and restarts.
     pub training_seconds: f64,
     /// Errors of the Bayesian reference in this scene; `None` where rounding hides it.
     pub reference: Option<Errors>,
 }
 
 impl TradePoint {
-    /// Error of z, AveZerr in percent; infinite where a percentage has no meaning.
+    /// Returns AveZerr in percent; infinite if undefined.
     pub fn z_percent(&self) -> f64 {
         self.report.errors.z_percent.unwrap_or(f64::INFINITY)
     }
 
-    /// Hidden nodes, if the decoder has a network.
+    /// Number of hidden nodes, if the decoder has a network.
     pub fn hidden(&self) -> Option<usize> {
         self.report.kind.needs_network().then_some(self.settings.hidden)
     }
@@ -33,23 +33,23 @@ impl TradePoint {
         (limit > 0.0).then(|| self.report.errors.z_mm / limit)
     }
 
-    /// Its decoding time in microseconds and its error.
+    /// Returns decoding time in microseconds and AveZerr in percent.
     pub fn decoding(&self) -> (f64, f64) {
         (self.report.cost.frame_us, self.z_percent())
     }
 
-    /// Its training time in seconds and its error.
+    /// Returns training time in seconds and AveZerr in percent.
     pub fn training(&self) -> (f64, f64) {
         (self.training_seconds, self.z_percent())
     }
 }
 
-/// Measures every decoder of `decoders` in the scene of `settings`, networks with each number of `hidden` nodes; hands
-/// over each point as it is measured. Training uses all threads, decoding is timed on one. Ends early, with `false`,
-/// once `is_cancelled`.
+/// Measures every decoder of `decoders` in the scene of `settings`, networks with each number of `hidden` nodes, and
+/// passes each point to `on_point` as soon as it is measured. Training uses all threads; decoding is timed on one.
+/// Returns `false` if cancelled before the end.
 ///
 /// # Errors
-/// Settings that are impossible, with the reason.
+/// If the settings are invalid.
 pub fn measure_trade(
     preset: Preset,
     settings: &SimulatedSettings,
@@ -105,7 +105,8 @@ pub fn measure_trade(
     Ok(true)
 }
 
-/// Which points (cost, error) no other beats: none is better in one and at least as good in the other.
+/// Marks the points (cost, error) on the Pareto front: those that no other beats in one and equals or beats in the
+/// other.
 pub fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     let is_beaten = |&(cost, error): &(f64, f64)| {
         let beats = |other: &(f64, f64)| other.0 <= cost && other.1 <= error && (other.0 < cost || other.1 < error);
@@ -114,13 +115,13 @@ pub fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     points.iter().map(|point| !is_beaten(point)).collect()
 }
 
-/// The point of least decoding time whose error is at most `percent`.
+/// Returns the point with the least decoding time among those with an error of at most `percent`.
 pub fn fastest_under(points: &[TradePoint], percent: f64) -> Option<&TradePoint> {
     let good = points.iter().filter(|point| point.z_percent() <= percent);
     good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
 }
 
-/// The point of least error that decodes a frame within `microseconds`.
+/// Returns the point with the least error among those that decode a frame within `microseconds`.
 pub fn most_accurate_under(points: &[TradePoint], microseconds: f64) -> Option<&TradePoint> {
     let quick = points.iter().filter(|point| point.report.cost.frame_us <= microseconds);
     quick.min_by(|a, b| a.z_percent().total_cmp(&b.z_percent()))

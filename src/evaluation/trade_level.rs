@@ -1,6 +1,6 @@
 use super::{TradePoint, pareto_front};
 
-/// What is weighed against the error.
+/// Cost weighed against the error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TradeCost {
     /// Time to decode a frame on one thread.
@@ -11,10 +11,10 @@ pub enum TradeCost {
 }
 
 impl TradeCost {
-    /// Both.
+    /// Both costs, in the order offered to the user.
     pub const ALL: [Self; 2] = [Self::Decoding, Self::Training];
 
-    /// Cost and error of z in percent: microseconds of decoding, or seconds of training.
+    /// Returns the cost (microseconds of decoding, or seconds of training) and the error of z in percent.
     pub fn of(self, point: &TradePoint) -> (f64, f64) {
         match self {
             Self::Decoding => point.decoding(),
@@ -22,7 +22,7 @@ impl TradeCost {
         }
     }
 
-    /// The cost and its unit.
+    /// Returns the name of the cost with its unit.
     pub fn name(self) -> &'static str {
         match self {
             Self::Decoding => "time to decode a frame (µs)",
@@ -31,17 +31,17 @@ impl TradeCost {
     }
 }
 
-/// The points at one level of noise.
+/// Points of the trade-off at one noise level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeLevel {
     /// Relative error of a reading.
     pub noise: f64,
-    /// In the order in which they were measured.
+    /// Points in the order in which they were measured.
     pub points: Vec<TradePoint>,
 }
 
 impl TradeLevel {
-    /// Which points no other beats at this cost.
+    /// Marks the points on the Pareto front for this cost.
     pub fn front(&self, cost: TradeCost) -> Vec<bool> {
         let points: Vec<_> = self.points.iter().map(|point| cost.of(point)).collect();
         pareto_front(&points)

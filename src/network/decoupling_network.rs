@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, Shape};
 
-/// A network together with its scaling: resistances in ohm in, coordinates in millimetres out.
+/// A network together with its scaling, from resistances in ohm to coordinates in millimetres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Record", into = "Record")]
 pub struct DecouplingNetwork {
@@ -13,38 +13,38 @@ pub struct DecouplingNetwork {
     outputs: MinMax,
 }
 
-/// Parts that do not make a network.
+/// Error in a saved network.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NetworkError {
-    /// The scaling has limits that are missing, not finite, or out of order.
+    /// The limits of a scaling are missing, not finite, or out of order.
     #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
     Scaling(&'static str),
-    /// Layer sizes that do not follow from each other.
+    /// The number of weights in a layer does not match the scaling and the hidden nodes.
     #[error("the {layer} layer has {found} weights, but {expected} follow from the scaling and the hidden nodes")]
     LayerSize {
-        /// Which layer.
+        /// Name of the layer.
         layer: &'static str,
-        /// Weights found.
+        /// Number of weights found.
         found: usize,
-        /// Weights expected.
+        /// Number of weights expected.
         expected: usize,
     },
     /// A weight is NaN or infinite.
     #[error("weight {index} of the {layer} layer is not a finite number")]
     Weight {
-        /// Which layer.
+        /// Name of the layer.
         layer: &'static str,
-        /// Which weight, row by row from 0.
+        /// Index of the weight, row by row from 0.
         index: usize,
     },
 }
 
 impl DecouplingNetwork {
-    /// Joins a network with the scaling it was trained under.
+    /// Combines a network with the scaling it was trained with.
     ///
     /// # Panics
-    /// If the network's channels are not those of the scaling.
+    /// If the inputs or outputs of the network do not match the scaling.
     pub fn new(inputs: impl Into<Inputs>, mlp: Mlp, outputs: MinMax) -> Self {
         let inputs = inputs.into();
         assert_eq!(inputs.count(), mlp.shape().inputs);
@@ -52,29 +52,29 @@ impl DecouplingNetwork {
         Self { inputs, mlp, outputs }
     }
 
-    /// The network between the scalings.
+    /// Returns the network without its scaling.
     pub fn mlp(&self) -> &Mlp {
         &self.mlp
     }
 
-    /// How resistances become inputs.
+    /// Returns the preprocessing of the resistances.
     pub fn inputs(&self) -> &Inputs {
         &self.inputs
     }
 
-    /// Scaling of the coordinates.
+    /// Returns the scaling of the coordinates.
     pub fn outputs(&self) -> &MinMax {
         &self.outputs
     }
 
-    /// Coordinates in millimetres (samples × 3·M2) from resistances in ohm (samples × M4).
+    /// Returns the coordinates in millimetres (samples × 3·M2) for resistances in ohm (samples × M4).
     pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
         let scaled = self.inputs.of(resistances_ohm);
         self.outputs.restore(self.mlp.forward(scaled.view()).view())
     }
 }
 
-/// How a network is written: named layers, row by row, biases last.
+/// File format of a network: one array per layer, row by row, biases last.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {

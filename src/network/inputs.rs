@@ -6,23 +6,23 @@ use thiserror::Error;
 
 use super::{MinMax, Quantity, ScalingError, Whitening};
 
-/// How resistances become the inputs of a network.
+/// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputChoice {
-    /// What is taken of each resistance.
+    /// Quantity computed from each resistance.
     pub quantity: Quantity,
-    /// How it is scaled.
+    /// Scaling of the quantity.
     pub scaling: ScalingChoice,
 }
 
 impl InputChoice {
-    /// Resistances between −1 and 1, as in the paper.
+    /// Resistances scaled to [−1, 1], as in the paper.
     pub const PAPER: Self = Self {
         quantity: Quantity::Resistance,
         scaling: ScalingChoice::MinMax,
     };
-    /// Readings as they are between −1 and 1, for measured data of any unit.
+    /// Raw readings scaled to [−1, 1], for measured data in any unit.
     pub const MEASURED: Self = Self {
         quantity: Quantity::Raw,
         scaling: ScalingChoice::MinMax,
@@ -34,35 +34,35 @@ impl InputChoice {
     };
 }
 
-/// How inputs are scaled.
+/// Choice of the scaling of the inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScalingChoice {
-    /// Each channel to [−1, 1]: the paper.
+    /// Each channel scaled to [−1, 1], as in the paper.
     #[default]
     MinMax,
-    /// Principal components to unit spread, less where noise hides them.
+    /// Principal components scaled to unit variance, less where noise hides them.
     Whitening,
 }
 
-/// Resistances to inputs, as fitted to a training set.
+/// Preprocessing of resistances into network inputs, fitted to a training set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inputs {
     quantity: Quantity,
     scaling: InputScaling,
 }
 
-/// A fitted scaling.
+/// Scaling fitted to a training set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum InputScaling {
-    /// Each channel to [−1, 1].
+    /// Each channel scaled to [−1, 1].
     MinMax(MinMax),
-    /// Principal components to unit spread.
+    /// Principal components scaled to unit variance.
     Whitening(Whitening),
 }
 
-/// A word that is none of the scalings.
+/// Error for a word that names no scaling.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not a scaling: give minmax or whiten")]
 pub struct ScalingChoiceError(String);
@@ -88,23 +88,25 @@ impl FromStr for ScalingChoice {
 }
 
 impl From<MinMax> for Inputs {
-    /// Resistances scaled by their range.
+    /// Creates inputs from resistances scaled by their range.
     fn from(scaling: MinMax) -> Self {
         Self::new(Quantity::Resistance, InputScaling::MinMax(scaling))
     }
 }
 
 impl Inputs {
-    /// This quantity with this scaling.
+    /// Creates inputs from a quantity and its fitted scaling.
     pub fn new(quantity: Quantity, scaling: InputScaling) -> Self {
         Self { quantity, scaling }
     }
 
-    /// Fits to training resistances in ohm (samples × M4). `noise` is the relative error (standard deviation) that the
-    /// training set lacks and later readings have; 0 if it has them already, or there is none.
+    /// Fits the scaling to training resistances in ohm (samples × M4).
+    ///
+    /// `noise` is the relative error (standard deviation) of later readings that is missing from the training set: 0 if
+    /// the training set already contains it, or if there is none.
     ///
     /// # Errors
-    /// No samples, values that are not finite, or a range that overflows.
+    /// If there are no samples, a value is not finite or not in the domain of the quantity, or a range overflows.
     pub fn fit(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>, noise: f64) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
         let foreign = resistances_ohm
@@ -128,17 +130,17 @@ impl Inputs {
         Ok(Self { quantity, scaling })
     }
 
-    /// What is taken of each resistance.
+    /// Returns the quantity computed from each resistance.
     pub fn quantity(&self) -> Quantity {
         self.quantity
     }
 
-    /// The scaling.
+    /// Returns the fitted scaling.
     pub fn scaling(&self) -> &InputScaling {
         &self.scaling
     }
 
-    /// Resistances of a sample: M4.
+    /// Number of resistances per sample, M4.
     pub fn channels(&self) -> usize {
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.channels(),
@@ -146,7 +148,7 @@ impl Inputs {
         }
     }
 
-    /// Inputs of the network.
+    /// Number of network inputs.
     pub fn count(&self) -> usize {
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.varying().len(),
@@ -154,7 +156,7 @@ impl Inputs {
         }
     }
 
-    /// Inputs (samples × inputs) from resistances in ohm (samples × M4).
+    /// Returns the inputs (samples × inputs) for resistances in ohm (samples × M4).
     pub fn of(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
         let values = resistances_ohm.mapv(|ohm| self.quantity.of(ohm));
         match &self.scaling {
@@ -163,7 +165,7 @@ impl Inputs {
         }
     }
 
-    /// The affine map behind the scaling: inputs = matrix · (values − centre), the matrix inputs × M4.
+    /// Returns the centre and matrix (inputs × M4) of the scaling: inputs = matrix · (values − centre).
     pub fn affine(&self) -> (Vec<f64>, Array2<f64>) {
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.affine(),
@@ -171,11 +173,11 @@ impl Inputs {
         }
     }
 
-    /// Whether the file this came from made sense.
+    /// Returns `true` if the limits, which may come from a file, are valid.
     pub(crate) fn is_sound(&self) -> bool {
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.is_sound(),
-            // Checked when it is read.
+            // Validated when it is deserialised.
             InputScaling::Whitening(_) => true,
         }
     }

@@ -3,91 +3,91 @@ use serde::{Deserialize, Serialize};
 
 use super::tanh_in_place;
 
-/// How many channels each layer of the network has, biases not counted.
+/// Number of channels in each layer, not counting biases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shape {
-    /// Input channels n.
+    /// Number of inputs, n.
     pub inputs: usize,
-    /// Hidden nodes h.
+    /// Number of hidden nodes, h.
     pub hidden: usize,
-    /// Output channels m.
+    /// Number of outputs, m.
     pub outputs: usize,
 }
 
 impl Shape {
-    /// Weights and biases of the hidden layer.
+    /// Number of weights and biases in the hidden layer.
     pub fn hidden_weights(self) -> usize {
         (self.inputs + 1) * self.hidden
     }
 
-    /// Weights and biases of the output layer.
+    /// Number of weights and biases in the output layer.
     pub fn output_weights(self) -> usize {
         (self.hidden + 1) * self.outputs
     }
 
-    /// All weights and biases.
+    /// Number of weights and biases in both layers.
     pub fn weights(self) -> usize {
         self.hidden_weights() + self.output_weights()
     }
 }
 
-/// A multilayer perceptron: `y = [tanh([x, 1] W), 1] V` with W (n+1 × h) and V (h+1 × m), the biases in their last
+/// A multilayer perceptron: `y = [tanh([x, 1] W), 1] V` with W (n+1 × h) and V (h+1 × m); the biases are in their last
 /// rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mlp {
     shape: Shape,
-    /// W then V, each row by row.
+    /// W followed by V, each row by row.
     weights: Vec<f64>,
 }
 
 impl Mlp {
-    /// A network whose weights are all zero.
+    /// Creates a network with all weights zero.
     pub fn zeros(shape: Shape) -> Self {
         Self::from_weights(shape, vec![0.0; shape.weights()])
     }
 
-    /// A network of these weights: W row by row, then V row by row.
+    /// Creates a network from its weights: W row by row, then V row by row.
     ///
     /// # Panics
-    /// If there are not `shape.weights()` of them.
+    /// If `weights` does not have `shape.weights()` entries.
     pub fn from_weights(shape: Shape, weights: Vec<f64>) -> Self {
         assert_eq!(weights.len(), shape.weights());
         Self { shape, weights }
     }
 
-    /// Channels of each layer.
+    /// Number of channels in each layer.
     pub fn shape(&self) -> Shape {
         self.shape
     }
 
-    /// All weights: W row by row, then V row by row.
+    /// Returns all weights: W row by row, then V row by row.
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// As [`Self::weights`], to be changed.
+    /// Returns all weights mutably, in the order of [`Self::weights`].
     pub fn weights_mut(&mut self) -> &mut [f64] {
         &mut self.weights
     }
 
-    /// W and V, each row by row.
+    /// Returns W and V, each row by row.
     pub fn layers(&self) -> (&[f64], &[f64]) {
         self.weights.split_at(self.shape.hidden_weights())
     }
 
-    /// W: n+1 × h, biases in the last row.
+    /// Weights of the hidden layer, W (n+1 × h), with the biases in the last row.
     pub fn hidden_layer(&self) -> ArrayView2<'_, f64> {
         let shape = (self.shape.inputs + 1, self.shape.hidden);
         ArrayView2::from_shape(shape, self.layers().0).expect("checked when built")
     }
 
-    /// V: h+1 × m, biases in the last row.
+    /// Weights of the output layer, V (h+1 × m), with the biases in the last row.
     pub fn output_layer(&self) -> ArrayView2<'_, f64> {
         let shape = (self.shape.hidden + 1, self.shape.outputs);
         ArrayView2::from_shape(shape, self.layers().1).expect("checked when built")
     }
 
-    /// Outputs (samples × m) for inputs (samples × n).
+    /// Returns the outputs (samples × m) for `inputs` (samples × n).
     pub fn forward(&self, inputs: ArrayView2<'_, f64>) -> Array2<f64> {
         let mut outputs = Array2::zeros((inputs.nrows(), self.shape.outputs));
         let mut hidden = vec![0.0; self.shape.hidden];
@@ -102,7 +102,7 @@ impl Mlp {
     }
 }
 
-/// `output = [input, 1] · layer`, the layer row by row with its biases last.
+/// Computes `output = [input, 1] · layer`, where the layer is stored row by row with its biases last.
 fn affine(layer: &[f64], input: ArrayView1<'_, f64>, output: &mut [f64]) {
     let width = output.len();
     let (rows, biases) = layer.split_at(input.len() * width);

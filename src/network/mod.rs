@@ -1,5 +1,7 @@
-//! The three-layer network of the paper (Fig. 3): resistances, a tanh hidden layer, a linear output layer; with the
-//! scaling on both sides and the random start.
+//! The three-layer network of the paper (Fig. 3): resistances, a tanh hidden layer and a linear output layer.
+//!
+//! A [`DecouplingNetwork`] is an [`Mlp`] with the scaling on both sides ([`Inputs`], [`MinMax`]); [`Networks`] are one
+//! network shared by all row-wires or one per row-wire. Weights are initialised at random by [`nguyen_widrow`].
 
 mod decoupling_network;
 mod inputs;

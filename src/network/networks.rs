@@ -9,21 +9,22 @@ use serde::{
 use super::DecouplingNetwork;
 use crate::dataset::{Dataset, PerRow};
 
-/// Trained networks: one for every row-wire read, or one for each where the row is known.
+/// Trained networks: one shared by all row-wires read, or one per row-wire where the row is known.
 ///
-/// In files a single network stands for itself and several are a list.
+/// In files, a single network is stored as itself and several as a list.
 pub type Networks = PerRow<DecouplingNetwork>;
 
 impl PerRow<DecouplingNetwork> {
-    /// Weights of all networks together.
+    /// Total number of weights in all networks.
     pub fn weights(&self) -> usize {
         self.values().iter().map(|network| network.mlp().weights().len()).sum()
     }
 
-    /// Decodes every sample of `set` by the network of its row-wire: samples × outputs, in the units of the targets.
+    /// Decodes each sample of `set` with the network of its row-wire. Returns samples × outputs, in the units of the
+    /// targets.
     ///
     /// # Panics
-    /// If the set has other channels, or row-wires without a network.
+    /// If the set has another number of channels, or a row-wire without a network.
     pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
         if let Some(only) = self.only() {
             return only.decouple(set.readings());

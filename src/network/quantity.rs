@@ -3,31 +3,31 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// What a decoder is given of a resistance R.
+/// Quantity computed from a resistance R as the input of a decoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// R in ohm: the paper.
+    /// R in ohm, as in the paper.
     #[default]
     Resistance,
-    /// 1/R in siemens. By Eq. (2) it is a plain sum over nodes, hence the most nearly linear in the deformation.
+    /// 1/R in siemens. By Eq. (2) it is a plain sum over nodes, and so the most nearly linear in the deformation.
     Conductance,
-    /// ln R: relative errors become additive.
+    /// ln R, in which relative errors are additive.
     LogResistance,
-    /// The reading as it is, of whatever unit and sign: for measured data that are no resistances.
+    /// The reading itself, in any unit and with any sign, for measured data other than resistances.
     Raw,
 }
 
-/// A word that is none of the quantities.
+/// Error for a word that names no quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not an input: give resistance, conductance or log")]
 pub struct QuantityError(String);
 
 impl Quantity {
-    /// Those of a resistance, in the order offered.
+    /// All quantities of a resistance, in the order offered to the user.
     pub const ALL: [Self; 3] = [Self::Resistance, Self::Conductance, Self::LogResistance];
 
-    /// The value for a resistance in ohm.
+    /// Returns the value for a resistance in ohm.
     pub fn of(self, resistance_ohm: f64) -> f64 {
         match self {
             Self::Resistance | Self::Raw => resistance_ohm,
@@ -36,7 +36,8 @@ impl Quantity {
         }
     }
 
-    /// Whether it has a value for a reading: any finite number, and where it is a resistance above 0.
+    /// Returns `true` if the quantity is defined for a reading: any finite number if raw, otherwise a finite number
+    /// above 0.
     #[inline(always)]
     pub fn accepts(self, reading: f64) -> bool {
         match self {
@@ -45,7 +46,7 @@ impl Quantity {
         }
     }
 
-    /// The resistance in ohm behind a value.
+    /// Returns the resistance in ohm for a value, the inverse of [`Self::of`].
     pub fn resistance_ohm(self, value: f64) -> f64 {
         match self {
             Self::Resistance | Self::Raw => value,
@@ -54,8 +55,7 @@ impl Quantity {
         }
     }
 
-    /// How much the value changes with the logarithm of the resistance, without sign: a relative error ε of a reading
-    /// is an error of ε times this.
+    /// Returns |d value / d ln R|: a relative error ε of a reading is an error of ε times this in the value.
     pub fn per_relative_error(self, resistance_ohm: f64) -> f64 {
         match self {
             Self::Resistance => resistance_ohm,

@@ -2,8 +2,9 @@ use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Scaling of channels to [−1, 1] by their smallest and largest training value, with constant channels removed and
-/// restored: `removeconstantrows` and `mapminmax` of the field's reference toolbox.
+/// Scaling of channels to [−1, 1] by their training minimum and maximum; constant channels are removed and restored.
+///
+/// Equivalent to `removeconstantrows` and `mapminmax` of the field's reference toolbox.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MinMax {
@@ -13,56 +14,56 @@ pub struct MinMax {
     maximum: Vec<f64>,
 }
 
-/// Why channels cannot be scaled.
+/// Error in fitting or reading a scaling.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ScalingError {
-    /// No samples.
+    /// There are no samples.
     #[error("there are no samples to scale")]
     Empty,
     /// A value is NaN or infinite.
     #[error("sample {}, channel {}: {value} is not a finite number", .sample + 1, .channel + 1)]
     NotFinite {
-        /// Sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
-        /// Channel, from 0.
+        /// Index of the channel, from 0.
         channel: usize,
-        /// The value.
+        /// Value found.
         value: f64,
     },
-    /// A reading that the chosen input has no value for.
+    /// A reading is outside the domain of the chosen input quantity.
     #[error("sample {}, channel {}: {value} is not a resistance; give finite numbers above 0, or take readings as they are", .sample + 1, .channel + 1)]
     Reading {
-        /// Sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
-        /// Channel, from 0.
+        /// Index of the channel, from 0.
         channel: usize,
-        /// The reading.
+        /// Reading found.
         value: f64,
     },
     /// The range of a channel overflows.
     #[error("channel {} ranges from {minimum} to {maximum}: too wide to scale; give it in larger units", .channel + 1)]
     Range {
-        /// Channel, from 0.
+        /// Index of the channel, from 0.
         channel: usize,
-        /// Its smallest value.
+        /// Smallest value of the channel.
         minimum: f64,
-        /// Its largest value.
+        /// Largest value of the channel.
         maximum: f64,
     },
-    /// The principal components could not be computed.
+    /// The decomposition into principal components did not converge.
     #[error("the principal components of the readings did not converge: scale by their range instead")]
     NotConverged,
-    /// A file whose scaling makes no sense.
+    /// The scaling in a file is inconsistent.
     #[error("its parts are missing, not finite, or of sizes that do not fit")]
     Damaged,
 }
 
 impl MinMax {
-    /// Takes the ranges of `values` (samples × channels).
+    /// Fits the ranges of `values` (samples × channels).
     ///
     /// # Errors
-    /// No samples, a value that is not finite, or a range that overflows.
+    /// If there are no samples, a value is not finite, or a range overflows.
     pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
         if values.nrows() == 0 {
             return Err(ScalingError::Empty);
@@ -91,12 +92,12 @@ impl MinMax {
         Ok(Self { minimum, maximum })
     }
 
-    /// Number of channels, constant ones included.
+    /// Number of channels, including constant ones.
     pub fn channels(&self) -> usize {
         self.minimum.len()
     }
 
-    /// Whether the file this came from made sense: equally many finite limits in order.
+    /// Returns `true` if there are as many minima as maxima, finite and in order, which a file does not guarantee.
     pub(crate) fn is_sound(&self) -> bool {
         self.minimum.len() == self.maximum.len()
             && self
@@ -106,7 +107,7 @@ impl MinMax {
                 .all(|(low, high)| low <= high && (high - low).is_finite())
     }
 
-    /// The channels that vary, which are what a network is given.
+    /// Indices of the channels that vary, the only ones that a network sees.
     pub fn varying(&self) -> Vec<usize> {
         (0..self.channels())
             .filter(|&channel| self.minimum[channel] < self.maximum[channel])
@@ -119,7 +120,7 @@ impl MinMax {
         (self.minimum[channel] + half_width, half_width)
     }
 
-    /// Physical values (samples × channels) to scaled ones (samples × varying channels).
+    /// Scales physical values (samples × channels) to [−1, 1] (samples × varying channels).
     pub fn scale(&self, values: ArrayView2<'_, f64>) -> Array2<f64> {
         let varying = self.varying();
         let mut scaled = values.select(Axis(1), &varying);
@@ -130,7 +131,7 @@ impl MinMax {
         scaled
     }
 
-    /// The map to scaled values, `matrix · (values − centre)` with the matrix varying channels × channels.
+    /// Returns the centre and matrix (varying channels × channels) of the scaling: scaled = matrix · (values − centre).
     pub(super) fn affine(&self) -> (Vec<f64>, Array2<f64>) {
         let varying = self.varying();
         let centre = (0..self.channels()).map(|channel| self.range(channel).0).collect();
@@ -141,12 +142,12 @@ impl MinMax {
         (centre, matrix)
     }
 
-    /// Values in the middle of their ranges, of which constants are the exact value, and half widths of the ranges.
+    /// Returns the middle and half-width of each channel's range; the middle of a constant channel is its exact value.
     pub(crate) fn middles_and_half_widths(&self) -> Vec<(f64, f64)> {
         (0..self.channels()).map(|channel| self.range(channel)).collect()
     }
 
-    /// Scaled values (samples × varying channels) back to physical ones (samples × channels), constants restored.
+    /// Converts scaled values (samples × varying channels) to physical ones (samples × channels), restoring constants.
     pub fn restore(&self, scaled: ArrayView2<'_, f64>) -> Array2<f64> {
         let mut values = Array2::zeros((scaled.nrows(), self.channels()));
         for (mut column, &constant) in values.columns_mut().into_iter().zip(&self.minimum) {

@@ -2,13 +2,14 @@ use rand::{Rng, RngExt};
 
 use super::{Mlp, Shape};
 
-/// A random start by Nguyen and Widrow (1990): the hidden nodes' active regions are spread over inputs in [−1, 1].
+/// Returns a network with a random initialisation by Nguyen and Widrow (1990), which spreads the active regions of the
+/// hidden nodes over inputs in [−1, 1].
 ///
 /// Each hidden node gets a random direction of length 2 · 0.7 · h^(1/n), and the biases are spaced evenly over ± that
-/// length, so that the nodes' slopes (net input within ±2) cover the input range. The output layer is uniform in
-/// [−1, 1].
+/// length, so that the slopes of the nodes (net input within ±2) cover the input range. The weights of the output layer
+/// are uniform in [−1, 1].
 pub fn nguyen_widrow(shape: Shape, rng: &mut impl Rng) -> Mlp {
-    /// Half the width of the net input over which tanh is not yet flat.
+    /// Half-width of the net input over which tanh is not yet flat.
     const ACTIVE: f64 = 2.0;
     let Shape { inputs, hidden, .. } = shape;
     let mut mlp = Mlp::zeros(shape);
@@ -20,7 +21,7 @@ pub fn nguyen_widrow(shape: Shape, rng: &mut impl Rng) -> Mlp {
     };
     for node in 0..hidden {
         let direction: Vec<f64> = (0..inputs).map(|_| rng.random_range(-1.0..1.0)).collect();
-        // A direction of length 0 has no direction; it is as improbable as 53 zero bits for every input.
+        // A vector of length 0 has no direction; it is as improbable as 53 zero bits for every input.
         let norm = direction
             .iter()
             .map(|x| x * x)

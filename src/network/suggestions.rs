@@ -1,19 +1,19 @@
 use std::ops::RangeInclusive;
 
-/// The most hidden nodes offered.
+/// Largest number of hidden nodes offered to the user.
 pub const LARGEST_HIDDEN: usize = 512;
 
-/// How many hidden nodes the paper's rules of thumb suggest; a starting point, not a bound.
+/// Numbers of hidden nodes suggested by the paper's rules of thumb; a starting point, not a bound.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HiddenSuggestions {
-    /// Eq. (12): n₁ = √(n+m) + a, a from 1 to 10.
+    /// Eq. (12): n₁ = √(n+m) + a, for a from 1 to 10.
     pub square_root: RangeInclusive<usize>,
     /// Eq. (13): n₁ = log₂ n.
     pub logarithm: usize,
 }
 
 impl HiddenSuggestions {
-    /// For n `inputs` and m `outputs`, rounded to whole nodes.
+    /// Computes the suggestions for n `inputs` and m `outputs`, rounded to whole nodes.
     pub fn new(inputs: usize, outputs: usize) -> Self {
         let root = ((inputs + outputs) as f64).sqrt();
         Self {

@@ -1,7 +1,7 @@
 /// Replaces each value by its hyperbolic tangent, within 3 units in the last place.
 ///
 /// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2). y is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor
-/// polynomial of degree 13 (remainder below 1e-17). No branches, so that it runs in vector registers, and no fused
+/// polynomial of degree 13 (remainder below 1e-17). There are no branches, so that the loop vectorises, and no fused
 /// operations, so that every machine gives the same bits.
 pub fn tanh_in_place(values: &mut [f64]) {
     pulp::Arch::new().dispatch(|| {
@@ -13,10 +13,10 @@ pub fn tanh_in_place(values: &mut [f64]) {
 
 #[inline(always)]
 fn tanh(x: f64) -> f64 {
-    /// ln 2 in two parts; products of the first with a whole number up to 2¹¹ are exact.
+    /// ln 2 in two parts; products of the first with an integer up to 2¹¹ are exact.
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// Adding 1.5·2⁵² leaves the nearest whole number in the low bits.
+    /// Adding 1.5·2⁵² leaves the nearest integer in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// Beyond 2|x| = 40 the result rounds to ±1.
     const SATURATED: f64 = 40.0;
@@ -52,7 +52,9 @@ fn tanh(x: f64) -> f64 {
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
 }
 
-/// As [`tanh_in_place`] in single precision, within 4 units in the last place.
+/// Replaces each value by its hyperbolic tangent in single precision, within 4 units in the last place.
+///
+/// Uses the method of [`tanh_in_place`].
 pub fn tanh_in_place_single(values: &mut [f32]) {
     pulp::Arch::new().dispatch(|| {
         for value in &mut *values {
@@ -63,14 +65,14 @@ pub fn tanh_in_place_single(values: &mut [f32]) {
 
 #[inline(always)]
 fn tanh_single(x: f32) -> f32 {
-    /// ln 2 in two parts; products of the first with a whole number up to 2¹⁵ are exact.
+    /// ln 2 in two parts; products of the first with an integer up to 2¹⁵ are exact.
     const LN2_HIGH: f32 = 0.693_359_4;
     const LN2_LOW: f32 = -2.121_944_4e-4;
-    /// Adding 1.5·2²³ leaves the nearest whole number in the low bits.
+    /// Adding 1.5·2²³ leaves the nearest integer in the low bits.
     const ROUND: f32 = 12_582_912.0;
     /// Beyond 2|x| = 20 the result rounds to ±1.
     const SATURATED: f32 = 20.0;
-    /// 1/n! from n = 7 down to 2; the rest is below 1e-8.
+    /// 1/n! from n = 7 down to 2; the remainder is below 1e-8.
     const INVERSE_FACTORIALS: [f32; 6] = [
         1.0 / 5_040.0,
         1.0 / 720.0,

@@ -4,9 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use super::ScalingError;
 
-/// Noise-aware whitening: principal components of the training values, each divided by √(σ² + noise²), where σ² is
-/// the component's variance and noise² what noise adds to it. What varies little but is still above the noise counts
-/// as much as what varies most; what noise hides stays small.
+/// Noise-aware whitening: principal components of the training values, each divided by √(σ² + noise²), where σ² is the
+/// component's variance and noise² the variance that noise adds to it.
+///
+/// A weak component that is still above the noise counts as much as the strongest; components hidden by noise stay
+/// small.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Record", into = "Record")]
 pub struct Whitening {
@@ -18,18 +20,20 @@ pub struct Whitening {
     deviations: Vec<f64>,
 }
 
-/// Components that vary less than this in proportion to the first are rounding errors of the readings, not signals.
+/// Components weaker than this relative to the first are rounding errors of the readings, not signals.
 const ROUNDING: f64 = 1e-13;
 
 impl Whitening {
-    /// Takes the components of `values` (samples × channels), to which noise of standard deviation `noise` adds (one
-    /// for each channel, independent; zeros where the values hold their noise already).
+    /// Fits the components of `values` (samples × channels).
+    ///
+    /// `noise` is the standard deviation of independent noise added to later values, one per channel; zero where
+    /// `values` already contain their noise.
     ///
     /// # Errors
-    /// No samples, or a value that is not finite.
+    /// If there are no samples, or a value is not finite.
     ///
     /// # Panics
-    /// If there is not one noise for each channel.
+    /// If `noise` does not have one entry per channel.
     pub fn fit(values: ArrayView2<'_, f64>, noise: &[f64]) -> Result<Self, ScalingError> {
         let (samples, channels) = values.dim();
         assert_eq!(noise.len(), channels);
@@ -39,8 +43,9 @@ impl Whitening {
         if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
             return Err(ScalingError::NotFinite { sample, channel, value });
         }
-        // The singular values of the centred samples, not the eigenvalues of their covariance: squares would lose
-        // what varies 1e-8 times less than the first component. R of a QR has the same ones and is small.
+        // Uses the singular values of the centred samples instead of the eigenvalues of their covariance, because
+        // squaring would lose components 1e-8 times weaker than the first. R of a QR decomposition has the same
+        // singular values and is small.
         let centred = Mat::from_fn(samples, channels, |s, c| values[[s, c]] - mean[c]);
         let triangle = if samples > channels {
             centred.qr().thin_R().to_owned()
@@ -64,12 +69,12 @@ impl Whitening {
         })
     }
 
-    /// Channels of the values.
+    /// Number of channels of the values.
     pub fn channels(&self) -> usize {
         self.mean.len()
     }
 
-    /// Components, which are what a network is given.
+    /// Number of components, the inputs of a network.
     pub fn components(&self) -> usize {
         self.deviations.len()
     }
@@ -79,14 +84,14 @@ impl Whitening {
         &self.mean
     }
 
-    /// The matrix (components × channels) that takes centred values to whitened ones.
+    /// Returns the matrix (components × channels) that whitens centred values.
     pub fn matrix(&self) -> Array2<f64> {
         Array2::from_shape_fn(self.directions.dim(), |(k, c)| {
             self.directions[[k, c]] / self.deviations[k]
         })
     }
 
-    /// Values (samples × channels) to whitened ones (samples × components).
+    /// Whitens values: samples × channels to samples × components.
     pub fn scale(&self, values: ArrayView2<'_, f64>) -> Array2<f64> {
         let mut centred = values.to_owned();
         for (mut column, mean) in centred.columns_mut().into_iter().zip(&self.mean) {
@@ -95,7 +100,7 @@ impl Whitening {
         centred.dot(&self.matrix().t())
     }
 
-    /// Whitened values (samples × components) back to values (samples × channels).
+    /// Converts whitened values (samples × components) back to values (samples × channels).
     pub fn restore(&self, whitened: ArrayView2<'_, f64>) -> Array2<f64> {
         let mut values = Array2::zeros((whitened.nrows(), self.channels()));
         for (mut row, whitened) in values.rows_mut().into_iter().zip(whitened.rows()) {
@@ -109,7 +114,7 @@ impl Whitening {
     }
 }
 
-/// How a whitening is written.
+/// File format of a whitening.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Record {

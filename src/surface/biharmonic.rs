@@ -7,19 +7,19 @@
 //! z(p) = Σ_n w_n φ(|p − p_n|)        φ(r) = r² (ln r − 1),  φ(0) = 0,  r in millimetres
 //! ```
 //!
-//! with weights from G w = z, G_mn = φ(|p_m − p_n|). Everything but z is fixed, hence z(grid) = (Φ G⁻¹) z.
-//! There is no polynomial part: like its model, it depends on the unit of length and does not reproduce constants
-//! exactly between the nodes.
+//! with weights from G w = z, G_mn = φ(|p_m − p_n|). Only z varies, hence z(grid) = (Φ G⁻¹) z. As in `griddata`, there
+//! is no polynomial part: the result depends on the unit of length and does not reproduce constants exactly between the
+//! nodes.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_vec_mul};
 
-/// Largest sum of absolute weights at a point within the nodes. Healthy lattices stay below 10; beyond this bound
-/// the weights are rounding errors of a nearly singular G.
+/// Largest accepted sum of absolute weights at a point within the nodes. Well-conditioned lattices stay below 10;
+/// beyond this bound the weights are rounding errors of a nearly singular G.
 const LARGEST_AMPLIFICATION: f64 = 1e3;
 
-/// Largest residual of G X = Φᵀ, relative to the largest entry of G.
+/// Largest accepted residual of G X = Φᵀ, relative to the largest entry of G and Φ.
 const LARGEST_RESIDUAL: f64 = 1e-9;
 
 /// φ(r) = r² (ln r − 1) from r².
@@ -35,14 +35,15 @@ fn distance_squared(a: (f64, f64), b: (f64, f64)) -> f64 {
     (a.0 - b.0).powi(2) + (a.1 - b.1).powi(2)
 }
 
-/// Φ G⁻¹, `points × nodes`; or nothing if G cannot be trusted. `points` yields `(place, is within the nodes)`.
+/// Returns Φ G⁻¹ (`points × nodes`), or `None` if G is too ill-conditioned. Each point comes with a flag for lying
+/// within the nodes.
 pub(super) fn weights(nodes_mm: &[(f64, f64)], points_mm: &[((f64, f64), bool)]) -> Option<Array2<f64>> {
     let (nodes, points) = (nodes_mm.len(), points_mm.len());
     let gram = Mat::from_fn(nodes, nodes, |m, n| green(distance_squared(nodes_mm[m], nodes_mm[n])));
     let basis = Mat::from_fn(nodes, points, |n, p| {
         green(distance_squared(nodes_mm[n], points_mm[p].0))
     });
-    // G is symmetric but indefinite, so it needs a pivoted factorisation; and Φ G⁻¹ = (G⁻¹ Φᵀ)ᵀ.
+    // G is symmetric but indefinite, hence the pivoted factorisation; Φ G⁻¹ = (G⁻¹ Φᵀ)ᵀ.
     let solution = gram.partial_piv_lu().solve(&basis);
 
     let scale = gram.norm_max().max(basis.norm_max());
@@ -55,7 +56,7 @@ pub(super) fn weights(nodes_mm: &[(f64, f64)], points_mm: &[((f64, f64), bool)])
         return None;
     }
     let mut weights = Array2::from_shape_fn((points, nodes), |(p, n)| solution[(n, p)]);
-    // Points on a node have its value and nothing else, which the solution knows only up to rounding.
+    // At a node the surface is exactly the node's value, which the solution gives only up to rounding.
     for (mut row, (place, _)) in weights.outer_iter_mut().zip(points_mm) {
         if let Some(node) = nodes_mm.iter().position(|node| node == place) {
             row.fill(0.0);
@@ -65,7 +66,7 @@ pub(super) fn weights(nodes_mm: &[(f64, f64)], points_mm: &[((f64, f64), bool)])
     Some(weights)
 }
 
-/// One frame: `out = weights · node_values`.
+/// Evaluates one frame: `out = weights · node_values`.
 pub(super) fn evaluate_into(weights: &Array2<f64>, node_values: &[f64], out: &mut [f64]) {
     general_mat_vec_mul(
         1.0,

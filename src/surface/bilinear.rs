@@ -1,6 +1,6 @@
-//! Bilinear interpolation on a lattice: plain, quick, and possible for every array.
+//! Bilinear interpolation on a lattice: fast, and defined for every array.
 
-/// Where a grid line falls between two lattice lines: `(1 − weight) · lower + weight · upper`.
+/// Position of a grid line between two lattice lines: `(1 − weight) · lower + weight · upper`.
 #[derive(Clone, Copy, Debug)]
 struct Between {
     lower: usize,
@@ -8,7 +8,7 @@ struct Between {
     weight: f64,
 }
 
-/// Weights of both axes; beyond the outermost nodes the surface goes on level.
+/// Bilinear weights along both axes; the surface is constant beyond the outermost nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Bilinear {
     x: Vec<Between>,
@@ -17,7 +17,8 @@ pub(super) struct Bilinear {
 }
 
 impl Bilinear {
-    /// Both node axes ascending, with the place of each in the caller's order.
+    /// Takes for each axis the ascending node coordinates, their indices in the caller's order, and the grid
+    /// coordinates.
     pub(super) fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
         Self {
             x: betweens(x.0, x.1, x.2),
@@ -38,7 +39,7 @@ impl Bilinear {
     }
 }
 
-/// Exact at both ends, and blind to a missing value whose weight is zero.
+/// Interpolates linearly; exact at both ends, and unaffected by a missing value (NaN) of zero weight.
 fn mix(lower: f64, upper: f64, weight: f64) -> f64 {
     if weight == 0.0 {
         lower

@@ -1,13 +1,13 @@
-//! What can be wrong with the places of the nodes.
+//! Errors in the coordinates of the nodes.
 
 use std::fmt;
 
-/// The axis whose coordinates were at fault.
+/// Axis of the coordinates at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// Along x, one coordinate per row-wire.
+    /// The x axis, with one coordinate per row-wire.
     X,
-    /// Along y, one coordinate per node of a row.
+    /// The y axis, with one coordinate per node of a row.
     Y,
 }
 
@@ -20,36 +20,36 @@ impl fmt::Display for Axis {
     }
 }
 
-/// Why no surface can be laid through the nodes.
+/// Error in the coordinates of the nodes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
-    /// An axis without coordinates.
+    /// An axis has no coordinates.
     #[error("a surface needs at least one {axis} coordinate, and none was given")]
     NoNodes {
         /// The empty axis.
         axis: Axis,
     },
-    /// NaN or infinity.
+    /// A coordinate is NaN or infinite.
     #[error("{axis} coordinate {index} is {value_mm} mm; every node needs a finite place")]
     NotFinite {
-        /// The axis at fault.
+        /// Axis at fault.
         axis: Axis,
-        /// Position in the coordinates given.
+        /// Index in the coordinates given.
         index: usize,
-        /// The value found, in millimetres.
+        /// Value found, in millimetres.
         value_mm: f64,
     },
-    /// Two nodes in one place: the surface would have two heights there.
+    /// Two coordinates coincide, where the surface would have two heights.
     #[error("{axis} coordinates {first} and {second} coincide at {value_mm} mm; nodes need places of their own")]
     Duplicate {
-        /// The axis at fault.
+        /// Axis at fault.
         axis: Axis,
-        /// Position of one of the two in the coordinates given.
+        /// Index of the first in the coordinates given.
         first: usize,
-        /// Position of the other.
+        /// Index of the second.
         second: usize,
-        /// The place they share, in millimetres.
+        /// Coordinate that they share, in millimetres.
         value_mm: f64,
     },
 }

@@ -1,10 +1,10 @@
-//! The points at which a surface is evaluated.
+//! The grid on which a surface is evaluated.
 
 use std::ops::RangeInclusive;
 
 use super::error::{Axis, SurfaceError};
 
-/// A rectangular grid that passes through the nodes and reaches half a pitch beyond them.
+/// A rectangular grid that passes through the nodes and extends half a pitch beyond them.
 ///
 /// Values on it are `x points × y points`, x-major: point `(ix, iy)` has the index `ix · y_mm().len() + iy`.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,33 +28,33 @@ impl Grid {
         &self.y.points_mm
     }
 
-    /// How many points there are in all.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.x.points_mm.len() * self.y.points_mm.len()
     }
 
-    /// Never true: a grid has at least three points a side.
+    /// Always returns `false`: a grid has at least three points per side.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Position of point `(ix, iy)` in an array of values on the grid.
+    /// Returns the index of point `(ix, iy)` in an array of values on the grid.
     pub fn index(&self, ix: usize, iy: usize) -> usize {
         ix * self.y.points_mm.len() + iy
     }
 
-    /// Indices along x which lie within the nodes' bounding rectangle.
+    /// Indices along x within the bounding rectangle of the nodes.
     pub fn inside_x(&self) -> RangeInclusive<usize> {
         self.x.first_inside..=self.x.last_inside
     }
 
-    /// Indices along y which lie within the nodes' bounding rectangle.
+    /// Indices along y within the bounding rectangle of the nodes.
     pub fn inside_y(&self) -> RangeInclusive<usize> {
         self.y.first_inside..=self.y.last_inside
     }
 
-    /// Whether a point lies within the nodes' bounding rectangle. Outside, the surface is extrapolated. A single row
-    /// or column has no extent; the strip that stands for it counts as inside.
+    /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. A
+    /// single row or column has no extent; the strip that stands for it counts as inside.
     pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
         self.inside_x().contains(&ix) && self.inside_y().contains(&iy)
     }
@@ -69,11 +69,11 @@ pub(super) struct GridAxis {
 }
 
 impl GridAxis {
-    /// Divides every interval of the ascending `nodes_mm` into about as many steps as make `target` points in all.
+    /// Divides every interval of the ascending `nodes_mm` into equal steps, for about `target` points in all.
     ///
-    /// `lone_margin_mm` is how far the grid reaches around a single coordinate, which has no pitch of its own.
+    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch of its own.
     pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
-        // Very long axes are thinned: more lines than pixels show nothing.
+        // Very long axes are thinned: more lines than pixels would not be visible.
         let stride = nodes_mm.len().div_ceil(target.max(2));
         let last = nodes_mm.len() - 1;
         let mut kept_mm: Vec<f64> = nodes_mm.iter().copied().step_by(stride).collect();
@@ -118,7 +118,7 @@ impl GridAxis {
     }
 }
 
-/// Coordinates in ascending order, and the place each had in the order given.
+/// Coordinates in ascending order, with the index of each in the order given.
 #[derive(Clone, Debug)]
 pub(super) struct SortedAxis {
     pub(super) nodes_mm: Vec<f64>,
@@ -140,7 +140,7 @@ impl SortedAxis {
         let mut order: Vec<usize> = (0..given_mm.len()).collect();
         order.sort_by(|&a, &b| given_mm[a].total_cmp(&given_mm[b]));
         let nodes_mm: Vec<f64> = order.iter().map(|&index| given_mm[index]).collect();
-        // Closer than this, the two heights could not be told apart in double precision.
+        // Nodes closer than this could not be told apart in double precision.
         let closest_mm = 1e-9 * nodes_mm.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         if let Some(at) = nodes_mm.windows(2).position(|pair| pair[1] - pair[0] <= closest_mm) {
             return Err(SurfaceError::Duplicate {
@@ -153,7 +153,7 @@ impl SortedAxis {
         Ok(Self { nodes_mm, order })
     }
 
-    /// The smallest distance between neighbours, if there are two.
+    /// Smallest distance between neighbours; `None` for a single coordinate.
     pub(super) fn pitch_mm(&self) -> Option<f64> {
         self.nodes_mm.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)
     }

@@ -1,4 +1,4 @@
-//! From the values at the nodes to a surface.
+//! Interpolation from the values at the nodes to a surface.
 
 use ndarray::Array2;
 
@@ -7,26 +7,27 @@ use super::bilinear::Bilinear;
 use super::error::{Axis, SurfaceError};
 use super::grid::{Grid, GridAxis, SortedAxis};
 
-/// Beyond this many nodes the spline's factorisation and its matrix cost more than they show.
+/// Largest number of nodes for the spline; beyond it, factorisation and matrix cost more than they show.
 const MOST_SPLINE_NODES: usize = 1000;
 
-/// Grid points × nodes which a frame may cost: about a millisecond, bound by memory.
+/// Largest number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
 const MOST_WEIGHTS: usize = 1_100_000;
 
-/// Grid points a side, as far as [`MOST_WEIGHTS`] allows.
+/// Number of grid points per side, as far as [`MOST_WEIGHTS`] allows.
 const GRID_POINTS: usize = 110;
 
-/// How the surface runs between the nodes.
+/// Interpolation between the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// Sandwell's biharmonic spline, `griddata(…, 'v4')`.
     BiharmonicSpline,
-    /// Bilinear between neighbours, level beyond the outermost nodes. For a single row or column of nodes, for more
-    /// than a thousand nodes, and where the spline's equations are singular (say, two nodes e millimetres apart).
+    /// Bilinear between neighbours, constant beyond the outermost nodes. Used for a single row or column of nodes, for
+    /// more than a thousand nodes, and where the spline's equations are singular (for example, two nodes e millimetres
+    /// apart).
     Bilinear,
 }
 
-/// Interpolation through a lattice of nodes, factored once; a frame is one matrix-vector product.
+/// Interpolation through a lattice of nodes, factored once, so that each frame is one matrix-vector product.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
     grid: Grid,
@@ -36,11 +37,11 @@ pub struct SurfaceMap {
 }
 
 impl SurfaceMap {
-    /// Prepares the surface of the lattice `x_mm × y_mm`: one x per row-wire, one y per node on a row, millimetres,
-    /// in any order.
+    /// Prepares the surface of the lattice `x_mm × y_mm`: one x per row-wire and one y per node of a row, in
+    /// millimetres, in any order.
     ///
     /// # Errors
-    /// [`SurfaceError`] for an empty axis, a coordinate that is not finite, or two that coincide.
+    /// [`SurfaceError`] if an axis is empty, a coordinate is not finite, or two coordinates coincide.
     pub fn new(x_mm: &[f64], y_mm: &[f64]) -> Result<Self, SurfaceError> {
         let x = SortedAxis::new(Axis::X, x_mm)?;
         let y = SortedAxis::new(Axis::Y, y_mm)?;
@@ -69,17 +70,17 @@ impl SurfaceMap {
         })
     }
 
-    /// Where the surface is evaluated.
+    /// Grid on which the surface is evaluated.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// How many nodes the surface goes through: rows × nodes per row.
+    /// Number of nodes: rows × nodes per row.
     pub fn node_count(&self) -> usize {
         self.nodes
     }
 
-    /// How the surface runs between the nodes.
+    /// Returns the interpolation used between the nodes.
     pub fn interpolation(&self) -> Interpolation {
         match self.spline_weights {
             Some(_) => Interpolation::BiharmonicSpline,
@@ -87,12 +88,13 @@ impl SurfaceMap {
         }
     }
 
-    /// The surface through `node_values` (`rows × nodes_per_row`, row after row, any unit), written to `out`
-    /// (`x points × y points`, see [`Grid`]). A missing value (NaN) leaves a gap
-    /// around its node, and the rest of that frame is bilinear.
+    /// Writes the surface through `node_values` (`rows × nodes_per_row`, row by row, in any unit) to `out`
+    /// (`x points × y points`, see [`Grid`]).
+    ///
+    /// A missing value (NaN) leaves a gap around its node, and the rest of that frame is bilinear.
     ///
     /// # Panics
-    /// If `node_values` is not [`Self::node_count`] or `out` not [`Grid::len`] long.
+    /// If `node_values` does not have [`Self::node_count`] entries, or `out` not [`Grid::len`].
     pub fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
         assert_eq!(node_values.len(), self.nodes, "one value per node");
         assert_eq!(out.len(), self.grid.len(), "one value per grid point");
@@ -105,10 +107,10 @@ impl SurfaceMap {
         }
     }
 
-    /// As [`Self::evaluate_into`], into a vector of its own.
+    /// Returns the surface through `node_values`; see [`Self::evaluate_into`].
     ///
     /// # Panics
-    /// If `node_values` is not [`Self::node_count`] long.
+    /// If `node_values` does not have [`Self::node_count`] entries.
     pub fn evaluate(&self, node_values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.grid.len()];
         self.evaluate_into(node_values, &mut out);
@@ -117,7 +119,7 @@ impl SurfaceMap {
 }
 
 fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
-    // A lone coordinate gets the pitch of the other axis; a lone node a millimetre.
+    // A single coordinate gets the pitch of the other axis; a single node gets a millimetre.
     let lone_margin_mm = 0.5 * x.pitch_mm().or(y.pitch_mm()).unwrap_or(1.0);
     Grid::new(
         GridAxis::through(&x.nodes_mm, target, lone_margin_mm),

@@ -1,7 +1,8 @@
-//! Smooth surfaces through the nodes: what is drawn between the electrodes.
+//! Smooth surfaces through the nodes of an array.
 //!
-//! The nodes of a sensor never leave their place in (x, y), so the interpolation is factored once per array and a
-//! frame is one matrix-vector product, whatever the heights.
+//! The positions of the nodes in (x, y) are fixed, so the interpolation is factored once per array and each frame is
+//! one matrix-vector product. A [`SurfaceMap`] evaluates it on a [`Grid`]: as a biharmonic spline where that exists,
+//! bilinearly elsewhere.
 
 mod biharmonic;
 mod bilinear;

@@ -239,7 +239,7 @@ mod tests {
         assert!(error(with_noises("NaN")).contains("give from 0 to 1"));
         assert!(error(with_noises(" , ")).contains("there are no values"));
         let none = TradeForm {
-            decoders: [false; 6],
+            decoders: [false; DecoderKind::ALL.len()],
             ..TradeForm::default()
         };
         assert!(error(none).contains("choose at least one"));

@@ -4,26 +4,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::{dataset::Seed, evaluation::SimulatedSettings, sensor::ArrayScale, training::Method};
 
-/// What an experiment varies, and over which values.
+/// A setting that an experiment varies, with its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// Hidden nodes.
+    /// Numbers of hidden nodes.
     Hidden(Vec<usize>),
     /// Array scales.
     Array(Vec<ArrayScale>),
-    /// Training samples; in a cross-validation, all samples.
+    /// Numbers of training samples; in a cross-validation, of all samples.
     Samples(Vec<usize>),
-    /// Methods with their settings.
+    /// Training methods with their settings.
     Method(Vec<Method>),
-    /// Most epochs.
+    /// Largest numbers of epochs.
     Epochs(Vec<usize>),
-    /// Seeds.
+    /// Seeds of the run.
     Seed(Vec<Seed>),
 }
 
 impl Axis {
-    /// What is varied.
+    /// Returns the name of the setting.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Hidden(_) => "hidden nodes",
@@ -35,7 +35,7 @@ impl Axis {
         }
     }
 
-    /// How many values there are.
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) => values.len(),
@@ -45,20 +45,20 @@ impl Axis {
         }
     }
 
-    /// Whether there is no value.
+    /// Returns `true` if there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether both vary the same thing.
+    /// Returns `true` if both vary the same setting.
     pub fn is_same_kind(&self, other: &Self) -> bool {
         discriminant(self) == discriminant(other)
     }
 
-    /// Value `index` in words.
+    /// Returns value `index` as text.
     ///
     /// # Panics
-    /// If there are not so many values.
+    /// If `index` is out of range.
     pub fn label(&self, index: usize) -> String {
         match self {
             Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) => values[index].to_string(),
@@ -68,10 +68,10 @@ impl Axis {
         }
     }
 
-    /// Puts value `index` into `settings`.
+    /// Writes value `index` to `settings`.
     ///
     /// # Panics
-    /// If there are not so many values.
+    /// If `index` is out of range.
     pub fn apply(&self, index: usize, settings: &mut SimulatedSettings) {
         match self {
             Self::Hidden(values) => settings.hidden = values[index],

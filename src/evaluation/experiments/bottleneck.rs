@@ -3,12 +3,12 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 
 use crate::network::{MinMax, ScalingError};
 
-/// What a hidden layer of h nodes can carry at most, whatever its inputs, weights and training.
+/// Lower bound on the error of a network with h hidden nodes, for any inputs, weights and training.
 ///
 /// The output is an affine function of h hidden values, so its deviations from their mean span at most h directions.
-/// Among all such answers the projection of the true targets on their first h principal components has the least mean
-/// squared error (Eckart and Young, 1936). It holds for the scaled targets that it was fitted to, the training set's;
-/// other sets are projected on the same components.
+/// Among all such answers, the projection of the true targets on their first h principal components has the least mean
+/// squared error (Eckart and Young, 1936). The bound holds for the scaled targets of the training set to which it was
+/// fitted; other sets are projected on the same components.
 #[derive(Clone, Debug)]
 pub struct Bottleneck {
     outputs: MinMax,
@@ -19,10 +19,10 @@ pub struct Bottleneck {
 }
 
 impl Bottleneck {
-    /// Fits the components of `coordinates_mm` (samples × 3·M2) for `hidden` nodes.
+    /// Fits the principal components of `coordinates_mm` (samples × 3·M2) for `hidden` nodes.
     ///
     /// # Errors
-    /// Coordinates that cannot be scaled.
+    /// If the coordinates cannot be scaled.
     pub fn fit(coordinates_mm: ArrayView2<'_, f64>, hidden: usize) -> Result<Self, ScalingError> {
         let outputs = MinMax::fit(coordinates_mm)?;
         let targets = outputs.scale(coordinates_mm);
@@ -30,8 +30,7 @@ impl Bottleneck {
         let mean = targets.mean_axis(Axis(0)).ok_or(ScalingError::Empty)?;
         let deviations = Mat::from_fn(samples, channels, |s, t| targets[[s, t]] - mean[t]);
         let kept = hidden.min(samples).min(channels);
-        // Finite values always converge; no component, which bounds nothing from below, is the answer if they ever do
-        // not.
+        // Finite values always converge; if they ever do not, the identity gives a bound of 0.
         let (components, left_out) = match deviations.thin_svd() {
             Ok(svd) => {
                 let components = Array2::from_shape_fn((channels, kept), |(t, k)| svd.V()[(t, k)]);
@@ -48,13 +47,12 @@ impl Bottleneck {
         })
     }
 
-    /// The mean squared error, scaled, that no network with so few hidden nodes gets below on the set it was fitted
-    /// to.
+    /// Least mean squared error (scaled) of any network with so few hidden nodes, on the set to which this was fitted.
     pub fn least_mse(&self) -> f64 {
         self.least_mse
     }
 
-    /// The best that can be answered where `coordinates_mm` (samples × 3·M2) are true, in millimetres.
+    /// Returns the best possible answers, in millimetres, for the true `coordinates_mm` (samples × 3·M2).
     pub fn reconstruct(&self, coordinates_mm: ArrayView2<'_, f64>) -> Array2<f64> {
         let deviations = self.outputs.scale(coordinates_mm) - &self.mean;
         let projected = deviations.dot(&self.components).dot(&self.components.t()) + &self.mean;

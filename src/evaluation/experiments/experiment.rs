@@ -10,73 +10,73 @@ use crate::{
     training::{SettingError, StoppingRules},
 };
 
-/// A grid of cells over one or two axes, each cell tried with several seeds.
+/// A grid of cells over one or two axes, each cell run with several seeds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// What all cells share; its seed is the first of [`Self::seeds`].
+    /// Settings shared by all cells; their seed is the first of [`Self::seeds`].
     pub base: SimulatedSettings,
-    /// What is varied.
+    /// First varied setting.
     pub axis: Axis,
-    /// What else is varied.
+    /// Second varied setting, if there is one.
     pub second_axis: Option<Axis>,
-    /// How many seeds in succession each cell is tried with; 1 where the seed is an axis.
+    /// Number of consecutive seeds for each cell; 1 if the seed is an axis.
     pub seeds: usize,
-    /// Test by cross-validation, instead of on samples drawn for the test.
+    /// Cross-validation to test by, instead of a separate test set.
     pub cross_validation: Option<CrossValidation>,
 }
 
-/// A place in the grid.
+/// A cell of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Index of its value on the first axis.
     pub column: usize,
     /// Index of its value on the second axis; 0 if there is none.
     pub row: usize,
-    /// What is run there, with the first seed.
+    /// Settings of the cell, with the first seed.
     pub settings: SimulatedSettings,
-    /// What the paper reports for it, if it does.
+    /// Errors that the paper reports for the cell, if there are any.
     pub published: Option<PublishedErrors>,
 }
 
-/// Why an experiment cannot be run.
+/// Error in setting up an experiment.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ExperimentError {
     /// An axis has no values.
     #[error("there are no values for {0}: give at least one")]
     Empty(&'static str),
-    /// Both axes vary the same.
+    /// Both axes vary the same setting.
     #[error("both axes vary {0}: choose two different ones")]
     SameAxes(&'static str),
-    /// A number out of range.
+    /// A number is out of range.
     #[error(transparent)]
     Count(#[from] CountError),
-    /// A setting of the method out of range.
+    /// A setting of the method is out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// The array has no such row-wire.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Folds that cannot be filled.
+    /// The folds cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
-    /// More trainings than anybody waits for.
+    /// There are too many trainings.
     #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MOST_TRAININGS}")]
     TooMany(usize),
-    /// The system gives no threads.
+    /// The operating system provides no threads.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
 }
 
-/// The most trainings of one experiment.
+/// Largest number of trainings in one experiment.
 const MOST_TRAININGS: usize = 1_000_000;
 
-/// The most seeds, starts or repeats.
+/// Largest number of seeds or repeats.
 const MOST_TRIALS: usize = 1000;
 
 impl Experiment {
-    /// Its cells, row by row; at least one if [`Self::check`] finds nothing wrong.
+    /// Returns the cells, row by row; at least one if [`Self::check`] succeeds.
     pub fn cells(&self) -> Vec<Cell> {
         let rows = self.second_axis.as_ref().map_or(1, Axis::len);
         let places = (0..rows).flat_map(|row| (0..self.axis.len()).map(move |column| (row, column)));
@@ -103,12 +103,12 @@ impl Experiment {
         }
     }
 
-    /// The axes: one or two.
+    /// Returns the axes, one or two.
     pub fn axes(&self) -> impl Iterator<Item = &Axis> {
         std::iter::once(&self.axis).chain(&self.second_axis)
     }
 
-    /// The seeds that the cell with these settings is tried with.
+    /// Returns the seeds of the cell with these settings.
     pub(super) fn seeds_of(&self, settings: &SimulatedSettings) -> impl Iterator<Item = Seed> + use<> {
         let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
             1
@@ -119,22 +119,22 @@ impl Experiment {
         (0..seeds as u64).map(move |offset| Seed(first.wrapping_add(offset)))
     }
 
-    /// How often each seed is tried.
+    /// Number of trials per seed.
     pub(super) fn repeats(&self) -> usize {
         self.cross_validation
             .map_or(1, |cross_validation| cross_validation.repeats)
     }
 
-    /// Networks that each trial trains, each from as many starts as the settings say.
+    /// Number of networks trained per trial, each with as many restarts as the settings say.
     pub(super) fn folds(&self) -> usize {
         self.cross_validation
             .map_or(1, |cross_validation| cross_validation.folds)
     }
 
-    /// Checks everything that can be known before a sample is drawn.
+    /// Checks everything that can be known before samples are drawn.
     ///
     /// # Errors
-    /// What is wrong.
+    /// The first problem found.
     pub fn check(&self) -> Result<(), ExperimentError> {
         if let Some(empty) = self.axes().find(|axis| axis.is_empty()) {
             return Err(ExperimentError::Empty(empty.name()));
@@ -186,7 +186,7 @@ impl Experiment {
     }
 }
 
-/// The tables of the paper.
+/// A table of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PaperTable {
@@ -199,10 +199,10 @@ pub enum PaperTable {
 }
 
 impl PaperTable {
-    /// All of them, in the paper's order.
+    /// All tables, in the paper's order.
     pub const ALL: [Self; 3] = [Self::HiddenNodes, Self::CrossValidation, Self::ArrayScales];
 
-    /// Its number in the paper.
+    /// Number of the table in the paper.
     pub fn number(self) -> u8 {
         match self {
             Self::HiddenNodes => 1,
@@ -211,7 +211,7 @@ impl PaperTable {
         }
     }
 
-    /// What it shows.
+    /// Returns the title of the table.
     pub fn title(self) -> &'static str {
         match self {
             Self::HiddenNodes => "Errors with different numbers of hidden nodes",
@@ -220,13 +220,14 @@ impl PaperTable {
         }
     }
 
-    /// Number and title.
+    /// Returns the number and title of the table.
     pub fn heading(self) -> String {
         format!("Table {}: {}", self.number(), self.title())
     }
 
-    /// The experiment that redoes it. The paper does not say how long it trained: epochs and starts are those that
-    /// redo all tables in about a minute on two cores. All epochs are run; the validation set only chooses the weights.
+    /// Returns the experiment that reproduces the table. The paper does not say how long it trained: epochs and
+    /// restarts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation
+    /// set only selects the weights.
     pub fn experiment(self) -> Experiment {
         let with = |axis, epochs, starts, cross_validation| {
             let mut base = SimulatedSettings::default();

@@ -1,13 +1,13 @@
-/// How a positive quantity t grows with a size x: how closely a polynomial law and an exponential one describe it.
+/// Growth of a positive quantity t with a size x, fitted by a polynomial and an exponential law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// d in t = a + b·x^d: the one of 1, 2 and 3 that fits best, with a and b not negative.
+    /// Degree d of t = a + b·x^d: the best fit of 1, 2 and 3, with a and b not negative.
     pub degree: i32,
-    /// How far that law is off: root mean square of the residuals of ln t, so 0.01 is about one percent.
+    /// Root mean square residual of ln t for the polynomial law; 0.01 is about one percent.
     pub polynomial_residual: f64,
-    /// By which factor t grows with each unit of x in t = a·c^x.
+    /// Factor c by which t grows with each unit of x in t = a·c^x.
     pub factor_per_unit: f64,
-    /// How far that law is off.
+    /// Root mean square residual of ln t for the exponential law.
     pub exponential_residual: f64,
 }
 
@@ -21,7 +21,7 @@ pub enum GrowthLaw {
 }
 
 impl Growth {
-    /// Fits points (x, t); `None` without three different x, or if a number is not positive and finite.
+    /// Fits points (x, t); returns `None` without three different x, or if a number is not positive and finite.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let is_sound = |&(x, t): &(f64, f64)| x > 0.0 && t > 0.0 && x.is_finite() && t.is_finite();
         let mut sizes: Vec<f64> = points.iter().map(|point| point.0).collect();
@@ -43,9 +43,9 @@ impl Growth {
         })
     }
 
-    /// The law that lies clearly closer to the points; `None` if both are about equally close.
+    /// Returns the law that is clearly closer to the points; `None` if both are about equally close.
     pub fn law(&self) -> Option<GrowthLaw> {
-        /// Residuals nearer to each other than this ratio decide nothing.
+        /// Ratio of the residuals up to which neither law is clearly closer.
         const CLEARLY: f64 = 1.25;
         let (polynomial, exponential) = (self.polynomial_residual, self.exponential_residual);
         if polynomial * CLEARLY < exponential {
@@ -64,7 +64,7 @@ fn residual(points: &[(f64, f64)], model: impl Fn(f64) -> f64) -> f64 {
     (squares.sum::<f64>() / points.len() as f64).sqrt()
 }
 
-/// What a + b·x^d leaves, with the a and b of the least relative errors in the least-squares sense.
+/// Residual of a + b·x^d, with a and b from least squares on the relative errors.
 fn polynomial_residual(points: &[(f64, f64)], degree: i32) -> f64 {
     let sum =
         |term: fn(f64, f64) -> f64| -> f64 { points.iter().map(|(x, t)| term(1.0 / t, x.powi(degree) / t)).sum() };
@@ -81,7 +81,7 @@ fn polynomial_residual(points: &[(f64, f64)], degree: i32) -> f64 {
     }
 }
 
-/// c of the line of least squares through ln t, and what it leaves.
+/// Returns c of the least-squares line through ln t, and its residual.
 fn exponential(points: &[(f64, f64)]) -> (f64, f64) {
     let count = points.len() as f64;
     let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / count;

@@ -10,12 +10,12 @@ pub(super) struct Measured {
     pub(super) published: Option<f64>,
     pub(super) linear: Option<f64>,
     pub(super) bound: Option<f64>,
-    /// Z errors by seed and repeat.
+    /// Z error of each trial, by seed and repeat.
     pub(super) trials: Vec<((u64, usize), f64)>,
 }
 
 impl Measured {
-    /// The cells that have results.
+    /// Returns the cells that have results.
     pub(super) fn all(results: &ExperimentResults) -> Vec<Self> {
         let z_of = |trial: &Trial| Some(((trial.seed.0, trial.repeat), trial.errors.z_percent?));
         let measure = |cell: &CellResults| {
@@ -34,7 +34,7 @@ impl Measured {
         results.cells.iter().filter_map(measure).collect()
     }
 
-    /// The Z errors of trials that both cells have.
+    /// Returns the Z errors of trials with the same seed and repeat in both cells.
     pub(super) fn beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (f64, f64)> + 'a {
         let partner = |key| other.trials.iter().find(move |trial| trial.0 == key);
         self.trials
@@ -42,19 +42,19 @@ impl Measured {
             .filter_map(move |(key, z)| Some((*z, partner(*key)?.1)))
     }
 
-    /// Label and Z errors.
+    /// Returns the label and Z errors as text.
     pub(super) fn figures(&self) -> String {
         format!("{}: {}", self.label, spread(&self.z))
     }
 }
 
-/// In ascending order of a key.
+/// Sorts cells by a key, ascending.
 pub(super) fn sorted_by<K: Ord>(mut measured: Vec<Measured>, key: impl FnMut(&Measured) -> K) -> Vec<Measured> {
     measured.sort_by_key(key);
     measured
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 pub(super) fn number(value: f64) -> String {
     match value.abs() {
         1e2.. => format!("{value:.0}"),
@@ -66,7 +66,7 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// Median, and smallest to largest where they differ.
+/// Formats the median, and the smallest to largest value where they differ.
 fn spread(spread: &Spread) -> String {
     if spread.smallest == spread.largest {
         return format!("{} %", number(spread.median));

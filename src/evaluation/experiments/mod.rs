@@ -1,7 +1,9 @@
-//! The paper's experiments and sweeps of one's own. An [`Experiment`] is a grid of cells; each cell is tried several
-//! times (seeds, repeats of a cross-validation) by jobs that do not depend on each other. [`run_experiments`] works
-//! them off on all cores and hands over each [`Trial`] as it is finished; [`ExperimentResults`] collects them, at any
-//! time complete for what is finished, and [`verdicts`] says which of the paper's claims they bear out.
+//! The paper's experiments, and experiments over any other settings.
+//!
+//! An [`Experiment`] is a grid of cells; each cell is run several times (seeds, repeats of a cross-validation) by
+//! independent jobs. [`run_experiments`] runs them on all cores and passes on each [`Trial`] as it finishes;
+//! [`ExperimentResults`] collects them and is complete at any time for what is finished; [`verdicts`] judges which of
+//! the paper's claims they support.
 
 mod axis;
 mod bottleneck;

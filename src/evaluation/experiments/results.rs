@@ -1,30 +1,30 @@
 use super::{Cell, Experiment, Trial, TrialFailure};
 use crate::evaluation::Spread;
 
-/// What is known of an experiment so far.
+/// Results of an experiment so far.
 #[derive(Clone, Debug)]
 pub struct ExperimentResults {
-    /// The experiment.
+    /// Experiment to which the results belong.
     pub experiment: Experiment,
-    /// Its cells, row by row as [`Experiment::cells`] gives them.
+    /// Results of the cells, row by row in the order of [`Experiment::cells`].
     pub cells: Vec<CellResults>,
 }
 
-/// What is known of a cell so far.
+/// Results of a cell so far.
 #[derive(Clone, Debug)]
 pub struct CellResults {
-    /// The cell.
+    /// Cell to which the results belong.
     pub cell: Cell,
-    /// How many trials there will be.
+    /// Number of trials planned.
     pub expected: usize,
-    /// The finished ones by seed and repeat, in whichever order they were finished.
+    /// Finished trials, sorted by seed and repeat, in whichever order they finished.
     pub trials: Vec<Trial>,
-    /// Those that could not be carried out.
+    /// Failed trials, sorted likewise.
     pub failures: Vec<TrialFailure>,
 }
 
 impl ExperimentResults {
-    /// Nothing known yet.
+    /// Creates empty results.
     pub fn new(experiment: Experiment) -> Self {
         let cells = experiment.cells().into_iter().map(|cell| CellResults {
             cell,
@@ -38,7 +38,7 @@ impl ExperimentResults {
         }
     }
 
-    /// Adds what a trial of cell `cell` came to.
+    /// Adds the outcome of a trial of cell `cell`.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -58,7 +58,7 @@ impl ExperimentResults {
         }
     }
 
-    /// The values of a cell on each axis, in words.
+    /// Returns the value of a cell on each axis, as text.
     pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
         let places = [cell.cell.column, cell.cell.row].into_iter();
         places
@@ -67,35 +67,35 @@ impl ExperimentResults {
             .collect()
     }
 
-    /// Whether every trial has come to something.
+    /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
         self.cells.iter().all(CellResults::is_complete)
     }
 }
 
 impl CellResults {
-    /// Whether every trial has come to something.
+    /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
         self.trials.len() + self.failures.len() == self.expected
     }
 
-    /// The spread of a figure over the trials that have it.
+    /// Summarises a figure over the trials that have it.
     pub fn spread(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<Spread> {
         Spread::of(self.trials.iter().filter_map(figure))
     }
 
-    /// AveZerr.
+    /// Summarises AveZerr over the trials, in percent.
     pub fn z_percent(&self) -> Option<Spread> {
         self.spread(|trial| trial.errors.z_percent)
     }
 
-    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub fn least_epoch_seconds(&self) -> Option<f64> {
         self.spread(|trial| Some(trial.least_epoch_seconds))
             .map(|spread| spread.smallest)
     }
 
-    /// The trial of median AveZerr (the lower one of two), which may stand for the cell.
+    /// Returns the trial with the median AveZerr (the lower of two), as representative of the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let with_errors = self
             .trials
@@ -128,7 +128,7 @@ pub(super) mod tests {
         }
     }
 
-    /// A trial of these errors; the linear map has 1.6 %, an epoch takes a second.
+    /// A trial with these errors; the linear map has 1.6 %, an epoch takes a second.
     pub(in crate::evaluation::experiments) fn trial(seed: u64, z_percent: f64) -> Trial {
         Trial {
             seed: Seed(seed),

@@ -16,39 +16,41 @@ use super::{
 };
 use crate::evaluation::{CrossValidation, SimulatedSettings};
 
-/// A trial that has come to something.
+/// A finished trial.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// Which of the experiments, from 0.
+    /// Index of the experiment, from 0.
     pub experiment: usize,
-    /// Which of its cells, from 0: to be handed to [`ExperimentResults::record`](super::ExperimentResults::record).
+    /// Index of the cell, from 0, for [`ExperimentResults::record`](super::ExperimentResults::record).
     pub cell: usize,
-    /// What it came to.
+    /// Result of the trial, or the reason for its failure.
     pub outcome: Result<Trial, TrialFailure>,
-    /// How many trials of all experiments have come to something.
+    /// Number of trials finished so far, over all experiments.
     pub done: usize,
-    /// How many there are.
+    /// Number of trials in all.
     pub trials: usize,
-    /// How long the others take, from what the finished ones took.
+    /// Estimated time for the remaining trials, from the time of the finished ones.
     pub time_left: Option<Duration>,
 }
 
-/// As many threads as there are cores, or one fewer, which leaves a core to the window.
+/// Number of worker threads: one per core, or one fewer to leave a core to the window.
 pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
     let cores = thread::available_parallelism().map_or(1, NonZero::get);
     let threads = cores.saturating_sub(usize::from(leave_one_core));
     NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN)
 }
 
-/// Runs all trials of `experiments` on `threads` threads, one trial on a thread, and hands over each as it is
-/// finished, on the calling thread. Returns when all are done or, once `is_cancelled`, when the epochs in progress
-/// are: it is asked before every epoch, from every thread.
+/// Runs all trials of `experiments` on `threads` threads, one trial per thread, and passes each to `on_finished` on the
+/// calling thread as soon as it finishes.
 ///
-/// What a trial comes to depends on its settings alone, not on the number of threads or on other trials; only its
-/// times do.
+/// Returns when all are done or, once `is_cancelled`, when the epochs in progress are; `is_cancelled` is called before
+/// every epoch, from every thread.
+///
+/// The result of a trial depends on its settings alone, not on the number of threads or on other trials; only its times
+/// do.
 ///
 /// # Errors
-/// An experiment that cannot be run; then none is.
+/// If any experiment cannot be run; then none is.
 pub fn run_experiments(
     experiments: &[Experiment],
     threads: NonZero<usize>,
@@ -58,8 +60,8 @@ pub fn run_experiments(
     experiments.iter().try_for_each(Experiment::check)?;
     let Queue { jobs, mut time_left } = Queue::new(experiments, threads);
     let threads = threads.get().min(jobs.len());
-    // A pool of one thread for each worker: what a training divides among threads stays on its own, so that its time
-    // is its own, too.
+    // One pool of a single thread per worker: parallel code within a training stays on its thread, so that other
+    // trainings do not affect its times.
     let pool = |_| {
         ThreadPoolBuilder::new()
             .num_threads(1)
@@ -101,30 +103,30 @@ pub fn run_experiments(
     Ok(())
 }
 
-/// What is to be done, in the order of doing.
+/// Jobs in the order in which they are run.
 struct Queue {
     jobs: Vec<Job>,
     time_left: TimeLeft,
 }
 
-/// One trial.
+/// A single trial.
 struct Job {
     experiment: usize,
     cell: usize,
-    /// The cell among the cells of all experiments.
+    /// Index of the cell among the cells of all experiments.
     time_cell: usize,
-    /// With the seed of the trial.
+    /// Settings of the cell, with the seed of the trial.
     settings: SimulatedSettings,
     cross_validation: Option<CrossValidation>,
     repeat: usize,
     work: f64,
-    /// How many trials of its cell come before it.
+    /// Number of earlier trials of the same cell.
     round: usize,
 }
 
 impl Queue {
-    /// First one trial of every cell, so that the outline of each table shows soon, then the second, and so on; in
-    /// each round the longest first, so that no core is idle at the end for long.
+    /// Orders the jobs: first one trial of every cell, so that the outline of each table appears early, then the
+    /// second, and so on; in each round the longest first, so that no core is idle for long at the end.
     fn new(experiments: &[Experiment], threads: NonZero<usize>) -> Self {
         let mut jobs: Vec<Job> = Vec::new();
         let mut cells = Vec::new();
@@ -154,7 +156,7 @@ impl Queue {
 }
 
 impl Job {
-    /// `None` if cancelled.
+    /// Runs the trial; returns `None` if cancelled.
     fn run(&self, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
         if is_cancelled() {
             return None;

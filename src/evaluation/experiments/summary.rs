@@ -7,74 +7,73 @@ use crate::{
     sensor::ArrayScale,
 };
 
-/// The figures of a cell as tables and files show them; medians where nothing else is said, `None` where there is no
-/// such figure (yet).
+/// Figures of a cell for tables and files: medians unless stated otherwise, `None` where there is no such figure (yet).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSummary {
     /// Array scale.
     pub array: ArrayScale,
-    /// Hidden nodes.
+    /// Number of hidden nodes.
     pub hidden: usize,
-    /// Training samples; in a cross-validation, all samples.
+    /// Number of training samples; in a cross-validation, of all samples.
     pub samples: usize,
-    /// Method.
+    /// Short name of the training method.
     pub method: &'static str,
-    /// Most epochs.
+    /// Largest number of epochs.
     pub epochs: usize,
-    /// Starts of each network.
+    /// Number of restarts per network.
     pub starts: usize,
-    /// First seed.
+    /// First seed of the cell.
     pub seed: Seed,
-    /// Trials finished.
+    /// Number of trials finished.
     pub trials: usize,
-    /// Trials asked for.
+    /// Number of trials planned.
     pub expected_trials: usize,
-    /// AveZerr.
+    /// AveZerr, in percent.
     pub z_percent: Figure,
-    /// AveXerr.
+    /// AveXerr, in percent.
     pub x_percent: Figure,
-    /// AveYerr.
+    /// AveYerr, in percent.
     pub y_percent: Figure,
-    /// Mean |decoupled z − z|.
+    /// Mean |decoupled z − z|, in millimetres.
     pub z_mm: Figure,
     /// AveZerr of always answering the mean of the training set.
     pub mean_z_percent: Option<f64>,
     /// AveZerr of the best affine map on resistance.
     pub linear_z_percent: Option<f64>,
-    /// AveZerr of the best answer that so few hidden nodes can give.
+    /// AveZerr of the best answer possible with so few hidden nodes.
     pub bound_z_percent: Option<f64>,
-    /// Mean number of epochs of a start.
+    /// Mean number of epochs per restart.
     pub epochs_run: Option<f64>,
-    /// Training time of a network, all its starts together.
+    /// Training time of a network, over all its restarts.
     pub training_seconds: Option<f64>,
-    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub epoch_ms: Option<f64>,
 }
 
-/// A figure beside the published one.
+/// A measured figure beside the published one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
-    /// What the paper reports.
+    /// Value that the paper reports.
     pub published: Option<f64>,
-    /// Half of the trials are below.
+    /// Median of the trials.
     pub median: Option<f64>,
-    /// The smallest.
+    /// Smallest value of the trials.
     pub min: Option<f64>,
-    /// The largest.
+    /// Largest value of the trials.
     pub max: Option<f64>,
-    /// Of each trial, by seed and repeat.
+    /// Value of each trial, by seed and repeat.
     pub values: Vec<Option<f64>>,
 }
 
 impl ExperimentResults {
-    /// The figures of every cell, row by row.
+    /// Returns the figures of every cell, row by row.
     pub fn summaries(&self) -> Vec<CellSummary> {
         self.cells.iter().map(CellResults::summary).collect()
     }
 }
 
 impl CellResults {
-    /// The figures of this cell.
+    /// Returns the figures of this cell.
     pub fn summary(&self) -> CellSummary {
         let settings = &self.cell.settings;
         let median = |figure: fn(&super::Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
@@ -118,7 +117,7 @@ impl CellResults {
     }
 }
 
-/// Zero for what only rounding has left.
+/// Replaces rounding errors by zero.
 fn without_rounding(percent: f64) -> f64 {
     if percent < 1e-9 { 0.0 } else { percent }
 }

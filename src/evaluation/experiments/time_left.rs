@@ -3,15 +3,15 @@ use std::time::Duration;
 use super::{Cell, Experiment};
 use crate::training::Method;
 
-/// How long the rest takes, from what the finished jobs took. Jobs of a cell that has finished ones count as their
-/// mean; other jobs by the arithmetic of their training, at the speed of all that is finished.
+/// Estimates the remaining time from the finished jobs. Jobs of a cell with finished jobs count as their mean; other
+/// jobs by the number of operations of their training, at the speed of all finished jobs.
 pub(super) struct TimeLeft {
     threads: usize,
     cells: Vec<CellTime>,
 }
 
 struct CellTime {
-    /// Multiplications of one job, about.
+    /// Approximate number of multiplications in one job.
     work: f64,
     jobs: usize,
     finished: usize,
@@ -19,7 +19,7 @@ struct CellTime {
 }
 
 impl TimeLeft {
-    /// For cells whose jobs take about `work` multiplications each, of which there are so many: `(work, jobs)`.
+    /// Creates an estimate from `(work, jobs)` of each cell: multiplications per job, roughly, and number of jobs.
     pub(super) fn new(cells: impl IntoIterator<Item = (f64, usize)>, threads: usize) -> Self {
         let cells = cells.into_iter().map(|(work, jobs)| CellTime {
             work,
@@ -33,14 +33,14 @@ impl TimeLeft {
         }
     }
 
-    /// A job of cell `cell` took so long.
+    /// Records the time of a finished job of cell `cell`.
     pub(super) fn finished(&mut self, cell: usize, took: Duration) {
         let cell = &mut self.cells[cell];
         cell.finished += 1;
         cell.seconds += took.as_secs_f64();
     }
 
-    /// The time until all are finished; `None` before the first is.
+    /// Returns the time until all jobs are finished; `None` before the first is.
     pub(super) fn estimate(&self) -> Option<Duration> {
         let (seconds, work) = self.cells.iter().fold((0.0, 0.0), |(seconds, work), cell| {
             (seconds + cell.seconds, work + cell.work * cell.finished as f64)
@@ -59,14 +59,14 @@ impl TimeLeft {
     }
 }
 
-/// Multiplications of one job of `cell`, about, if it runs all of its epochs.
+/// Approximate number of multiplications in one job of `cell`, if it runs all of its epochs.
 pub(super) fn work(experiment: &Experiment, cell: &Cell) -> f64 {
     let settings = &cell.settings;
     let scale = settings.source.sensor.scale;
     let (n1, h) = ((scale.columns() + 1) as f64, settings.hidden as f64);
     let outputs = scale.coordinates_per_row() as f64;
     let samples = settings.source.samples as f64;
-    // Forwards and back, and the test and validation sets.
+    // Forward and backward passes, and the test and validation sets.
     let passes = 4.0 * samples * h * (n1 + outputs);
     let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);
     let epoch = match settings.training.method {

@@ -9,52 +9,53 @@ use crate::{
     training::TrainerState,
 };
 
-/// What one trial of a cell came to.
+/// Result of one trial of a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
-    /// Its seed.
+    /// Seed of the trial.
     pub seed: Seed,
-    /// Which repeat of a cross-validation, from 0.
+    /// Index of the repeat of a cross-validation, from 0.
     pub repeat: usize,
-    /// On the test set; in a cross-validation, on all samples, each decoupled by the network that had not seen it.
+    /// Errors on the test set; in a cross-validation, on all samples, each decoupled by the network that had not seen
+    /// it.
     pub errors: Errors,
-    /// On the same samples.
+    /// Errors of the baselines on the same samples.
     pub baselines: Baselines,
-    /// The errors, on the same samples, of the best answer that so few hidden nodes can give: see [`Bottleneck`].
+    /// Errors, on the same samples, of the best answer possible with so few hidden nodes: see [`Bottleneck`].
     pub bottleneck: Errors,
-    /// Networks trained: 1, or one for each fold.
+    /// Number of networks trained: 1, or one per fold.
     pub networks: usize,
-    /// Epochs run, of all starts and folds together.
+    /// Number of epochs, over all restarts and folds.
     pub epochs: usize,
     /// Time spent on them.
     pub seconds: f64,
-    /// Time of the quickest epoch, which other work on the machine has disturbed least.
+    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub least_epoch_seconds: f64,
-    /// Every start as it ended, which [`Run::resume`] takes up; none from a cross-validation, which has as many
-    /// networks as folds.
+    /// Final state of every training, for [`Run::resume`]; empty for a cross-validation, which has as many networks as
+    /// folds.
     pub states: Vec<TrainerState>,
 }
 
-/// A trial that could not be carried out.
+/// A trial that failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("seed {seed}: {reason}")]
 pub struct TrialFailure {
-    /// Its seed.
+    /// Seed of the trial.
     pub seed: Seed,
-    /// Which repeat of a cross-validation, from 0.
+    /// Index of the repeat of a cross-validation, from 0.
     pub repeat: usize,
-    /// Why.
+    /// Reason for the failure.
     pub reason: RunError,
 }
 
 impl Trial {
-    /// Training time of one network, all its starts together.
+    /// Training time of one network, over all its restarts.
     pub fn seconds_per_network(&self) -> f64 {
         self.seconds / self.networks.max(1) as f64
     }
 
-    /// Trains on sets drawn with the seed of `settings` and tests on the test set. `None` if cancelled.
+    /// Trains and tests on sets drawn with the seed of `settings`. Returns `None` if cancelled.
     pub(super) fn on_drawn_sets(
         settings: SimulatedSettings,
         is_cancelled: impl Fn() -> bool,
@@ -82,7 +83,7 @@ impl Trial {
         }))
     }
 
-    /// Cross-validates on a set drawn with the seed of `settings`. `None` if cancelled.
+    /// Cross-validates on a set drawn with the seed of `settings`. Returns `None` if cancelled.
     pub(super) fn by_cross_validation(
         settings: SimulatedSettings,
         validation: CrossValidation,
@@ -114,7 +115,7 @@ impl Trial {
     }
 }
 
-/// The best answers that so few hidden nodes can give, for every sample from what its fold was trained on.
+/// Returns the best answers possible with so few hidden nodes, for each sample from the training set of its fold.
 fn bottleneck_answers(set: &Dataset, validated: &CrossValidated, hidden: usize) -> Result<Array2<f64>, RunError> {
     let folds = &validated.folds;
     let mut answers = Array2::zeros(set.targets().dim());

@@ -7,26 +7,26 @@ use super::{
     measured::{Measured, number, sorted_by},
 };
 
-/// What an experiment says about a claim.
+/// Verdict of an experiment on a claim.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
-    /// The claim, the paper's or one to hold against it.
+    /// Claim, either the paper's or one to compare it with.
     pub claim: &'static str,
-    /// Whether it holds in this run.
+    /// Standing of the claim in this run.
     pub standing: Standing,
-    /// The numbers that say so.
+    /// Numbers that support the verdict.
     pub finding: String,
 }
 
-/// Whether a claim holds in a run.
+/// Standing of a claim in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Standing {
-    /// It does, beyond the spread of the trials.
+    /// The claim holds, beyond the spread of the trials.
     Holds,
-    /// For some cells it does, for others not.
+    /// The claim holds for some cells but not for others.
     HoldsInPart,
-    /// It does not.
+    /// The claim does not hold.
     Fails,
     /// The spread of the trials is too wide to tell, or results are missing.
     Undecided,
@@ -43,7 +43,7 @@ impl fmt::Display for Standing {
     }
 }
 
-/// What the finished trials say about the claims that this experiment can test.
+/// Judges the claims that this experiment can test by its finished trials.
 pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
     let measured = Measured::all(results);
     let mut verdicts = Vec::new();
@@ -81,7 +81,7 @@ fn missing(claim: &'static str) -> Verdict {
     }
 }
 
-/// Whether something is so everywhere, somewhere or nowhere.
+/// Returns the standing of a claim that is true in `so` of `of` cases.
 fn share(so: usize, of: usize) -> Standing {
     match so {
         _ if so == of => Standing::Holds,
@@ -124,14 +124,14 @@ fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
     })
 }
 
-/// With a capital and a full stop.
+/// Capitalises the first letter and adds a full stop.
 fn sentence(text: &str) -> String {
     let mut characters = text.chars();
     let first: String = characters.next().into_iter().flat_map(char::to_uppercase).collect();
     format!("{first}{}.", characters.as_str())
 }
 
-/// Looks for the least error among `cells`, which come by number of hidden nodes.
+/// Looks for the least error among `cells`, which are sorted by number of hidden nodes.
 fn optimum_exists(cells: Vec<Measured>) -> Verdict {
     let claim = "There is an optimal number of hidden nodes";
     let best = cells
@@ -182,7 +182,7 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
     }
 }
 
-/// Whether the errors rise along `measured`, trial by trial of the same seed and repeat.
+/// Checks that the errors rise along `measured`, trial by trial of the same seed and repeat.
 fn in_order(claim: &'static str, measured: Vec<Measured>) -> Verdict {
     if measured.len() < 2 {
         return missing(claim);
@@ -210,7 +210,7 @@ fn in_order(claim: &'static str, measured: Vec<Measured>) -> Verdict {
     }
 }
 
-/// Compares a polynomial law with an exponential one on the time of the quickest epoch in each cell.
+/// Compares a polynomial and an exponential law for the time of the fastest epoch in each cell.
 fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(usize) -> usize) -> Verdict {
     let claim = "Training time does not grow exponentially";
     let point = |cell: &CellResults| Some((size(cell.cell.column) as f64, cell.least_epoch_seconds()?));
