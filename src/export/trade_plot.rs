@@ -4,7 +4,7 @@ use crate::{
     evaluation::{Preset, TradeCost, TradeLevel, TradePoint},
 };
 
-/// The picture of one level of noise: the points of each decoder, the front, and the limit that physics sets.
+/// The picture of one level of noise: the points of each decoder, the front, and the Bayesian reference.
 pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
     let place = |point: &TradePoint| {
         let (x, y) = cost.of(point);
@@ -55,7 +55,7 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
     all.push(Series {
         is_dashed: true,
         ..series(
-            "limit of physics".to_owned(),
+            "Bayesian reference".to_owned(),
             Hue::Grey,
             None,
             ends.filter(|end| end.y > 0.0).collect(),

@@ -22,7 +22,7 @@ const COLUMNS: [Column; 4] = [
     },
     Column {
         heading: TIMES_LIMIT,
-        meaning: "Mean |error| of z over that of the Bayesian reference, below which no decoder comes",
+        meaning: "Mean |error| of z over that of the Bayesian reference, the limit for decoders that know of the loading only its range, or its mean and covariance",
     },
     Column {
         heading: "residual",
@@ -101,7 +101,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
 
 /// What the reference row is.
 pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
-                             loading, with Eq. (2) linearised at the truth. On average no decoder comes below it.";
+                             loading, with Eq. (2) linearised at the truth. On average no decoder does better that knows no more of the loading than its range, or its mean and covariance.";
 
 /// In the order of [`COLUMNS`], without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {

@@ -49,7 +49,7 @@ pub fn keys(level: &TradeLevel, palette: &Palette) -> Vec<Key> {
         .collect();
     keys.push(key("no other is better", Mark::Line, palette.dim));
     if limit(level).is_some() {
-        keys.push(key("limit of physics", Mark::Dashes, palette.warning));
+        keys.push(key("Bayesian reference", Mark::Dashes, palette.warning));
     }
     keys
 }
@@ -86,7 +86,7 @@ pub fn chart_ui(ui: &mut Ui, state: &State, level: &TradeLevel, cost: TradeCost)
     let chart = chart.y_axis_formatter(|mark, _| log_text(mark.value));
     let shown = chart.show(ui, |plot_ui| {
         if let Some(limit) = limit(level) {
-            let line = HLine::new("limit of physics", limit.log10()).color(palette.warning);
+            let line = HLine::new("Bayesian reference", limit.log10()).color(palette.warning);
             plot_ui.hline(line.width(1.4).style(LineStyle::dashed_dense()));
         }
         if cost == TradeCost::Decoding {

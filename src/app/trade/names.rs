@@ -48,7 +48,7 @@ pub fn point_facts(point: &TradePoint) -> Vec<String> {
         format_number(point.report.errors.z_mm)
     )];
     if let Some(ratio) = point.to_reference() {
-        facts.push(format!("{} times the limit of physics", format_number(ratio)));
+        facts.push(format!("{} times the Bayesian reference", format_number(ratio)));
     }
     facts.push(format!("{} a frame", frame_time(point.report.cost.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));

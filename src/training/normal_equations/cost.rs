@@ -1,7 +1,6 @@
 //! The cost of solving the equations, from sizes alone, so that the choice of the solver is the same on every machine and
 //! after every pause.
 
-use super::{conjugate::ConjugateGradient, hidden_solver::HiddenSolver, products::Products, schur::SchurComplement};
 use crate::{
     network::Shape,
     training::{
@@ -27,8 +26,8 @@ pub(in crate::training) struct Cost {
     pub(super) pairs: usize,
 }
 
-/// Speed of the large products of the factored solver relative to the small ones of conjugate gradients.
-const SPEED: f64 = 2.0;
+/// Number of columns that are filled at a time, so that they stay in the cache.
+pub(super) const CHUNK: usize = 512;
 
 impl Cost {
     /// Multiplications per sample to gather all products.
@@ -38,7 +37,7 @@ impl Cost {
     }
 
     /// Multiplications to gather and to solve once.
-    fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         self.samples as f64 * self.gathering_per_sample() + self.solving
     }
 
@@ -47,7 +46,7 @@ impl Cost {
         let work = Work {
             blocks,
             multiplications: BLOCK * self.gathering_per_sample() as usize,
-            bytes: Products::bytes(self),
+            bytes: self.part_bytes(),
         };
         work.parts(LARGE)
     }
@@ -55,35 +54,14 @@ impl Cost {
     /// About how many bytes the equations take, beside the samples.
     pub(super) fn bytes(&self) -> usize {
         let matrices = self.entries.saturating_mul(size_of::<f64>());
-        matrices.saturating_add(Products::bytes(self))
+        matrices.saturating_add(self.part_bytes())
     }
-}
 
-/// Tells whether factoring is cheaper than conjugate gradients.
-pub(super) fn factoring_is_cheaper(shape: Shape, samples: usize) -> bool {
-    let factored = SchurComplement::cost(shape, samples);
-    let iterated = ConjugateGradient::cost(shape, samples);
-    factored.total() <= SPEED * iterated.total()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_usual_networks_are_factored_and_wide_ones_iterated() {
-        let is_factored = |inputs, hidden, outputs, samples| {
-            let shape = Shape {
-                inputs,
-                hidden,
-                outputs,
-            };
-            factoring_is_cheaper(shape, samples)
-        };
-        for samples in [100, 1000, 100_000] {
-            assert!(is_factored(30, 12, 20, samples), "{samples} samples");
-        }
-        assert!(!is_factored(96, 64, 64, 2000));
-        assert!(!is_factored(1536, 512, 1024, 10_000));
+    /// About how many bytes the products take for each part of the samples.
+    fn part_bytes(&self) -> usize {
+        let (h, n1) = (self.shape.hidden, self.shape.inputs + 1);
+        let (rows, columns) = self.gram;
+        let buffers = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + self.pairs);
+        size_of::<f64>() * (rows * columns + self.shape.hidden_weights() * (h + 1) + buffers)
     }
 }

@@ -4,7 +4,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
 use super::{
     cholesky::{Cholesky, solve_rows, substitute},
-    products::Sums,
+    sums::Sums,
 };
 use crate::network::{Mlp, Shape};
 

@@ -3,8 +3,9 @@
 use faer::MatRef;
 
 use super::{
+    choice::factoring_is_cheaper,
     conjugate::ConjugateGradient,
-    cost::{Cost, factoring_is_cheaper},
+    cost::Cost,
     elimination::{Elimination, output_weights, write_negative},
     hidden_solver::{HiddenSolver, System},
     output_layer::{OutputLayer, ridge},

@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatMut, MatRef};
 
-use super::{cost::Cost, elimination::Elimination, products::Sums};
+use super::{cost::Cost, elimination::Elimination, sums::Sums};
 use crate::{
     network::{Mlp, Shape},
     training::{

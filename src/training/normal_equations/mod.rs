@@ -14,6 +14,7 @@
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
+mod choice;
 mod cholesky;
 mod conjugate;
 mod cost;
@@ -25,5 +26,6 @@ mod hidden_solver;
 mod output_layer;
 mod products;
 mod schur;
+mod sums;
 
 pub(super) use equations::{FactoredEquations, NormalEquations};

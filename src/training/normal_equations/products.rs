@@ -2,7 +2,11 @@
 
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
-use super::{cost::Cost, hidden_solver::HiddenSolver};
+use super::{
+    cost::{CHUNK, Cost},
+    hidden_solver::HiddenSolver,
+    sums::Sums,
+};
 use crate::{
     network::{Mlp, Shape},
     training::{
@@ -15,28 +19,10 @@ use crate::{
     },
 };
 
-/// Number of columns that are filled at a time, so that they stay in the cache.
-pub(super) const CHUNK: usize = 512;
-
 /// The products of all samples.
 pub(super) struct Products {
     /// One for each part of the samples; once gathered, the first has the sums of all.
     parts: Vec<(Sums, BlockBuffers)>,
-}
-
-/// Sums over samples.
-pub(super) struct Sums {
-    shape: Shape,
-    /// The entries of BᵀB that the solver needs.
-    pub(super) gram: Mat<f64>,
-    /// C: h·n1 × (h+1), column by column without gaps, so that it is also n1 × h(h+1).
-    c: Vec<f64>,
-    /// H̃ᵀH̃.
-    pub(super) g: Mat<f64>,
-    /// Jwᵀe: n1 × h.
-    pub(super) gradient_w: Mat<f64>,
-    /// Jvᵀe: (h+1) × outputs.
-    pub(super) gradient_v: Mat<f64>,
 }
 
 /// Buffers for one block of samples.
@@ -74,14 +60,6 @@ impl Products {
         }
     }
 
-    /// About how many bytes each part of the samples takes.
-    pub(super) fn bytes(cost: &Cost) -> usize {
-        let (h, n1) = (cost.shape.hidden, cost.shape.inputs + 1);
-        let (rows, columns) = cost.gram;
-        let buffers = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + cost.pairs);
-        size_of::<f64>() * (rows * columns + cost.shape.hidden_weights() * (h + 1) + buffers)
-    }
-
     /// The sums last gathered.
     pub(super) fn sums(&self) -> &Sums {
         &self.parts[0].0
@@ -114,40 +92,6 @@ impl Products {
 }
 
 impl Sums {
-    fn new(shape: Shape, (rows, columns): (usize, usize)) -> Self {
-        let (h, n1, h1) = (shape.hidden, shape.inputs + 1, shape.hidden + 1);
-        Self {
-            shape,
-            gram: Mat::zeros(rows, columns),
-            c: vec![0.0; h * n1 * h1],
-            g: Mat::zeros(h1, h1),
-            gradient_w: Mat::zeros(n1, h),
-            gradient_v: Mat::zeros(h1, shape.outputs),
-        }
-    }
-
-    /// C: h·n1 × (h+1).
-    pub(super) fn c(&self) -> MatRef<'_, f64> {
-        let h1 = self.shape.hidden + 1;
-        MatRef::from_column_major_slice(&self.c, self.shape.hidden_weights(), h1)
-    }
-
-    fn clear(&mut self) {
-        self.c.fill(0.0);
-        for sum in [&mut self.gram, &mut self.g, &mut self.gradient_w, &mut self.gradient_v] {
-            sum.fill(0.0);
-        }
-    }
-
-    /// Adds the sums of another part.
-    fn add(&mut self, other: &Self) {
-        self.c.iter_mut().zip(&other.c).for_each(|(sum, value)| *sum += value);
-        self.gram += &other.gram;
-        self.g += &other.g;
-        self.gradient_w += &other.gradient_w;
-        self.gradient_v += &other.gradient_v;
-    }
-
     /// Adds a block to BᵀB, C and H̃ᵀH̃; leaves its slopes in their buffer.
     fn add_second_order<S: HiddenSolver + ?Sized>(
         &mut self,

@@ -16,10 +16,10 @@ use pulp::{Simd, WithSimd};
 
 use super::{
     cholesky::{Cholesky, substitute},
-    cost::Cost,
+    cost::{CHUNK, Cost},
     elimination::{Elimination, fill, output_weights},
     hidden_solver::{HiddenSolver, System},
-    products::{CHUNK, Sums},
+    sums::Sums,
 };
 use crate::{
     network::Shape,
