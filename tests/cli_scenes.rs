@@ -135,9 +135,9 @@ fn a_trade_is_told_in_text_and_json() {
     let levels = report["levels"].as_array().unwrap();
     assert_eq!(levels.len(), 2);
     for level in levels {
-        // Two presets, each with four decoders without a network and twice network, its single precision, and polish.
+        // Two presets, each with five decoders without a network and twice network, its single precision, and polish.
         let points = level["points"].as_array().unwrap();
-        assert_eq!(points.len(), 2 * (4 + 2 * 3));
+        assert_eq!(points.len(), 2 * (5 + 2 * 3));
         assert!(points.iter().any(|point| point["on_decoding_front"] == true));
         assert!(
             level["most_accurate_under"]["command"]
@@ -171,7 +171,7 @@ fn what_is_wrong_is_named() {
         ("train --noise -1", "from 0"),
         ("train --noise 2", "from 0 to 1"),
         ("train --noise 0,1", "one number"),
-        ("train --decoder knn", "rbf, newton or polish"),
+        ("train --decoder knn", "rbf, fuzzy, newton or polish"),
         ("simulate --decoder mean,ridge", "one here"),
         ("trade --hidden 0", "from 1"),
     ];

@@ -42,7 +42,6 @@ fn trained(settings: SimulatedSettings) -> Run {
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
     let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
-    assert!(report.cost.frame_us > 0.0, "{kind}");
     report.errors.z_percent.unwrap()
 }
 

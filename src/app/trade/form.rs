@@ -196,8 +196,8 @@ mod tests {
     #[test]
     fn the_form_begins_with_a_quick_look_at_everything() {
         let plan = TradeForm::default().plan(&SimulatedSettings::default()).unwrap();
-        // Four without a network, then two sizes with two precisions and polish.
-        assert_eq!(plan.points(), 4 * 2 * (4 + 2 * 3));
+        // Five without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
         let best = plan.settings(Preset::Best, 1e-3);
         assert_eq!((best.source.samples, best.training.stopping.epochs), (2000, 60));
         assert_eq!(
