@@ -13,12 +13,13 @@ use crate::{
     driver::{Driver, small, trained},
 };
 
-const NAMES: [&str; 7] = [
+const NAMES: [&str; 8] = [
     "Training mean",
     "Ridge",
     "Network",
     "Network f32",
     "Radial basis",
+    "Fuzzy rules",
     "Newton",
     "Network + Newton",
 ];

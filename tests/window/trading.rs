@@ -22,7 +22,7 @@ fn open() -> Driver {
 fn tiny(driver: &mut Driver) -> TradePlan {
     driver.type_into("Noise levels", "0, 1e-3");
     driver.type_into("Hidden nodes", "3");
-    for decoder in ["Training mean", "Radial basis", "Network + Newton"] {
+    for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
         driver.click(decoder);
     }
     driver.enter("Samples at most", "100");
