@@ -6,6 +6,10 @@ use crate::{
 };
 
 /// Source of the samples of a run.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one a run, and a box would cost the settings their `Copy`"
+)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Source {
     /// Samples drawn from a model of the sensor.
