@@ -67,7 +67,7 @@ fn a_network_learns_what_a_linear_map_cannot() {
         // Uniform targets on [−1, 1] deviate by 1/√3.
         assert!((mean - 1.0 / 3.0_f64.sqrt()).abs() < 0.1, "{mean}");
         assert!(
-            linear < 0.7 * mean && network < 0.1 * linear,
+            linear < 0.7 * mean && network < 0.2 * linear,
             "{target}: {mean} {linear} {network}"
         );
     }

@@ -91,9 +91,19 @@ fn folds_are_counted_by_the_rows_read() {
 }
 
 #[test]
+fn a_fold_without_samples_of_a_known_row_is_named() {
+    let results = finished(experiment(Rows::Known, 12, FoldUnit::Sample));
+    let reason = results.cells[0].failures[0].reason.to_string();
+    assert!(reason.contains("has no validation samples"), "{reason}");
+}
+
+#[test]
 fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
     for rows in [Rows::One(2), Rows::Known] {
-        let results = finished(experiment(rows, 3, FoldUnit::Sample));
+        let mut experiment = experiment(rows, 3, FoldUnit::Sample);
+        // Enough that no fold lacks a row.
+        experiment.base.source.samples = 240;
+        let results = finished(experiment);
         assert_eq!(results.cells[0].failures, []);
         let errors = results.cells[0].trials[0].errors;
         assert!(errors.z_percent.unwrap() < 50.0, "{rows}: {errors:?}");

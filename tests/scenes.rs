@@ -214,8 +214,8 @@ fn a_trade_has_a_point_for_every_choice() {
     let mut points: Vec<TradePoint> = Vec::new();
     let keep = |point| points.push(point);
     assert!(measure_trade(Preset::Best, &settings, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
-    // Four without a network; network in two precisions and polish, each with two numbers of hidden nodes.
-    assert_eq!(points.len(), 4 + 2 * 3);
+    // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
+    assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
     let best = most_accurate_under(&points, f64::INFINITY).unwrap();
     assert!(matches!(best.report.kind, DecoderKind::Newton | DecoderKind::Polish));
