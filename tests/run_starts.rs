@@ -191,7 +191,10 @@ fn too_many_starts_are_refused() {
         ..settings(1)
     };
     let error = Run::prepare(wide).err().unwrap();
-    assert!(matches!(error, RunError::TooManyStarts { starts: 100, .. }), "{error}");
+    assert!(
+        matches!(error, RunError::TooManyTrainings { trainings: 100, .. }),
+        "{error}"
+    );
     let states = Run::prepare(settings(2)).unwrap().states();
     assert!(matches!(
         Run::resume(settings(3), states),

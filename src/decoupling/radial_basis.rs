@@ -28,10 +28,10 @@ pub struct RadialBasisNetwork {
     outputs: MinMax,
 }
 
-/// How a radial-basis network is built.
+/// Settings of a radial-basis network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadialBasisSettings {
-    /// Where the Gaussians stand.
+    /// Positions of the Gaussians.
     pub centres: Centres,
     /// Width of the Gaussians in proportion to the root mean square distance between inputs.
     pub relative_width: f64,
@@ -39,7 +39,7 @@ pub struct RadialBasisSettings {
     pub ridge: f64,
 }
 
-/// Where the Gaussians stand.
+/// Positions of the Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Centres {
     /// On every training sample.

@@ -334,10 +334,10 @@ pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<
 }
 
 /// Checks that the equations of all restarts fit into memory together; a single one is checked by the trainer.
-fn check_memory(method: &Method, shape: Shape, samples: usize, starts: usize) -> Result<(), RunError> {
-    let bytes = method.equations_bytes(shape, samples).saturating_mul(starts);
-    if starts > 1 && bytes > LARGEST_EQUATIONS_BYTES {
-        return Err(RunError::TooManyStarts { starts, bytes });
+fn check_memory(method: &Method, shape: Shape, samples: usize, trainings: usize) -> Result<(), RunError> {
+    let bytes = method.equations_bytes(shape, samples).saturating_mul(trainings);
+    if trainings > 1 && bytes > LARGEST_EQUATIONS_BYTES {
+        return Err(RunError::TooManyTrainings { trainings, bytes });
     }
     Ok(())
 }

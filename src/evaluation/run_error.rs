@@ -63,13 +63,13 @@ pub enum RunError {
     Training(#[from] TrainingError),
     /// The equations of all restarts would take too much memory.
     #[error(
-        "{starts} starts of this network would take {:.1} GB with this method: use fewer starts, fewer hidden nodes, \
-         or the scaled conjugate gradient (scg)",
+        "{trainings} trainings at once, starts times networks, would take {:.1} GB with this method: use fewer starts, \
+         fewer hidden nodes, or the scaled conjugate gradient (scg)",
         *.bytes as f64 * 1e-9
     )]
-    TooManyStarts {
+    TooManyTrainings {
         /// Number of restarts times networks.
-        starts: usize,
+        trainings: usize,
         /// Memory needed, in bytes.
         bytes: usize,
     },

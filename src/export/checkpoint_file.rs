@@ -56,7 +56,7 @@ pub enum CheckpointFileError {
     NotOurs {
         /// The file.
         path: PathBuf,
-        /// What the file is instead.
+        /// Description of the file as found.
         reason: String,
     },
     /// The file ends too early.

@@ -17,7 +17,7 @@ pub enum Rows {
     One(usize),
 }
 
-/// How row-wires share a decoder.
+/// Sharing of decoders among row-wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowModel {

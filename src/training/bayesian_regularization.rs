@@ -151,7 +151,7 @@ impl Algorithm for BayesianRegularization {
         })?;
         std::mem::swap(mlp, &mut self.candidate);
         self.equations.gather(mlp, examples);
-        // Where rounding leaves no trace, γ stays as it was.
+        // γ keeps its value if rounding hides the trace.
         if let Some(trace) = self.equations.trace_of_inverse(mlp, alpha / beta) {
             let weights = self.step.len() as f64;
             self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);

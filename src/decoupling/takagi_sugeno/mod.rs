@@ -28,7 +28,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct TakagiSugeno {
     quantity: Quantity,
-    /// What each channel is taken relative to.
+    /// Value subtracted from each channel.
     centre: Vec<f64>,
     /// Logarithms of the memberships from centred channels, the whitening folded in: (M4 + 1) × rules, the constant last.
     antecedents: Array2<f64>,

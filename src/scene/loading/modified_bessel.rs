@@ -17,8 +17,8 @@ pub(super) fn scaled_k0_k1(x: f64) -> (f64, f64) {
     }
 }
 
-/// Where the series, which cancels beyond, hands over to the integral, whose integrand is analytic only up to √(2x) from
-/// the real axis.
+/// Argument at which the series, which cancels beyond, hands over to the integral, whose integrand is analytic only up to
+/// √(2x) from the real axis.
 const LARGEST_OF_SERIES: f64 = 2.0;
 
 /// With y = x²/4, H_k the harmonic numbers and L = ln(x/2) + γ:
