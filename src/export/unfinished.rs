@@ -1,9 +1,8 @@
 use std::{
     collections::BTreeSet,
-    fs::{self, File},
+    fs::File,
     io,
     path::{Path, PathBuf},
-    process,
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
@@ -73,7 +72,7 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
     let all = all();
     for path in all.iter() {
         // It may have found its place or have been removed just now.
-        let _ = fs::remove_file(path);
+        let _ = std::fs::remove_file(path);
     }
-    process::exit(status)
+    std::process::exit(status)
 }
