@@ -90,7 +90,7 @@ impl Decoder for AffineMap {
     }
 
     fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        DecodeError::check_that(readings, |value| self.quantity.accepts(value))?;
+        DecodeError::check_for(self.quantity, readings)?;
         self.changes.fill(0.0);
         let width = self.changes.len();
         let matrix = self.matrix.as_slice().expect("made in standard layout");

@@ -7,6 +7,7 @@ const ROUNDS: usize = 20;
 const MOST_CLUSTERED: usize = 1000;
 
 /// Squared Euclidean distance.
+#[inline]
 pub(super) fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }

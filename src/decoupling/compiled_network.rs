@@ -221,10 +221,7 @@ impl<T: Real> WithSimd for Decoding<'_, T> {
             readings,
             targets,
         } = self;
-        match decoder.networks.at(first_row).quantity {
-            Quantity::Raw => DecodeError::check_that(readings, f64::is_finite)?,
-            _ => DecodeError::check(readings)?,
-        }
+        DecodeError::check_for(decoder.networks.at(first_row).quantity, readings)?;
         let width = decoder.hidden.len() / decoder.rows;
         let rows = readings.len() / decoder.channels;
         decoder.feed_hidden_nodes(first_row, readings);

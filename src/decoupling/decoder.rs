@@ -1,7 +1,10 @@
 use ndarray::Array2;
 use thiserror::Error;
 
-use crate::dataset::{Dataset, PerRow};
+use crate::{
+    dataset::{Dataset, PerRow},
+    network::Quantity,
+};
 
 /// A method of decoding readings into targets; for a simulated array, resistances in ohm into coordinates of nodes in
 /// millimetres.
@@ -58,14 +61,24 @@ pub struct DecodeError {
 
 impl DecodeError {
     /// Checks that all readings of a row are finite and above 0.
+    #[inline(always)]
     pub(crate) fn check(readings: &[f64]) -> Result<(), Self> {
         Self::check_that(readings, |value| (value > 0.0) & (value < f64::INFINITY))
+    }
+
+    /// Checks that `quantity` has a value for all readings of a row.
+    #[inline(always)]
+    pub(crate) fn check_for(quantity: Quantity, readings: &[f64]) -> Result<(), Self> {
+        match quantity {
+            Quantity::Raw => Self::check_that(readings, f64::is_finite),
+            Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Self::check(readings),
+        }
     }
 
     /// Checks that `is_sound` holds for all readings of a row, in a single vectorised pass, since bad readings are
     /// rare.
     #[inline(always)]
-    pub(crate) fn check_that(readings: &[f64], is_sound: impl Fn(f64) -> bool) -> Result<(), Self> {
+    fn check_that(readings: &[f64], is_sound: impl Fn(f64) -> bool) -> Result<(), Self> {
         if readings.iter().fold(true, |all, &value| all & is_sound(value)) {
             return Ok(());
         }

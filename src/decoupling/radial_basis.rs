@@ -137,7 +137,7 @@ impl Decoder for RadialBasisNetwork {
     }
 
     fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        DecodeError::check_that(readings, |value| self.inputs.quantity().accepts(value))?;
+        DecodeError::check_for(self.inputs.quantity(), readings)?;
         let readings = ArrayView2::from_shape((1, readings.len()), readings).expect("one row");
         let x = self.inputs.of(readings);
         let count = self.centres.nrows();

@@ -114,7 +114,7 @@ impl Decoder for TakagiSugeno {
     }
 
     fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        DecodeError::check_that(readings, |value| self.quantity.accepts(value))?;
+        DecodeError::check_for(self.quantity, readings)?;
         for ((value, &reading), centre) in self.values.iter_mut().zip(readings).zip(&self.centre) {
             *value = self.quantity.of(reading) - centre;
         }
