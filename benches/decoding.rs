@@ -12,7 +12,7 @@ use decoupler::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
-        RadialBasisNetwork, RadialBasisSettings, TrainingMean,
+        RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean,
     },
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
@@ -131,6 +131,15 @@ fn print_scale(scale: ArrayScale) {
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
                     AffineMap::ridge(set, InputChoice::BEST, 0.0)
+                })
+                .unwrap(),
+            ),
+        ),
+        (
+            "fuzzy rules".into(),
+            Box::new(
+                PerRow::fit(&training, RowModel::Each, |set| {
+                    TakagiSugeno::fit(set, Quantity::Conductance, 0.0, &mut rng)
                 })
                 .unwrap(),
             ),
