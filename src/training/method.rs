@@ -8,19 +8,18 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdaptiveDescentSettings, AdaptiveState, BayesianState, ConjugateState, DampedState, Damping, Evaluation, Examples,
-    GradientDescentSettings, MomentumSettings, ProjectionState, ResilientSettings, ResilientState,
-    ScaledConjugateGradientSettings, Setting, SettingError, StepMomentumSettings, StopReason,
-    adaptive_descent::AdaptiveDescent,
+    AdaptiveDescentSettings, Damping, Evaluation, Examples, GradientDescentSettings, MomentumSettings,
+    ResilientSettings, ScaledConjugateGradientSettings, Setting, SettingError, StepMomentumSettings, StopReason,
+    adaptive_descent::{AdaptiveDescent, AdaptiveState},
     algorithm::{Algorithm, Checked, Description},
-    bayesian_regularization::BayesianRegularization,
+    bayesian_regularization::{BayesianRegularization, BayesianState},
     gradient_descent::GradientDescent,
-    levenberg_marquardt::LevenbergMarquardt,
+    levenberg_marquardt::{DampedState, LevenbergMarquardt},
     momentum::Momentum,
-    resilient::Resilient,
-    scaled_conjugate_gradient::ScaledConjugateGradient,
+    resilient::{Resilient, ResilientState},
+    scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
     step_momentum::StepMomentum,
-    variable_projection::VariableProjection,
+    variable_projection::{ProjectionState, VariableProjection},
 };
 use crate::network::{Mlp, Shape};
 
