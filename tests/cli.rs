@@ -3,11 +3,10 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "support/terminal.rs"]
+mod terminal;
+
+use std::{fs, path::Path};
 
 use decoupler::{
     dataset::{Dataset, Seed, Stream},
@@ -17,12 +16,7 @@ use decoupler::{
     sensor::{ArrayScale, SensorModel},
 };
 use serde_json::Value;
-
-fn decoupler(arguments: &str, folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
-    command.output().unwrap()
-}
+use terminal::decoupler;
 
 /// Standard error of a call that must fail with `status`: one line, nothing on standard output.
 fn failure(arguments: &str, folder: &Path, status: i32) -> String {
@@ -286,7 +280,7 @@ fn files_that_cannot_be_decoded_leave_nothing() {
 #[cfg(unix)]
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
-    use std::process::Stdio;
+    use std::process::{Command, Stdio};
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
     command.args(["simulate", "--samples", "10000"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

@@ -3,19 +3,13 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+#[path = "support/terminal.rs"]
+mod terminal;
+
+use std::{fs, path::Path};
 
 use serde_json::Value;
-
-fn decoupler(arguments: &str, folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
-    command.output().unwrap()
-}
+use terminal::decoupler;
 
 fn success(arguments: &str, folder: &Path) -> String {
     let output = decoupler(arguments, folder);
