@@ -14,11 +14,11 @@
 //! | [`decoupling`] | readings to deformation, every way we know, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
-//! | [`export`] | files for other programs; `export::figures` draws (feature `figures`) |
+//! | `export` | files for other programs (feature `files`); `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
 //!
-//! All features are on by default. The library alone, without argument parser, progress bars, renderer and window, is
+//! All features are on by default. The library alone, without files, argument parser, progress bars, renderer and window, is
 //! `decoupler = { version = "0.1", default-features = false }`.
 //!
 //! # A tour
@@ -102,6 +102,7 @@ pub mod cli;
 pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
+#[cfg(feature = "files")]
 pub mod export;
 pub mod network;
 pub mod scene;
@@ -110,7 +111,7 @@ pub mod surface;
 pub mod training;
 
 /// The crates whose types stand in public signatures: vectors in space (`glam::DVec3`) in [`sensor`], [`scene`],
-/// [`dataset`] and [`export`]; arrays (`ndarray::Array2`) in [`dataset`], [`network`], [`decoupling`], [`evaluation`] and
-/// [`export`]; generators of random numbers (`rand::Rng`) wherever something is drawn. Use these to have matching
+/// [`dataset`] and `export`; arrays (`ndarray::Array2`) in [`dataset`], [`network`], [`decoupling`], [`evaluation`] and
+/// `export`; generators of random numbers (`rand::Rng`) wherever something is drawn. Use these to have matching
 /// versions.
 pub use {glam, ndarray, rand};

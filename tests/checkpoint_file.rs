@@ -1,5 +1,6 @@
 //! The checkpoint file: what is read goes on with the same bits, and whatever happens to the file is noticed.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, path::PathBuf};

@@ -1,5 +1,6 @@
 //! Measured samples through the library: trained, cross-validated and tabled without any geometry.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use decoupler::{

@@ -1,5 +1,6 @@
 //! The network file: what is read answers with the same bits as what was written, and damage is named.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, path::PathBuf};

@@ -1,5 +1,6 @@
 //! Scenes from settings to answers: known rows, single rows, noise, sideways movement; and files of older programs.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::path::Path;

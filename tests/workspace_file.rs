@@ -1,4 +1,5 @@
 //! The run list: it comes back as it was, and whatever is damaged is put aside and never lost.
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{fs, path::Path, sync::Arc};

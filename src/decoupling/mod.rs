@@ -7,7 +7,6 @@
 //! | [`AffineMap`] | an affine map, by least squares or ridge regression with generalised cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
-//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
 //! | [`NewtonDecoder`] | solves Eq. (2) by the Gauss-Newton method |
 //! | [`PolishedDecoder`] | another decoder's answer, improved by a few Gauss-Newton steps |

@@ -91,7 +91,7 @@ impl DecoderSet {
     }
 
     /// Replaces the networks.
-    pub fn set_networks(&mut self, networks: Option<Networks>) {
+    pub(super) fn set_networks(&mut self, networks: Option<Networks>) {
         self.networks = networks;
     }
 

@@ -49,5 +49,5 @@ pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
 pub use target_errors::{TargetErrors, TargetRow};
-pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under, pareto_front};
+pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under};
 pub use trade_level::{TradeCost, TradeLevel};

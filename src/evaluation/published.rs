@@ -39,7 +39,7 @@ impl PublishedErrors {
     }
 
     /// Returns the errors reported for this configuration by cross-validation of all `samples`, if there are any.
-    pub fn of_cross_validation(array: ArrayScale, hidden: usize, samples: usize) -> Option<Self> {
+    pub(super) fn of_cross_validation(array: ArrayScale, hidden: usize, samples: usize) -> Option<Self> {
         Self::find(array, hidden, samples, |table| table == Self::CROSS_VALIDATION)
     }
 

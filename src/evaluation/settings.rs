@@ -105,7 +105,7 @@ impl<S> RunSettings<S> {
     ///
     /// # Errors
     /// The first number out of range.
-    pub fn check_network(&self) -> Result<(), CountError> {
+    pub(super) fn check_network(&self) -> Result<(), CountError> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
             ("starts", self.starts, 1..=MOST_STARTS),

@@ -23,7 +23,7 @@ impl SimulatedSettings {
     ///
     /// # Errors
     /// If the sensor, scene, or number of samples is invalid.
-    pub fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
+    pub(super) fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
         let Simulation { sensor, scene, .. } = &self.source;
         sensor.check()?;
         scene.check()?;

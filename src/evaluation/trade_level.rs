@@ -1,4 +1,4 @@
-use super::{TradePoint, pareto_front};
+use super::{TradePoint, trade::pareto_front};
 
 /// Cost weighed against the error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -56,7 +56,7 @@ impl Quantity {
     }
 
     /// Returns |d value / d ln R|: a relative error ε of a reading is an error of ε times this in the value.
-    pub fn per_relative_error(self, resistance_ohm: f64) -> f64 {
+    pub(super) fn per_relative_error(self, resistance_ohm: f64) -> f64 {
         match self {
             Self::Resistance => resistance_ohm,
             Self::Conductance => 1.0 / resistance_ohm,

@@ -51,7 +51,7 @@ impl Axis {
     }
 
     /// Returns `true` if both vary the same setting.
-    pub fn is_same_kind(&self, other: &Self) -> bool {
+    pub(super) fn is_same_kind(&self, other: &Self) -> bool {
         discriminant(self) == discriminant(other)
     }
 

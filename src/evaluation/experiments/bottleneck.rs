@@ -53,7 +53,7 @@ impl Bottleneck {
     }
 
     /// Returns the best possible answers, in millimetres, for the true `coordinates_mm` (samples × 3·M2).
-    pub fn reconstruct(&self, coordinates_mm: ArrayView2<'_, f64>) -> Array2<f64> {
+    pub(super) fn reconstruct(&self, coordinates_mm: ArrayView2<'_, f64>) -> Array2<f64> {
         let deviations = self.outputs.scale(coordinates_mm) - &self.mean;
         let projected = deviations.dot(&self.components).dot(&self.components.t()) + &self.mean;
         self.outputs.restore(projected.view())

@@ -13,7 +13,7 @@ pub struct Growth {
 
 /// A law of growth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GrowthLaw {
+pub(super) enum GrowthLaw {
     /// t = a + b·x^d.
     Polynomial,
     /// t = a·c^x.
@@ -44,7 +44,7 @@ impl Growth {
     }
 
     /// Returns the law that is clearly closer to the points; `None` if both are about equally close.
-    pub fn law(&self) -> Option<GrowthLaw> {
+    pub(super) fn law(&self) -> Option<GrowthLaw> {
         /// Ratio of the residuals up to which neither law is clearly closer.
         const CLEARLY: f64 = 1.25;
         let (polynomial, exponential) = (self.polynomial_residual, self.exponential_residual);

@@ -20,7 +20,7 @@ mod verdict;
 pub use axis::Axis;
 pub use bottleneck::Bottleneck;
 pub use experiment::{Cell, Experiment, ExperimentError, PaperTable};
-pub use growth::{Growth, GrowthLaw};
+pub use growth::Growth;
 pub use results::{CellResults, ExperimentResults};
 pub use runner::{Finished, run_experiments, worker_threads};
 pub use summary::{CellSummary, Figure};

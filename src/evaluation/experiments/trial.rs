@@ -51,7 +51,7 @@ pub struct TrialFailure {
 
 impl Trial {
     /// Training time of one network, over all its restarts.
-    pub fn seconds_per_network(&self) -> f64 {
+    pub(super) fn seconds_per_network(&self) -> f64 {
         self.seconds / self.networks.max(1) as f64
     }
 

@@ -3,7 +3,8 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{
-    Axis, CellResults, ExperimentResults, Growth, GrowthLaw,
+    Axis, CellResults, ExperimentResults, Growth,
+    growth::GrowthLaw,
     measured::{Measured, number, sorted_by},
 };
 

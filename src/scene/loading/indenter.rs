@@ -80,12 +80,12 @@ impl Default for Indenter {
 
 impl Indenter {
     /// Sizes offered.
-    pub const RADIUS_MM: Span = Span {
+    const RADIUS_MM: Span = Span {
         smallest: 2.0,
         largest: 6.0,
     };
     /// Tilt offered.
-    pub const TILT_DEGREES: f64 = 5.0;
+    const TILT_DEGREES: f64 = 5.0;
 
     /// The four shapes with sizes and tilts as offered, in the order of [`IndenterShape`].
     pub fn all() -> [Self; 4] {
