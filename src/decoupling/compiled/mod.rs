@@ -1,11 +1,16 @@
-use ndarray::{Axis, Slice};
+//! Trained networks prepared to decode fast: scalings folded into the weights, layers padded to vector registers.
+
+mod folded_network;
+mod padded_layer;
+mod real;
+
 use pulp::{Simd, WithSimd};
 
-use super::{DecodeError, Decoder, real::Real};
-use crate::{
-    dataset::PerRow,
-    network::{DecouplingNetwork, Networks, Quantity},
-};
+use self::{folded_network::FoldedNetwork, padded_layer::affine};
+use super::{DecodeError, Decoder};
+use crate::{dataset::PerRow, network::Networks};
+
+pub use real::Real;
 
 /// Networks prepared to decode frames fast and without allocation, in double or single precision: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.
@@ -20,7 +25,7 @@ pub struct CompiledNetworks<T> {
     rows: usize,
     channels: usize,
     outputs_per_row: usize,
-    networks: PerRow<Compiled<T>>,
+    networks: PerRow<FoldedNetwork<T>>,
     /// Inputs of one row.
     inputs: Vec<T>,
     /// Hidden nodes of all rows, so that hyperbolic tangents fill the vector registers.
@@ -32,45 +37,18 @@ pub struct CompiledNetworks<T> {
     wide_sums: Vec<f64>,
 }
 
-#[derive(Clone, Debug)]
-struct Compiled<T> {
-    quantity: Quantity,
-    /// Reference resistance R₀ of each channel.
-    centre_ohm: Vec<f64>,
-    /// (channels + 1) × padded hidden nodes, the bias last.
-    hidden_layer: Vec<T>,
-    /// Hidden layer in double precision, if its sums need it.
-    wide_hidden_layer: Option<Vec<f64>>,
-    /// (padded hidden nodes + 1) × padded outputs, the bias last.
-    output_layer: Vec<T>,
-    /// Middle of the range of every target; constant targets stay there.
-    middles: Vec<f64>,
-    /// Index of the target that each output changes.
-    varying: Vec<usize>,
-    padded_hidden: usize,
-    padded_outputs: usize,
-}
-
-/// Rounding error of the hidden sums above which they are computed in double precision.
-const LARGEST_ROUNDING: f64 = 1e-5;
-/// Typical relative deviation of readings from R₀, for the estimate of rounding errors.
-const USUAL_CHANGE: f64 = 0.1;
-
-/// Layers are padded to a multiple of this number.
-const LANES: usize = 4;
-
 impl<T: Real> CompiledNetworks<T> {
     /// Prepares `networks` to decode frames of `rows` row-wires.
     ///
     /// # Panics
     /// If the networks differ in channels or outputs.
     pub fn new(networks: &Networks, rows: usize) -> Self {
-        let networks = networks.map(Compiled::new);
+        let networks = networks.map(FoldedNetwork::new);
         let (channels, outputs) = (networks.at(0).centre_ohm.len(), networks.at(0).middles.len());
         let of_same_size =
-            |network: &Compiled<T>| (network.centre_ohm.len(), network.middles.len()) == (channels, outputs);
+            |network: &FoldedNetwork<T>| (network.centre_ohm.len(), network.middles.len()) == (channels, outputs);
         assert!(networks.values().iter().all(of_same_size));
-        let widest = |width: fn(&Compiled<T>) -> usize| networks.values().iter().map(width).max().unwrap_or(0);
+        let widest = |width: fn(&FoldedNetwork<T>) -> usize| networks.values().iter().map(width).max().unwrap_or(0);
         let (hidden, padded_outputs) = (widest(|n| n.padded_hidden), widest(|n| n.padded_outputs));
         Self {
             rows,
@@ -82,85 +60,6 @@ impl<T: Real> CompiledNetworks<T> {
             wide_inputs: vec![0.0; channels],
             wide_sums: vec![0.0; hidden],
             networks,
-        }
-    }
-}
-
-impl<T: Real> Compiled<T> {
-    fn new(network: &DecouplingNetwork) -> Self {
-        let (mlp, quantity) = (network.mlp(), network.inputs().quantity());
-        let shape = mlp.shape();
-        let (centre, matrix) = network.inputs().affine();
-        let centre_ohm: Vec<f64> = centre.iter().map(|&value| quantity.resistance_ohm(value)).collect();
-        let (padded_hidden, padded_outputs) = (
-            shape.hidden.next_multiple_of(LANES),
-            shape.outputs.next_multiple_of(LANES),
-        );
-        let channels = centre_ohm.len();
-        // For a conductance, (R − R₀)/R is computed from the reading; the rest is folded into the weights.
-        let per_computed = |channel: usize| match quantity {
-            Quantity::Conductance => -1.0 / centre_ohm[channel],
-            Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => 1.0,
-        };
-        let folded = matrix
-            .t()
-            .dot(&mlp.hidden_layer().slice_axis(Axis(0), Slice::from(..shape.inputs)));
-        let usual_input = |channel: usize| match quantity {
-            Quantity::Conductance | Quantity::LogResistance => USUAL_CHANGE,
-            Quantity::Resistance | Quantity::Raw => USUAL_CHANGE * centre_ohm[channel],
-        };
-        let mut wide = vec![0.0; (channels + 1) * padded_hidden];
-        let mut rounding = 0.0_f64;
-        for node in 0..shape.hidden {
-            let mut squares = 0.0;
-            for channel in 0..channels {
-                let weight = folded[[channel, node]] * per_computed(channel);
-                wide[channel * padded_hidden + node] = weight;
-                squares += (weight * usual_input(channel)).powi(2);
-            }
-            wide[channels * padded_hidden + node] = mlp.hidden_layer()[[shape.inputs, node]];
-            rounding = rounding.max(T::EPSILON * squares.sqrt());
-        }
-        let hidden_layer = wide.iter().map(|&weight| T::of(weight)).collect();
-        let is_wide = T::EPSILON > f64::EPSILON && rounding > LARGEST_ROUNDING;
-        let ranges = network.outputs().middles_and_half_widths();
-        let varying = network.outputs().varying();
-        let mut output_layer = vec![T::ZERO; (padded_hidden + 1) * padded_outputs];
-        for (output, &target) in varying.iter().enumerate() {
-            let half_width = ranges[target].1;
-            for node in 0..shape.hidden {
-                let weight = mlp.output_layer()[[node, output]] * half_width;
-                output_layer[node * padded_outputs + output] = T::of(weight);
-            }
-            let bias = mlp.output_layer()[[shape.hidden, output]] * half_width;
-            output_layer[padded_hidden * padded_outputs + output] = T::of(bias);
-        }
-        Self {
-            quantity,
-            centre_ohm,
-            hidden_layer,
-            wide_hidden_layer: is_wide.then_some(wide),
-            output_layer,
-            middles: ranges.iter().map(|range| range.0).collect(),
-            varying,
-            padded_hidden,
-            padded_outputs,
-        }
-    }
-
-    #[inline(always)]
-    fn read<U: Real>(&self, readings_ohm: &[f64], inputs: &mut [U]) {
-        let pairs = inputs.iter_mut().zip(readings_ohm).zip(&self.centre_ohm);
-        match self.quantity {
-            Quantity::Resistance | Quantity::Raw => {
-                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre));
-            }
-            Quantity::Conductance => {
-                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(ohm - centre) / U::of(ohm));
-            }
-            Quantity::LogResistance => {
-                pairs.for_each(|((input, &ohm), &centre)| *input = U::of(((ohm - centre) / centre).ln_1p()));
-            }
         }
     }
 }
@@ -273,61 +172,15 @@ impl<T: Real> CompiledNetworks<T> {
     }
 }
 
-/// Computes `output = [input, 1] · layer`. The layer is stored row by row with its biases last; its number of columns
-/// is that of the outputs, a multiple of [`LANES`]. Blocks of columns stay in registers.
-#[inline(always)]
-fn affine<T: Real>(input: &[T], layer: &[T], output: &mut [T]) {
-    let width = output.len();
-    let mut first = 0;
-    while first < width {
-        first += match width - first {
-            16.. => block::<T, 16>(input, layer, width, first, output),
-            12.. => block::<T, 12>(input, layer, width, first, output),
-            8.. => block::<T, 8>(input, layer, width, first, output),
-            _ => block::<T, LANES>(input, layer, width, first, output),
-        };
-    }
-}
-
-/// Computes the outputs `first..first + B` and returns B. Even and odd inputs are summed separately, so that additions
-/// need not wait for each other.
-#[inline(always)]
-fn block<T: Real, const B: usize>(input: &[T], layer: &[T], width: usize, first: usize, output: &mut [T]) -> usize {
-    let weights = |row: usize| -> &[T; B] {
-        let begin = row * width + first;
-        layer[begin..begin + B].try_into().expect("B long")
-    };
-    let mut even = *weights(input.len());
-    let mut odd = [T::ZERO; B];
-    let mut pairs = input.chunks_exact(2);
-    let mut row = 0;
-    for pair in &mut pairs {
-        let (of_even, of_odd) = (weights(row), weights(row + 1));
-        for lane in 0..B {
-            even[lane] = even[lane] + pair[0] * of_even[lane];
-            odd[lane] = odd[lane] + pair[1] * of_odd[lane];
-        }
-        row += 2;
-    }
-    if let [value] = *pairs.remainder() {
-        let of_even = weights(row);
-        for lane in 0..B {
-            even[lane] = even[lane] + value * of_even[lane];
-        }
-    }
-    for lane in 0..B {
-        output[first + lane] = even[lane] + odd[lane];
-    }
-    B
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
         decoupling::decode_set,
-        network::{InputChoice, Inputs, MinMax, ScalingChoice, ScalingError, Shape, nguyen_widrow},
+        network::{
+            DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
+        },
         scene::{RowModel, Scene},
         sensor::SensorModel,
     };
