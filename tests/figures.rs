@@ -143,12 +143,15 @@ fn both_surfaces_have_one_scale_of_colours() {
     };
     let figure = |panels| SurfaceFigure {
         grid: map.grid().clone(),
+        interpolation: map.interpolation(),
         panels,
         range_mm: 4.0..=5.0,
         look: SurfaceLook::Top,
     };
     let same = figure(vec![level("Actual", 4.5), level("Decoupled", 4.5)]).draw();
     let other = figure(vec![level("Actual", 4.5), level("Decoupled", 5.0)]).draw();
+    let caption = "Between the nodes: thin-plate spline (the biharmonic spline with a plane).";
+    assert_eq!(count(&same, caption), 1);
     let [at_4_5, at_5] = [&same, &other].map(colours);
     let (colour, cells) = &at_4_5[0];
     assert!(*cells > 100 && cells % 2 == 0, "{at_4_5:?}");

@@ -47,6 +47,13 @@ impl Skin {
         })
     }
 
+    /// A dent of a tenth of the stroke on a sensor that is level otherwise.
+    fn lightly_pressed(rows: usize, per_row: usize) -> Self {
+        Self::new(rows, per_row, |x, y, _| {
+            5.0 - 0.1 * (-((x - 0.3).powi(2) + (y - 0.4).powi(2)) / 0.03).exp()
+        })
+    }
+
     fn noise(rows: usize, per_row: usize, low: f64, high: f64) -> Self {
         Self::new(rows, per_row, |_, _, n| {
             low + (high - low) * ((n as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0)
@@ -190,7 +197,11 @@ fn gallery() {
     let skins = [
         ("10x10", Skin::pressed(10, 10), 4.0..=5.0),
         ("10x10noise", Skin::noise(10, 10, 4.0, 5.0), 4.0..=5.0),
+        ("10x10light", Skin::lightly_pressed(10, 10), 4.0..=5.0),
         ("10x6", Skin::pressed(10, 6), 4.0..=5.0),
+        ("1x10", Skin::pressed(1, 10), 4.0..=5.0),
+        ("2x2level", Skin::new(2, 2, |_, _, _| 4.7), 4.0..=5.0),
+        ("2x3", Skin::pressed(2, 3), 4.0..=5.0),
         ("1x1", Skin::pressed(1, 1), 4.0..=5.0),
         ("40x40", Skin::pressed(40, 40), 4.0..=5.0),
         ("error", Skin::noise(10, 10, -0.2, 0.25), -0.25..=0.25),

@@ -31,12 +31,21 @@ impl PaperFigure {
     /// What it shows, in a sentence.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Four => "Trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above.",
+            Self::Four => {
+                "Trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
             Self::Six => {
                 "Trains 10×6_3×18 with 12 hidden nodes and shows every node: true as squares, decoupled as discs."
             }
-            Self::Seven => "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space.",
-            Self::Eight => "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above.",
+            Self::Seven => {
+                "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
+            Self::Eight => {
+                "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
         }
     }
 

@@ -76,6 +76,7 @@ fn surfaces(state: &State, run: &RunView) -> Option<SurfaceFigure> {
     let (decoupled, _) = state.frames.decoupled.as_ref()?;
     Some(SurfaceFigure {
         grid: run.test.surface.grid().clone(),
+        interpolation: run.test.surface.interpolation(),
         panels: vec![panel("Actual", &state.frames.actual), panel("Decoupled", decoupled)],
         range_mm: run.test.z_range_mm(),
         look: match state.look.mode {

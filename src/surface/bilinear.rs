@@ -1,6 +1,7 @@
 //! Bilinear interpolation on a lattice: fast, and defined for every array.
 
-/// Position of a grid line between two lattice lines: `(1 − weight) · lower + weight · upper`.
+/// Position of a grid line among two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost line the
+/// weight is below 0 or above 1.
 #[derive(Clone, Copy, Debug)]
 struct Between {
     lower: usize,
@@ -8,7 +9,7 @@ struct Between {
     weight: f64,
 }
 
-/// Bilinear weights along both axes; the surface is constant beyond the outermost nodes.
+/// Bilinear weights along both axes; beyond the outermost nodes the surface keeps its slope.
 #[derive(Clone, Debug)]
 pub(super) struct Bilinear {
     x: Vec<Between>,
@@ -54,13 +55,13 @@ fn betweens(nodes_mm: &[f64], order: &[usize], points_mm: &[f64]) -> Vec<Between
     points_mm
         .iter()
         .map(|&point_mm| {
+            let last = nodes_mm.len() - 1;
             let upper = nodes_mm
                 .partition_point(|&node_mm| node_mm < point_mm)
-                .min(nodes_mm.len() - 1);
+                .clamp(last.min(1), last);
             let lower = upper.saturating_sub(1);
-            let width_mm = nodes_mm[upper] - nodes_mm[lower];
-            let weight = if width_mm > 0.0 {
-                ((point_mm - nodes_mm[lower]) / width_mm).clamp(0.0, 1.0)
+            let weight = if upper > lower {
+                (point_mm - nodes_mm[lower]) / (nodes_mm[upper] - nodes_mm[lower])
             } else {
                 0.0
             };

@@ -30,8 +30,8 @@ pub enum SurfaceError {
         /// The empty axis.
         axis: Axis,
     },
-    /// A coordinate is NaN or infinite.
-    #[error("{axis} coordinate {index} is {value_mm} mm; every node needs a finite place")]
+    /// A coordinate is NaN, infinite, or so large that distances would overflow.
+    #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite places within ±1e300 mm")]
     NotFinite {
         /// Axis at fault.
         axis: Axis,
@@ -40,8 +40,8 @@ pub enum SurfaceError {
         /// Value found, in millimetres.
         value_mm: f64,
     },
-    /// Two coordinates coincide, where the surface would have two heights.
-    #[error("{axis} coordinates {first} and {second} coincide at {value_mm} mm; nodes need places of their own")]
+    /// Two coordinates coincide, where the surface would have two heights, or are too close to draw points between.
+    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need places of their own")]
     Duplicate {
         /// Axis at fault.
         axis: Axis,

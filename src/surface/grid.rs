@@ -71,7 +71,8 @@ pub(super) struct GridAxis {
 impl GridAxis {
     /// Divides every interval of the ascending `nodes_mm` into equal steps, for about `target` points in all.
     ///
-    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch of its own.
+    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch of its own; larger where that would be
+    /// lost in the rounding of the coordinate.
     pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
         // Very long axes are thinned: more lines than pixels would not be visible.
         let stride = nodes_mm.len().div_ceil(target.max(2));
@@ -90,7 +91,10 @@ impl GridAxis {
                 0.5 * (nodes_mm[1] - nodes_mm[0]),
                 0.5 * (nodes_mm[last] - nodes_mm[last - 1]),
             ),
-            _ => (lone_margin_mm, lone_margin_mm),
+            _ => {
+                let margin_mm = lone_margin_mm.max(1e3 * CLOSEST_RELATIVE * nodes_mm[0].abs());
+                (margin_mm, margin_mm)
+            }
         };
         let along = |from: f64, to: f64, step: usize, steps: usize| from + (to - from) * step as f64 / steps as f64;
         let (first_mm, last_mm) = (nodes_mm[0], nodes_mm[last]);
@@ -118,6 +122,13 @@ impl GridAxis {
     }
 }
 
+/// Largest coordinate of which differences and products with the number of points do not overflow.
+const LARGEST_MM: f64 = 1e300;
+
+/// Smallest distance between nodes, relative to their largest coordinate: some thousand roundings, so that the points
+/// between them can be told apart in double precision.
+const CLOSEST_RELATIVE: f64 = 1e-12;
+
 /// Coordinates in ascending order, with the index of each in the order given.
 #[derive(Clone, Debug)]
 pub(super) struct SortedAxis {
@@ -130,7 +141,8 @@ impl SortedAxis {
         if given_mm.is_empty() {
             return Err(SurfaceError::NoNodes { axis });
         }
-        if let Some(index) = given_mm.iter().position(|value| !value.is_finite()) {
+        let is_usable = |value_mm: &f64| value_mm.abs() <= LARGEST_MM;
+        if let Some(index) = given_mm.iter().position(|value_mm| !is_usable(value_mm)) {
             return Err(SurfaceError::NotFinite {
                 axis,
                 index,
@@ -140,8 +152,8 @@ impl SortedAxis {
         let mut order: Vec<usize> = (0..given_mm.len()).collect();
         order.sort_by(|&a, &b| given_mm[a].total_cmp(&given_mm[b]));
         let nodes_mm: Vec<f64> = order.iter().map(|&index| given_mm[index]).collect();
-        // Nodes closer than this could not be told apart in double precision.
-        let closest_mm = 1e-9 * nodes_mm.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let largest_mm = nodes_mm.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        let closest_mm = CLOSEST_RELATIVE * largest_mm.max(1.0 / LARGEST_MM);
         if let Some(at) = nodes_mm.windows(2).position(|pair| pair[1] - pair[0] <= closest_mm) {
             return Err(SurfaceError::Duplicate {
                 axis,

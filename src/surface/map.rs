@@ -1,13 +1,16 @@
 //! Interpolation from the values at the nodes to a surface.
 
+use std::{fmt, ops::RangeInclusive};
+
 use ndarray::Array2;
 
-use super::biharmonic;
 use super::bilinear::Bilinear;
 use super::error::{Axis, SurfaceError};
 use super::grid::{Grid, GridAxis, SortedAxis};
+use super::weights::{Point, Weights};
+use super::{natural_cubic, thin_plate};
 
-/// Largest number of nodes for the spline; beyond it, factorisation and matrix cost more than they show.
+/// Largest number of nodes for a spline; beyond it, factorisation and matrix cost more than they show.
 const MOST_SPLINE_NODES: usize = 1000;
 
 /// Largest number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
@@ -16,15 +19,27 @@ const MOST_WEIGHTS: usize = 1_100_000;
 /// Number of grid points per side, as far as [`MOST_WEIGHTS`] allows.
 const GRID_POINTS: usize = 110;
 
-/// Interpolation between the nodes.
+/// Interpolation between the nodes. Each kind reproduces constants and planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// Sandwell's biharmonic spline, `griddata(…, 'v4')`.
-    BiharmonicSpline,
-    /// Bilinear between neighbours, constant beyond the outermost nodes. Used for a single row or column of nodes, for
-    /// more than a thousand nodes, and where the spline's equations are singular (for example, two nodes e millimetres
-    /// apart).
+    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, which draws the paper's figures, has
+    /// none, so that its surfaces sag between nodes of equal height and depend on the unit of length.
+    ThinPlateSpline,
+    /// A natural cubic spline along a single row or column of nodes, constant across it; level for a single node.
+    CubicSpline,
+    /// Bilinear between neighbours, and with the same slope beyond the outermost nodes. Used for more than a thousand
+    /// nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or drown in rounding.
     Bilinear,
+}
+
+impl fmt::Display for Interpolation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::ThinPlateSpline => "thin-plate spline (the biharmonic spline with a plane)",
+            Self::CubicSpline => "natural cubic spline",
+            Self::Bilinear => "bilinear",
+        })
+    }
 }
 
 /// Interpolation through a lattice of nodes, factored once, so that each frame is one matrix-vector product.
@@ -32,8 +47,18 @@ pub enum Interpolation {
 pub struct SurfaceMap {
     grid: Grid,
     nodes: usize,
-    spline_weights: Option<Array2<f64>>,
+    spline: Option<Spline>,
     bilinear: Bilinear,
+}
+
+#[derive(Clone, Debug)]
+enum Spline {
+    /// Weights of every grid point.
+    Surface(Weights),
+    /// Weights of the grid points along x, of nodes with one y.
+    AlongX(Weights),
+    /// Weights of the grid points along y, of nodes with one x.
+    AlongY(Weights),
 }
 
 impl SurfaceMap {
@@ -46,17 +71,29 @@ impl SurfaceMap {
         let x = SortedAxis::new(Axis::X, x_mm)?;
         let y = SortedAxis::new(Axis::Y, y_mm)?;
         let nodes = x_mm.len() * y_mm.len();
-        // A polynomial-free spline sags between collinear nodes, and with one node it has no solution.
-        let spline = if x_mm.len() > 1 && y_mm.len() > 1 && nodes <= MOST_SPLINE_NODES {
-            let affordable = (MOST_WEIGHTS as f64 / nodes as f64).sqrt() as usize;
-            let grid = grid(&x, &y, affordable.min(GRID_POINTS));
-            spline_weights(x_mm, y_mm, &grid).map(|weights| (grid, weights))
-        } else {
+        let affordable = (MOST_WEIGHTS as f64 / nodes as f64).sqrt() as usize;
+        let is_line = x_mm.len() == 1 || y_mm.len() == 1;
+        let spline_grid = grid(
+            &x,
+            &y,
+            if is_line {
+                GRID_POINTS
+            } else {
+                affordable.min(GRID_POINTS)
+            },
+        );
+        let spline = if nodes > MOST_SPLINE_NODES {
             None
+        } else if x_mm.len() == 1 {
+            along(y_mm, &y, spline_grid.y_mm(), spline_grid.inside_y()).map(Spline::AlongY)
+        } else if y_mm.len() == 1 {
+            along(x_mm, &x, spline_grid.x_mm(), spline_grid.inside_x()).map(Spline::AlongX)
+        } else {
+            surface(x_mm, y_mm, &spline_grid).map(Spline::Surface)
         };
-        let (grid, spline_weights) = match spline {
-            Some((grid, weights)) => (grid, Some(weights)),
-            None => (grid(&x, &y, GRID_POINTS), None),
+        let grid = match spline {
+            Some(_) => spline_grid,
+            None => grid(&x, &y, GRID_POINTS),
         };
         let bilinear = Bilinear::new(
             (&x.nodes_mm, &x.order, grid.x_mm()),
@@ -65,7 +102,7 @@ impl SurfaceMap {
         Ok(Self {
             grid,
             nodes,
-            spline_weights,
+            spline,
             bilinear,
         })
     }
@@ -82,8 +119,9 @@ impl SurfaceMap {
 
     /// Returns the interpolation used between the nodes.
     pub fn interpolation(&self) -> Interpolation {
-        match self.spline_weights {
-            Some(_) => Interpolation::BiharmonicSpline,
+        match self.spline {
+            Some(Spline::Surface(_)) => Interpolation::ThinPlateSpline,
+            Some(Spline::AlongX(_) | Spline::AlongY(_)) => Interpolation::CubicSpline,
             None => Interpolation::Bilinear,
         }
     }
@@ -98,12 +136,25 @@ impl SurfaceMap {
     pub fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
         assert_eq!(node_values.len(), self.nodes, "one value per node");
         assert_eq!(out.len(), self.grid.len(), "one value per grid point");
-        match &self.spline_weights {
-            // A missing value would spread over the whole spline.
-            Some(weights) if node_values.iter().all(|value| value.is_finite()) => {
-                biharmonic::evaluate_into(weights, node_values, out);
+        // A missing value would spread over the whole spline.
+        let spline = self
+            .spline
+            .as_ref()
+            .filter(|_| node_values.iter().all(|value| value.is_finite()));
+        let across = self.grid.y_mm().len();
+        match spline {
+            Some(Spline::Surface(weights)) => weights.evaluate_into(node_values, out),
+            Some(Spline::AlongX(weights)) => {
+                let curve = weights.evaluate(node_values);
+                let lines = out.chunks_exact_mut(across).zip(curve);
+                lines.for_each(|(line, value)| line.fill(value));
             }
-            _ => self.bilinear.evaluate_into(node_values, out),
+            Some(Spline::AlongY(weights)) => {
+                let curve = weights.evaluate(node_values);
+                out.chunks_exact_mut(across)
+                    .for_each(|line| line.copy_from_slice(&curve));
+            }
+            None => self.bilinear.evaluate_into(node_values, out),
         }
     }
 
@@ -127,11 +178,38 @@ fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
     )
 }
 
-fn spline_weights(x_mm: &[f64], y_mm: &[f64], grid: &Grid) -> Option<Array2<f64>> {
-    let nodes_mm: Vec<_> = x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| (x, y))).collect();
-    let points_mm: Vec<_> = (0..grid.x_mm().len())
-        .flat_map(|ix| (0..grid.y_mm().len()).map(move |iy| (ix, iy)))
-        .map(|(ix, iy)| ((grid.x_mm()[ix], grid.y_mm()[iy]), grid.is_inside(ix, iy)))
-        .collect();
-    biharmonic::weights(&nodes_mm, &points_mm)
+/// The spline through the nodes on one line, at the grid points along it.
+fn along(nodes_mm: &[f64], sorted: &SortedAxis, points_mm: &[f64], inside: RangeInclusive<usize>) -> Option<Weights> {
+    let of_sorted = natural_cubic::weights(&sorted.nodes_mm, points_mm);
+    let mut weights = Array2::zeros(of_sorted.dim());
+    for (column, &node) in of_sorted.columns().into_iter().zip(&sorted.order) {
+        weights.column_mut(node).assign(&column);
+    }
+    let points = points_mm.iter().enumerate().map(|(index, &point_mm)| Point {
+        is_inside: inside.contains(&index),
+        node: node_at(nodes_mm, point_mm),
+    });
+    Weights::checked(weights, points)
+}
+
+/// The spline through the nodes of the lattice, at every grid point.
+fn surface(x_mm: &[f64], y_mm: &[f64], grid: &Grid) -> Option<Weights> {
+    let places = |x_mm: &[f64], y_mm: &[f64]| -> Vec<_> {
+        let lines = x_mm.iter().map(|&x| y_mm.iter().map(move |&y| (x, y)));
+        lines.flatten().collect()
+    };
+    let weights = thin_plate::weights(&places(x_mm, y_mm), &places(grid.x_mm(), grid.y_mm()))?;
+    let points = (0..grid.x_mm().len()).flat_map(|ix| (0..grid.y_mm().len()).map(move |iy| (ix, iy)));
+    let points = points.map(|(ix, iy)| {
+        let (row, node) = (node_at(x_mm, grid.x_mm()[ix]), node_at(y_mm, grid.y_mm()[iy]));
+        Point {
+            is_inside: grid.is_inside(ix, iy),
+            node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
+        }
+    });
+    Weights::checked(weights, points)
+}
+
+fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
+    nodes_mm.iter().position(|&node_mm| node_mm == point_mm)
 }

@@ -1,14 +1,17 @@
 //! Smooth surfaces through the nodes of an array.
 //!
 //! The positions of the nodes in (x, y) are fixed, so the interpolation is factored once per array and each frame is
-//! one matrix-vector product. A [`SurfaceMap`] evaluates it on a [`Grid`]: as a biharmonic spline where that exists,
-//! bilinearly elsewhere.
+//! one matrix-vector product. A [`SurfaceMap`] evaluates it on a [`Grid`]: as a thin-plate spline, as a curve where the
+//! nodes are on one line, bilinearly where neither is feasible. All of them reproduce constants and planes, and none
+//! depends on the unit of length or the origin.
 
-mod biharmonic;
 mod bilinear;
 mod error;
 mod grid;
 mod map;
+mod natural_cubic;
+mod thin_plate;
+mod weights;
 
 pub use error::{Axis, SurfaceError};
 pub use grid::Grid;

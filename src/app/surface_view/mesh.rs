@@ -81,7 +81,7 @@ impl Surface<'_> {
             far_to_near(self.grid.x_mm(), eye_mm.x),
             far_to_near(self.grid.y_mm(), eye_mm.y),
         );
-        let levels = multiples(self.range, step_for(self.range, CONTOUR_LEVELS));
+        let levels = contour_levels(self.range);
         let mut previous = None;
         for &ix in &columns {
             for &iy in &rows {
@@ -207,6 +207,14 @@ impl Surface<'_> {
     }
 }
 
+/// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
+/// micrometre would draw lines all over it.
+fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
+    let step = step_for(range, CONTOUR_LEVELS);
+    let is_within = |level: &f64| level - range.start() > 1e-3 * step && range.end() - level > 1e-3 * step;
+    multiples(range, step).into_iter().filter(is_within).collect()
+}
+
 /// Lambert's law, with a light that follows the viewer: from above, over the left shoulder.
 struct Shade<'a> {
     units: &'a [Vec3],
@@ -257,7 +265,28 @@ fn contrast(colour: Color32) -> Color32 {
 
 #[cfg(test)]
 mod tests {
-    use super::far_to_near;
+    use super::{contour_levels, far_to_near};
+
+    #[test]
+    fn contour_lines_lie_between_the_ends_of_the_range() {
+        let near = |levels: Vec<f64>, expected: &[f64]| {
+            assert_eq!(levels.len(), expected.len(), "{levels:?}");
+            let pairs = levels.iter().zip(expected);
+            pairs.for_each(|(level, expected)| assert!((level - expected).abs() < 1e-12, "{levels:?}"));
+        };
+        near(
+            contour_levels(&(4.0..=5.0)),
+            &[4.1, 4.2, 4.3, 4.4, 4.5, 4.6, 4.7, 4.8, 4.9],
+        );
+        near(
+            contour_levels(&(-0.25..=0.25)),
+            &[-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2],
+        );
+        near(
+            contour_levels(&(3.95..=4.05)),
+            &[3.96, 3.97, 3.98, 3.99, 4.0, 4.01, 4.02, 4.03, 4.04],
+        );
+    }
 
     #[test]
     fn cells_are_drawn_towards_the_eye() {

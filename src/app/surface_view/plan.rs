@@ -42,9 +42,9 @@ impl PlanAxes {
             card.min + vec2(left, line + 2.0 * GAP),
             card.max - vec2(12.0, TICK + 3.0 * GAP + 2.0 * line),
         );
-        let points_per_mm = (f64::from(free.width()) / size_mm.x)
-            .min(f64::from(free.height()) / size_mm.y)
-            .max(1e-6);
+        // A card too small for its labels still shows a point.
+        let points_per_mm =
+            (f64::from(free.width().max(1.0)) / size_mm.x).min(f64::from(free.height().max(1.0)) / size_mm.y);
         let frame = Rect::from_center_size(
             free.center(),
             vec2((size_mm.x * points_per_mm) as f32, (size_mm.y * points_per_mm) as f32),

@@ -1,9 +1,9 @@
 use std::ops::RangeInclusive;
 
 use super::{
-    canvas::{Area, Canvas, Stroke},
+    canvas::{Anchor, Area, Canvas, Stroke},
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
-    colours::{INK, MISSING, viridis},
+    colours::{DIM, INK, MISSING, viridis},
     frame::Frame,
     picture::Picture,
     plot::Plot,
@@ -11,7 +11,7 @@ use super::{
     relief::Relief,
     surface_panel::SurfacePanel,
 };
-use crate::surface::Grid;
+use crate::surface::{Grid, Interpolation};
 
 /// View of the surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +28,8 @@ pub enum SurfaceLook {
 pub struct SurfaceFigure {
     /// Grid of the values.
     pub grid: Grid,
+    /// Interpolation that gave the values, named below the surfaces.
+    pub interpolation: Interpolation,
     /// The surfaces from left to right.
     pub panels: Vec<SurfacePanel>,
     /// Heights at the ends of the scale, in millimetres.
@@ -38,12 +40,14 @@ pub struct SurfaceFigure {
 
 impl SurfaceFigure {
     const HEIGHT: f64 = 240.0;
+    /// Room below for the caption.
+    const CAPTION: f64 = 14.0;
     /// Maximum number of cells per side: more would only make the file larger.
     const MOST_CELLS: usize = 64;
 
     /// Draws the figure, as wide as a page.
     pub fn draw(&self) -> Picture {
-        let mut canvas = Canvas::new(Plot::WIDE_PT, Self::HEIGHT);
+        let mut canvas = Canvas::new(Plot::WIDE_PT, Self::HEIGHT + Self::CAPTION);
         let width = (Plot::WIDE_PT - COLOUR_BAR_WIDTH - 8.0) / self.panels.len().max(1) as f64;
         let points = [
             thinned(self.grid.inside_x(), Self::MOST_CELLS),
@@ -70,6 +74,9 @@ impl SurfaceFigure {
         let left = Plot::WIDE_PT - COLOUR_BAR_WIDTH;
         let axis = PlotAxis::linear("z (mm)");
         draw_colour_bar(&mut canvas, left, 28.0, Self::HEIGHT - 64.0, &axis, &self.range_mm);
+        let caption = format!("Between the nodes: {}.", self.interpolation);
+        let place = [12.0, Self::HEIGHT + 0.4 * Self::CAPTION];
+        canvas.text(place, Anchor::Start, DIM, &caption);
         canvas.finish()
     }
 
