@@ -31,7 +31,7 @@ pub enum SurfaceError {
         axis: Axis,
     },
     /// A coordinate is NaN or infinite.
-    #[error("{axis} coordinate {index} is {value_mm} mm; every node needs a finite place")]
+    #[error("{axis} coordinate {index} is {value_mm:?} mm; every node needs a finite place")]
     NotFinite {
         /// Axis at fault.
         axis: Axis,
@@ -41,7 +41,7 @@ pub enum SurfaceError {
         value_mm: f64,
     },
     /// Two coordinates coincide, where the surface would have two heights.
-    #[error("{axis} coordinates {first} and {second} coincide at {value_mm} mm; nodes need places of their own")]
+    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need places of their own")]
     Duplicate {
         /// Axis at fault.
         axis: Axis,
