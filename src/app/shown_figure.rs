@@ -102,15 +102,15 @@ fn chart(state: &State, run: &RunView, result: &RunResult) -> Option<Plot> {
     })
 }
 
-/// A quantity of each epoch.
-type OfEpoch = fn(&EpochRecord) -> Option<f64>;
+/// A quantity of each epoch, given the largest that is drawn.
+type OfEpoch = fn(&EpochRecord, f64) -> Option<f64>;
 
-fn curve(name: &str, hue: Hue, history: &[EpochRecord], of: OfEpoch) -> Option<Series> {
+fn curve(name: &str, hue: Hue, history: &[EpochRecord], highest: f64, of: OfEpoch) -> Option<Series> {
     let points = charts::thinned(history).filter_map(|epoch| {
         let bar = None;
         Some(PlotPoint {
             x: epoch.epoch as f64,
-            y: of(&epoch)?,
+            y: of(&epoch, highest)?,
             bar,
         })
     });
@@ -135,17 +135,22 @@ fn line(name: &str, hue: Hue, points: Vec<[f64; 2]>) -> Series {
 
 fn loss(run: &RunView, result: &RunResult) -> Plot {
     let curves: [(&str, Hue, OfEpoch); 3] = [
-        ("training", Hue::Blue, |epoch| Some(epoch.training_mse)),
-        ("validation", Hue::Green, |epoch| epoch.validation_mse),
-        ("test", Hue::Orange, |epoch| epoch.test_mse),
+        ("training", Hue::Blue, |epoch, highest| {
+            Some(epoch.training_mse.min(highest))
+        }),
+        ("validation", Hue::Green, |epoch, highest| {
+            Some(epoch.validation_mse?.min(highest))
+        }),
+        ("test", Hue::Orange, |epoch, highest| Some(epoch.test_mse?.min(highest))),
     ];
     let best = result.best_epoch as f64;
+    let highest = charts::highest_mse(&run.history);
     let curves = curves.into_iter();
     Plot {
         x: PlotAxis::linear("epoch"),
         y: PlotAxis::logarithmic("mean squared error (scaled)"),
         series: curves
-            .filter_map(|(name, hue, of)| curve(name, hue, &run.history, of))
+            .filter_map(|(name, hue, of)| curve(name, hue, &run.history, highest, of))
             .collect(),
         spans: vec![Span {
             name: "best weights".to_owned(),
@@ -159,15 +164,20 @@ fn loss(run: &RunView, result: &RunResult) -> Plot {
 fn training_state(run: &RunView) -> Plot {
     let name = charts::parameter_name(&run.stages);
     let curves: [(&str, Hue, OfEpoch); 2] = [
-        ("gradient", Hue::Blue, |epoch| Some(epoch.gradient_norm)),
-        (name, Hue::Orange, |epoch| Some(epoch.parameter)),
+        ("gradient", Hue::Blue, |epoch, highest| {
+            Some(epoch.gradient_norm.min(highest))
+        }),
+        (name, Hue::Orange, |epoch, _| {
+            Some(charts::drawn_parameter(epoch.parameter))
+        }),
     ];
+    let highest = charts::highest_gradient(&run.history);
     let curves = curves.into_iter();
     Plot {
         x: PlotAxis::linear("epoch"),
         y: PlotAxis::logarithmic(format!("gradient, {name}")),
         series: curves
-            .filter_map(|(name, hue, of)| curve(name, hue, &run.history, of))
+            .filter_map(|(name, hue, of)| curve(name, hue, &run.history, highest, of))
             .collect(),
         spans: Vec::new(),
         width_pt: Plot::WIDTH_PT,

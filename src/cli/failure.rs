@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::interruption;
 use crate::{
-    dataset::{ReadError, SimulationError},
+    dataset::{ReadError, SimulationError, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
     scene::Rows,
@@ -43,15 +43,15 @@ pub(super) enum Failure {
     InterruptedTrials { done: usize, trials: usize },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
-    #[error("cannot make the folder '{}': {source}", .path.display())]
+    #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error(transparent)]
     Picture(#[from] PictureError),
-    #[error("cannot write to standard output: {0}")]
+    #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
-    #[error("cannot open '{}': {source}", .path.display())]
+    #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
@@ -107,6 +107,8 @@ impl Failure {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) => 2,
+            Self::Run(error) if comes_of_arguments(error) => 2,
+            Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_) | Self::InterruptedTrials { .. } | Self::InterruptedTrade { .. } => {
                 interruption::STATUS
             }
@@ -123,4 +125,17 @@ impl Failure {
             _ => false,
         }
     }
+}
+
+/// Returns true for arguments that are each possible, but not together: other arguments are the cure.
+fn comes_of_arguments(error: &RunError) -> bool {
+    matches!(
+        error,
+        RunError::Count(_)
+            | RunError::TooManySamples { .. }
+            | RunError::Scene(_)
+            | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
+            | RunError::Training(_)
+            | RunError::TooManyTrainings { .. }
+    )
 }

@@ -97,6 +97,10 @@ impl Simulate {
         let networks = if kind.needs_network() {
             let mut run = Run::prepare(*settings)?;
             while run.step().is_none() {}
+            let errors = run.node_scores().map(|scores| scores.network);
+            if let Some(flaw) = errors.and_then(|errors| run.flaw(&errors)) {
+                eprintln!("Warning: {flaw}");
+            }
             Some(run.network())
         } else {
             None

@@ -72,10 +72,11 @@ impl Train {
         } else {
             Vec::new()
         };
+        let flaw = run.flaw(&file.errors);
         if self.json {
-            print_json(&file, &decoders)?;
+            print_json(&file, flaw.as_ref(), &decoders)?;
         } else {
-            print_text(&file, &decoders)?;
+            print_text(&file, flaw.as_ref(), &decoders)?;
         }
         end
     }

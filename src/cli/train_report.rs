@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
-        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, SimulatedSettings, StartRecord, best_start,
-        error_rows,
+        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, RunFlaw, SimulatedSettings, StartRecord,
+        best_start, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -85,7 +85,11 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 }
 
 /// Prints one JSON object.
-pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Result<(), Failure> {
+pub(super) fn print_json(
+    file: &NetworkFile,
+    flaw: Option<&RunFlaw>,
+    decoders: &[DecoderReport],
+) -> Result<(), Failure> {
     let (settings, training) = (&file.settings, &file.training);
     let best = training.history.get(training.best_epoch);
     let size = settings.source.model_size().map_err(RunError::from)?;
@@ -127,7 +131,10 @@ pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
         networks: size.networks,
         weights: file.network.weights(),
         condition: condition(outlook.as_ref()),
-        warnings: warnings(outlook.as_ref()),
+        warnings: warnings(outlook.as_ref())
+            .into_iter()
+            .chain(flaw.map(ToString::to_string))
+            .collect(),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -163,11 +170,20 @@ fn warnings(outlook: Option<&Outlook>) -> Vec<String> {
 }
 
 /// Prints what was trained, why it ended, and the error table.
-pub(super) fn print_text(file: &NetworkFile, decoders: &[DecoderReport]) -> Result<(), Failure> {
-    write_text(file, decoders, &mut stdout().lock()).map_err(Failure::Output)
+pub(super) fn print_text(
+    file: &NetworkFile,
+    flaw: Option<&RunFlaw>,
+    decoders: &[DecoderReport],
+) -> Result<(), Failure> {
+    write_text(file, flaw, decoders, &mut stdout().lock()).map_err(Failure::Output)
 }
 
-fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Write) -> io::Result<()> {
+fn write_text(
+    file: &NetworkFile,
+    flaw: Option<&RunFlaw>,
+    decoders: &[DecoderReport],
+    out: &mut impl Write,
+) -> io::Result<()> {
     let (settings, training) = (&file.settings, &file.training);
     let scale = settings.source.sensor.scale;
     let first = training.stages.first();
@@ -201,7 +217,11 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
         time(training.seconds),
         time(epoch_seconds(training))
     )?;
-    writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
+    writeln!(out, "Weights kept from epoch {}", training.best_epoch)?;
+    if let Some(flaw) = flaw {
+        writeln!(out, "Warning: {flaw}")?;
+    }
+    writeln!(out)?;
     if training.starts.len() > 1 {
         write_starts(&training.starts, out)?;
         writeln!(out)?;

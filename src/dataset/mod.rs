@@ -13,6 +13,7 @@ mod samples;
 mod seed;
 mod simulation;
 mod split;
+mod system_error;
 
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError};
@@ -22,3 +23,4 @@ pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::SimulationError;
 pub use split::{Split, hold_out};
+pub(crate) use system_error::system_cause;

@@ -4,6 +4,8 @@ use csv::{ByteRecord, ReaderBuilder};
 use ndarray::Array2;
 use thiserror::Error;
 
+use super::system_cause;
+
 /// Reads resistances from CSV block by block, so that large files need little memory.
 ///
 /// The file has columns named `r_1` to `r_M4`, in any order and among others, or M4 columns without names.
@@ -91,7 +93,7 @@ pub enum ReadError {
     #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
     LineBreak(u64),
     /// The file could not be read.
-    #[error(transparent)]
+    #[error("{}", system_cause(.0))]
     Io(#[from] io::Error),
 }
 

@@ -49,7 +49,7 @@ pub trait Decoder: Send {
 
 /// Error for a reading that cannot be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("row {}, reading {}: {value} cannot be decoded; give a finite number, above 0 for a resistance", .row_index + 1, .channel + 1)]
+#[error("row {}, reading {}: {value:?} cannot be decoded; give a finite number, above 0 for a resistance", .row_index + 1, .channel + 1)]
 pub struct DecodeError {
     /// Index of the row in its frame or set, from 0.
     pub row_index: usize,

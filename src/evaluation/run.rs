@@ -4,7 +4,8 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, RunError, RunSettings, SimulatedSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
+    Baselines, Errors, RunError, RunFlaw, RunSettings, SimulatedSettings, StartRecord, StartTrainer, TargetErrors,
+    TargetRow,
     baselines::fit_baselines,
     reference_errors,
     sets::check_sets,
@@ -193,6 +194,12 @@ impl Run {
             return Some(StopReason::Stopped);
         }
         self.leader().stop_reason()
+    }
+
+    /// Finds the defect of the leader, once its trainings have ended, given [`Self::errors_of`] its answers; `None` for a
+    /// sound or a measured run.
+    pub fn flaw(&self, network: &Errors) -> Option<RunFlaw> {
+        RunFlaw::of(self.leader(), network, &self.baselines.as_ref()?.mean)
     }
 
     /// Continues every restart from its present weights with another method: [`Trainer::continue_with`].

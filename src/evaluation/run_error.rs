@@ -17,6 +17,23 @@ pub enum RunError {
     /// A number is out of range.
     #[error(transparent)]
     Count(#[from] CountError),
+    /// More samples than a run can hold.
+    #[error(
+        "{training} training and {validation} validation samples, drawn together as whole snapshots of {rows} rows, are \
+         {total}: the limit is {most}; give fewer of either"
+    )]
+    TooManySamples {
+        /// Training samples given.
+        training: usize,
+        /// Validation samples given.
+        validation: usize,
+        /// Row-wires of a snapshot.
+        rows: usize,
+        /// Samples of the whole snapshots.
+        total: usize,
+        /// Largest number possible.
+        most: usize,
+    },
     /// The sensor is invalid.
     #[error(transparent)]
     Sensor(#[from] SensorError),

@@ -1,6 +1,6 @@
 use super::{RunError, SimulatedSettings, Simulation};
 use crate::{
-    dataset::{Dataset, Split, Stream, hold_out},
+    dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
     training::TrainingError,
 };
 
@@ -12,10 +12,25 @@ impl SimulatedSettings {
     pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
         self.check_counts()?;
         self.training.check().map_err(TrainingError::from)?;
-        let test = self.draw_test()?;
+        let Simulation {
+            samples: training,
+            validation_samples: validation,
+            ..
+        } = self.source;
         let rows = self.source.model_size()?.rows;
-        let held_out = self.source.validation_samples.div_ceil(rows);
-        let drawn = self.draw_training((self.source.samples.div_ceil(rows) + held_out) * rows)?;
+        let held_out = validation.div_ceil(rows);
+        let total = (training.div_ceil(rows) + held_out) * rows;
+        if total > LARGEST_SAMPLES {
+            return Err(RunError::TooManySamples {
+                training,
+                validation,
+                rows,
+                total,
+                most: LARGEST_SAMPLES,
+            });
+        }
+        let test = self.draw_test()?;
+        let drawn = self.draw_training(total)?;
         Ok((hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split)), test))
     }
 

@@ -7,6 +7,7 @@ use std::{
 use thiserror::Error;
 
 use super::unfinished::Unfinished;
+use crate::dataset::system_cause;
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]
@@ -27,7 +28,7 @@ pub enum WriteError {
     #[error("cannot write '{}': it is read-only; give another name", .0.display())]
     ReadOnly(PathBuf),
     /// The operating system refuses.
-    #[error("cannot write '{}': {source}", .path.display())]
+    #[error("cannot write '{}': {}", .path.display(), system_cause(.source))]
     Io {
         /// The file.
         path: PathBuf,

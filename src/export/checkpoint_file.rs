@@ -14,6 +14,7 @@ use super::{
     soundness::settings_flaw,
 };
 use crate::{
+    dataset::system_cause,
     evaluation::{Run, RunError, SimulatedSettings},
     training::TrainerState,
 };
@@ -44,7 +45,7 @@ pub struct CheckpointFile {
 #[non_exhaustive]
 pub enum CheckpointFileError {
     /// The operating system refuses to read it.
-    #[error("cannot read '{}': {source}", .path.display())]
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
     Read {
         /// The file.
         path: PathBuf,

@@ -13,6 +13,7 @@ use super::{
     soundness::flaw,
 };
 use crate::{
+    dataset::system_cause,
     evaluation::{Baselines, Errors, Run, SimulatedSettings, StartRecord},
     network::Networks,
     training::{EpochRecord, History, Stage, StopReason},
@@ -65,7 +66,7 @@ pub struct TrainingRecord {
 #[non_exhaustive]
 pub enum NetworkFileError {
     /// The operating system refuses to read it.
-    #[error("cannot read '{}': {source}", .path.display())]
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
     Read {
         /// The file.
         path: PathBuf,

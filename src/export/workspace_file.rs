@@ -15,6 +15,7 @@ use super::{
     heading::{Heading, NoHeading},
     network_file::PROGRAM,
 };
+use crate::dataset::system_cause;
 
 const FORMAT: &str = "decoupler workspace";
 const VERSION: u64 = 1;
@@ -53,7 +54,7 @@ pub struct FoundWorkspace {
 #[non_exhaustive]
 pub enum WorkspaceError {
     /// The operating system refuses to read it.
-    #[error("cannot read the run list '{}': {source}; runs of this session are not kept", .path.display())]
+    #[error("cannot read the run list '{}': {}; runs of this session are not kept", .path.display(), system_cause(.source))]
     Read {
         /// The file.
         path: PathBuf,
@@ -69,7 +70,7 @@ pub enum WorkspaceError {
         program: String,
     },
     /// The file is damaged, and cannot be copied.
-    #[error("the run list '{}' is damaged ({flaw}) and cannot be put aside: {source}; runs of this session are not kept", .path.display())]
+    #[error("the run list '{}' is damaged ({flaw}) and cannot be put aside: {}; runs of this session are not kept", .path.display(), system_cause(.source))]
     Aside {
         /// The file.
         path: PathBuf,

@@ -22,7 +22,7 @@ pub enum ScalingError {
     #[error("there are no samples to scale")]
     Empty,
     /// A value is NaN or infinite.
-    #[error("sample {}, channel {}: {value} is not a finite number", .sample + 1, .channel + 1)]
+    #[error("sample {}, channel {}: {value:?} is not a finite number", .sample + 1, .channel + 1)]
     NotFinite {
         /// Index of the sample, from 0.
         sample: usize,
@@ -32,7 +32,7 @@ pub enum ScalingError {
         value: f64,
     },
     /// A reading is outside the domain of the chosen input quantity.
-    #[error("sample {}, channel {}: {value} is not a resistance; give finite numbers above 0, or take readings as they are", .sample + 1, .channel + 1)]
+    #[error("sample {}, channel {}: {value:?} is not a resistance; give finite numbers above 0, or take readings as they are", .sample + 1, .channel + 1)]
     Reading {
         /// Index of the sample, from 0.
         sample: usize,
@@ -42,7 +42,7 @@ pub enum ScalingError {
         value: f64,
     },
     /// The range of a channel overflows.
-    #[error("channel {} ranges from {minimum} to {maximum}: too wide to scale; give it in larger units", .channel + 1)]
+    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; give it in larger units", .channel + 1)]
     Range {
         /// Index of the channel, from 0.
         channel: usize,

@@ -29,11 +29,11 @@ pub enum SensorError {
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// g is not a positive number.
-    #[error("the resistance per millimetre is {0}: it must be above 0 and finite")]
+    #[error("the resistance per millimetre is {0:?}: it must be above 0 and finite")]
     Resistivity(f64),
     /// A resistance came out as zero, infinite or NaN.
     #[error(
-        "row {}, column {}: the resistance is {resistance_ohm} ohm; a node touches a column-wire or a length is out of range",
+        "row {}, column {}: the resistance is {resistance_ohm:?} ohm; a node touches a column-wire or a length is out of range",
         row + 1,
         column + 1
     )]

@@ -6,6 +6,7 @@ use super::{
     Evaluation, Examples, Setting, StopReason,
     algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
+    setting::LARGEST_MOMENTUM,
 };
 use crate::network::Mlp;
 
@@ -51,9 +52,9 @@ impl AdaptiveDescentSettings {
             },
             Setting {
                 name: "momentum",
-                meaning: "Share of the previous step in each step, from 0 to 1.",
+                meaning: "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
                 default: default.momentum,
-                range: 0.0..=1.0,
+                range: 0.0..=LARGEST_MOMENTUM,
                 value: &mut self.momentum,
             },
             Setting {
@@ -129,6 +130,7 @@ impl Algorithm for AdaptiveDescent {
         name: "Adaptive rate with momentum",
         summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
         parameter_name: "learning rate",
+        cure: "lower the learning rate, run more epochs, or take another seed",
     };
 
     fn list(settings: &mut AdaptiveDescentSettings) -> Vec<Setting<'_>> {

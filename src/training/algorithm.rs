@@ -1,6 +1,6 @@
 //! The interface of a training method: each method's file implements it, and [`super::Method`] lists the methods.
 
-use super::{Evaluation, Examples, Setting, StopReason};
+use super::{Evaluation, Examples, Setting, SettingError, StopReason};
 use crate::network::{Mlp, Shape};
 
 /// A training method at work on one network.
@@ -20,6 +20,14 @@ pub(super) trait Algorithm: Sized + Send + Sync {
 
     /// The settings, to be shown and changed.
     fn list(settings: &mut Self::Settings) -> Vec<Setting<'_>>;
+
+    /// Checks settings against each other, each being in its own range.
+    ///
+    /// # Errors
+    /// Two settings that contradict each other.
+    fn check(_settings: &Self::Settings) -> Result<(), SettingError> {
+        Ok(())
+    }
 
     /// About how many bytes the method's equations take for a network of this shape and so many samples.
     fn equations_bytes(_shape: Shape, _samples: usize) -> usize {
@@ -59,6 +67,8 @@ pub(super) struct Description {
     pub(super) summary: &'static str,
     /// Name of [`Algorithm::parameter`].
     pub(super) parameter_name: &'static str,
+    /// What to try where the training diverged or did not lower the error; it completes "to mend it, …".
+    pub(super) cure: &'static str,
 }
 
 /// State of a method, as read from a file.

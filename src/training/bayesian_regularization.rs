@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Damping, Evaluation, Examples, FactoredEquations, Setting, StopReason,
+    Damping, Evaluation, Examples, FactoredEquations, Setting, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
@@ -91,6 +91,7 @@ impl Algorithm for BayesianRegularization {
         summary: "Levenberg-Marquardt that keeps weights small, weighing them against the error by what the data can \
                   determine: for few or noisy samples.",
         parameter_name: "mu",
+        cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
     fn default_settings() -> Damping {
@@ -102,6 +103,10 @@ impl Algorithm for BayesianRegularization {
 
     fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
         settings.list(Self::default_settings())
+    }
+
+    fn check(settings: &Damping) -> Result<(), SettingError> {
+        settings.check()
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {

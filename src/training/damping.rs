@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Setting, StopReason};
+use super::{Setting, SettingError, StopReason, setting::check_limit};
 
 /// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,6 +65,11 @@ impl Damping {
                 value: &mut self.mu_max,
             },
         ]
+    }
+
+    /// Checks that there is a damping to try.
+    pub(super) fn check(&self) -> Result<(), SettingError> {
+        check_limit(("mu", self.mu), ("largest mu", self.mu_max))
     }
 
     /// Tries steps with growing damping until one is accepted; `mu` is then decreased for the next epoch.

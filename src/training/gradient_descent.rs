@@ -52,6 +52,7 @@ impl Algorithm for GradientDescent {
         name: "Gradient descent",
         summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
         parameter_name: "learning rate",
+        cure: "change the learning rate, run more epochs, or take another method",
     };
 
     fn list(settings: &mut GradientDescentSettings) -> Vec<Setting<'_>> {

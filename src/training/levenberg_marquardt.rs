@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Damping, Evaluation, Examples, NormalEquations, Setting, StopReason,
+    Damping, Evaluation, Examples, NormalEquations, Setting, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
@@ -40,10 +40,15 @@ impl Algorithm for LevenbergMarquardt {
         name: "Levenberg-Marquardt",
         summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the least time.",
         parameter_name: "mu",
+        cure: "take another seed, more samples, or fewer hidden nodes",
     };
 
     fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
         settings.list(Self::default_settings())
+    }
+
+    fn check(settings: &Damping) -> Result<(), SettingError> {
+        settings.check()
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {

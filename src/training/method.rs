@@ -18,6 +18,7 @@ use super::{
     momentum::Momentum,
     resilient::{Resilient, ResilientState},
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
+    setting::short,
     step_momentum::StepMomentum,
     variable_projection::{ProjectionState, VariableProjection},
 };
@@ -51,6 +52,12 @@ macro_rules! methods {
             /// Every method with its defaults, in the order offered.
             pub fn all() -> [Self; [$(stringify!($name)),*].len()] {
                 [$(Self::$name($name::default_settings())),*]
+            }
+
+            fn check_together(&self) -> Result<(), SettingError> {
+                match self {
+                    $(Self::$name(settings) => $name::check(settings),)*
+                }
             }
 
             fn words(&self) -> Description {
@@ -192,13 +199,40 @@ impl Method {
         self.words().parameter_name
     }
 
-    /// Checks the ranges of the settings.
+    /// Checks the ranges of the settings, and settings against each other.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// The first setting out of range, or two that contradict each other.
     pub fn check(&self) -> Result<(), SettingError> {
         let mut copy = *self;
-        copy.settings().iter().try_for_each(Setting::check)
+        copy.settings().iter().try_for_each(Setting::check)?;
+        self.check_together()
+    }
+
+    /// Says what to change where a training of this method diverged or did not lower the error: the settings that are not
+    /// the default ones, or where all are, what else may help.
+    pub fn cure(&self) -> String {
+        let mut copy = *self;
+        let changed = copy
+            .settings()
+            .into_iter()
+            .filter(|setting| *setting.value != setting.default);
+        let changed: Vec<String> = changed
+            .map(|setting| {
+                let Setting {
+                    name, default, value, ..
+                } = setting;
+                format!("{name} {} (now {})", short(default), short(*value))
+            })
+            .collect();
+        if changed.is_empty() {
+            return self.words().cure.to_owned();
+        }
+        format!(
+            "set back to its default: {}; or {}",
+            changed.join(", "),
+            self.words().cure
+        )
     }
 
     /// Resumes the method where an interrupted training left it; `None` if `state` is that of another method.

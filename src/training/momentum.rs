@@ -69,6 +69,7 @@ impl Algorithm for Momentum {
         name: "Momentum, Eq. (11)",
         summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
         parameter_name: "learning rate",
+        cure: "change the learning rate, run more epochs, or take another method",
     };
 
     fn list(settings: &mut MomentumSettings) -> Vec<Setting<'_>> {

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, Setting, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
+    setting::check_limit,
 };
 use crate::network::Mlp;
 
@@ -103,10 +104,18 @@ impl Algorithm for Resilient {
         name: "Resilient back-propagation",
         summary: "Each weight keeps a step length of its own and follows only the sign of its slope.",
         parameter_name: "mean step length",
+        cure: "lower the first and the largest step length, or take another seed",
     };
 
     fn list(settings: &mut ResilientSettings) -> Vec<Setting<'_>> {
         settings.list()
+    }
+
+    fn check(settings: &ResilientSettings) -> Result<(), SettingError> {
+        check_limit(
+            ("first step length", settings.first_length),
+            ("largest step length", settings.largest_length),
+        )
     }
 
     fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -118,7 +127,7 @@ impl Algorithm for Resilient {
             backpropagation,
             state: ResilientState {
                 previous_gradient: vec![0.0; weights],
-                lengths: vec![settings.first_length.min(settings.largest_length); weights],
+                lengths: vec![settings.first_length; weights],
             },
         };
         (method, evaluation)

@@ -133,6 +133,7 @@ impl Algorithm for ScaledConjugateGradient {
         name: "Scaled conjugate gradient",
         summary: "Conjugate directions with the step length from the curvature: little memory, for very large networks.",
         parameter_name: "lambda",
+        cure: "take another seed, or Levenberg-Marquardt (lm)",
     };
 
     fn list(settings: &mut ScaledConjugateGradientSettings) -> Vec<Setting<'_>> {

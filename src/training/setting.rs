@@ -19,16 +19,35 @@ pub struct Setting<'a> {
     pub value: &'a mut f64,
 }
 
-/// A setting out of its range.
+/// A setting with which no training can work.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("{name} is {value:?}: it must be from {:?} to {:?}", .range.start(), .range.end())]
-pub struct SettingError {
-    /// Name of the setting.
-    pub name: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// Allowed values.
-    pub range: RangeInclusive<f64>,
+#[non_exhaustive]
+pub enum SettingError {
+    /// A setting is out of its range.
+    #[error("{name} is {}: it must be from {} to {}", short(*.value), short(*.range.start()), short(*.range.end()))]
+    Range {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Allowed values.
+        range: RangeInclusive<f64>,
+    },
+    /// A first value is above the largest that the method may reach.
+    #[error(
+        "{name} is {}, above {limit_name}, which is {}: lower {name}, or raise {limit_name}",
+        short(*.value), short(*.limit)
+    )]
+    AboveLimit {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Name of the setting that limits it.
+        limit_name: &'static str,
+        /// Value of the limit.
+        limit: f64,
+    },
 }
 
 impl Setting<'_> {
@@ -40,10 +59,38 @@ impl Setting<'_> {
         if self.range.contains(self.value) {
             return Ok(());
         }
-        Err(SettingError {
+        Err(SettingError::Range {
             name: self.name,
             value: *self.value,
             range: self.range.clone(),
         })
     }
+}
+
+/// A number of any size in a few characters: `0.5`, `1e300`.
+pub(super) fn short(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// Largest share of the previous step in each step. At 1 the gradient has no share, and no weight ever moves.
+pub(super) const LARGEST_MOMENTUM: f64 = 0.999_999;
+
+/// Checks that the first value of `name` does not exceed its limit.
+pub(super) fn check_limit(
+    (name, value): (&'static str, f64),
+    (limit_name, limit): (&'static str, f64),
+) -> Result<(), SettingError> {
+    if value <= limit {
+        return Ok(());
+    }
+    Err(SettingError::AboveLimit {
+        name,
+        value,
+        limit_name,
+        limit,
+    })
 }

@@ -6,6 +6,7 @@ use super::{
     Evaluation, Examples, Setting, StopReason,
     algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
+    setting::LARGEST_MOMENTUM,
 };
 use crate::network::Mlp;
 
@@ -41,9 +42,9 @@ impl StepMomentumSettings {
             },
             Setting {
                 name: "momentum",
-                meaning: "Share of the previous step in each step, from 0 to 1.",
+                meaning: "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
                 default: default.momentum,
-                range: 0.0..=1.0,
+                range: 0.0..=LARGEST_MOMENTUM,
                 value: &mut self.momentum,
             },
         ]
@@ -68,6 +69,7 @@ impl Algorithm for StepMomentum {
         name: "Momentum of steps",
         summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
         parameter_name: "learning rate",
+        cure: "change the learning rate, run more epochs, or take another method",
     };
 
     fn list(settings: &mut StepMomentumSettings) -> Vec<Setting<'_>> {

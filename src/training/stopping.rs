@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::SettingError;
+use super::{Method, SettingError};
 
 /// Rules that end a training by themselves, with the field's usual defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +49,7 @@ impl StoppingRules {
             ("validation failures", self.max_fail as f64, 1.0..=most),
         ];
         match values.into_iter().find(|(_, value, range)| !range.contains(value)) {
-            Some((name, value, range)) => Err(SettingError { name, value, range }),
+            Some((name, value, range)) => Err(SettingError::Range { name, value, range }),
             None => Ok(()),
         }
     }
@@ -84,6 +84,21 @@ impl StopReason {
         self != Self::Diverged
     }
 
+    /// Says what to change after a training of this method that ended so, where its network is not good enough.
+    pub fn remedy(self, method: &Method) -> String {
+        match self {
+            Self::Diverged => method.cure(),
+            Self::EpochsReached | Self::Stopped => "train for more epochs, or with more hidden nodes".to_owned(),
+            Self::ValidationRose => {
+                "draw more training samples, or take another seed or another number of hidden nodes".to_owned()
+            }
+            Self::GoalReached => "set a lower goal".to_owned(),
+            Self::GradientSmall | Self::MuLarge | Self::LambdaLarge => {
+                "it is stuck: take another seed, or more hidden nodes".to_owned()
+            }
+        }
+    }
+
     /// Tells whether other stopping rules could have let the training continue: not if the user stopped it or the method
     /// found no further step.
     pub(super) fn depends_on_rules(self) -> bool {
@@ -98,11 +113,9 @@ impl fmt::Display for StopReason {
             Self::GoalReached => "goal reached",
             Self::GradientSmall => "gradient below its limit: no further progress to make",
             Self::MuLarge => "mu above its limit: no step lowers the error",
-            Self::LambdaLarge => {
-                "lambda above its limit: no step lowers the error; take another seed or another method"
-            }
+            Self::LambdaLarge => "lambda above its limit: no step lowers the error",
             Self::ValidationRose => "validation error no longer falls",
-            Self::Diverged => "error grew above its start: lower the learning rate, or take another seed or method",
+            Self::Diverged => "diverged: the error grew above that of the start",
             Self::Stopped => "stopped by you",
         })
     }

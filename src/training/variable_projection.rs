@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Damping, Evaluation, Examples, FactoredEquations, Setting, StopReason,
+    Damping, Evaluation, Examples, FactoredEquations, Setting, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
@@ -68,10 +68,15 @@ impl Algorithm for VariableProjection {
         name: "Variable projection",
         summary: "Solves the linear output layer exactly and takes Levenberg-Marquardt steps on the hidden layer only.",
         parameter_name: "mu",
+        cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
     fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
         settings.list(Self::default_settings())
+    }
+
+    fn check(settings: &Damping) -> Result<(), SettingError> {
+        settings.check()
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {

@@ -2,6 +2,7 @@ use eframe::egui::{Color32, Ui};
 use egui_plot::{HoverPosition, Line, PlotPoints, VLine};
 
 use super::{
+    ceiling::highest_mse,
     legend::{Key, Mark},
     plot_style::{log_marks, log_text, plot, thinned},
     stages::stage_marks_ui,
@@ -41,17 +42,18 @@ pub fn loss_keys(palette: &Palette, history: &[EpochRecord]) -> Vec<Key> {
 }
 
 /// Training, validation and test error against epoch; a dashed line marks the epoch of the best weights,
-/// a thin one each change of method.
+/// a thin one each change of method. Errors far above that of the start run along the upper edge.
 pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage], best_epoch: usize) {
     let palette = Theme::of(ui).palette;
+    let highest = highest_mse(history);
     let shown = plot(ui, "loss", "epoch", "mse (scaled)")
         .y_grid_spacer(log_marks)
         .y_axis_formatter(|mark, _| log_text(mark.value))
-        .label_formatter(hover_text)
+        .label_formatter(move |position| hover_text(position, highest))
         .show(ui, |plot_ui| {
             for (name, colour, error) in curves(&palette) {
                 let points: Vec<[f64; 2]> = thinned(history)
-                    .filter_map(|epoch| Some([epoch.epoch as f64, error(&epoch)?.log10()]))
+                    .filter_map(|epoch| Some([epoch.epoch as f64, error(&epoch)?.min(highest).log10()]))
                     .filter(|point| point[1].is_finite())
                     .collect();
                 if !points.is_empty() {
@@ -66,15 +68,18 @@ pub fn loss_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage], best_epoc
     stage_marks_ui(ui, &shown, stages);
 }
 
-fn hover_text(position: &HoverPosition<'_>) -> Option<String> {
+fn hover_text(position: &HoverPosition<'_>, highest: f64) -> Option<String> {
     match position {
         HoverPosition::NearDataPoint {
             plot_name, position, ..
-        } => Some(format!(
-            "{plot_name}, epoch {}\nmean squared error {}",
-            position.x,
-            format_number(10.0_f64.powf(position.y))
-        )),
+        } => {
+            let above = if position.y >= highest.log10() { "at least " } else { "" };
+            let mse = format_number(10.0_f64.powf(position.y));
+            Some(format!(
+                "{plot_name}, epoch {}\nmean squared error {above}{mse}",
+                position.x
+            ))
+        }
         HoverPosition::Elsewhere { .. } => None,
     }
 }

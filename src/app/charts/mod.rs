@@ -1,5 +1,6 @@
 //! The charts below the surfaces, one a file.
 
+mod ceiling;
 mod error_histogram;
 mod legend;
 mod loss;
@@ -11,6 +12,7 @@ mod strip;
 mod test_pairs;
 mod training_state;
 
+pub use ceiling::{drawn_parameter, highest_gradient, highest_mse};
 pub use error_histogram::{error_histogram_ui, histogram};
 pub use legend::{Key, Mark, legend_ui, legend_width};
 pub use loss::{loss_keys, loss_ui};

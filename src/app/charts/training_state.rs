@@ -2,6 +2,7 @@ use eframe::egui::{Color32, Ui};
 use egui_plot::{Line, PlotPoints};
 
 use super::{
+    ceiling::{drawn_parameter, highest_gradient},
     legend::{Key, Mark},
     plot_style::{log_marks, log_text, plot, thinned, whole_marks},
     stages::{parameter_name, stage_marks_ui},
@@ -11,13 +12,17 @@ use crate::{
     training::{EpochRecord, Stage},
 };
 
-/// Picks one of an epoch's quantities.
-type QuantityOf = fn(&EpochRecord) -> f64;
+/// Picks one of an epoch's quantities, given the largest gradient drawn.
+type QuantityOf = fn(&EpochRecord, f64) -> f64;
 
 fn curves(palette: &Palette, parameter_name: &'static str) -> [(&'static str, Color32, QuantityOf); 2] {
     [
-        ("gradient", palette.training_series, |epoch| epoch.gradient_norm),
-        (parameter_name, palette.test_series, |epoch| epoch.parameter),
+        ("gradient", palette.training_series, |epoch, highest| {
+            epoch.gradient_norm.min(highest)
+        }),
+        (parameter_name, palette.test_series, |epoch, _| {
+            drawn_parameter(epoch.parameter)
+        }),
     ]
 }
 
@@ -34,10 +39,11 @@ pub fn training_state_keys(palette: &Palette, parameter_name: &'static str) -> V
     .collect()
 }
 
-/// Length of the gradient, damping or learning rate, and validation failures against epoch.
+/// Length of the gradient (far above that of the start along the upper edge), damping or learning rate, and validation failures against epoch.
 pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage]) {
     let parameter_name = parameter_name(stages);
     let palette = Theme::of(ui).palette;
+    let highest = highest_gradient(history);
     let half = 0.5 * (ui.available_width() - ui.spacing().item_spacing.x);
     let height = ui.available_height();
     ui.horizontal(|ui| {
@@ -48,7 +54,7 @@ pub fn training_state_ui(ui: &mut Ui, history: &[EpochRecord], stages: &[Stage])
             .y_axis_formatter(|mark, _| log_text(mark.value))
             .show(ui, |plot_ui| {
                 for (name, colour, value) in curves(&palette, parameter_name) {
-                    let points = thinned(history).map(|epoch| [epoch.epoch as f64, value(&epoch).log10()]);
+                    let points = thinned(history).map(|epoch| [epoch.epoch as f64, value(&epoch, highest).log10()]);
                     let points: Vec<[f64; 2]> = points.filter(|point| point[1].is_finite()).collect();
                     plot_ui.line(Line::new(name, PlotPoints::from(points)).color(colour).width(1.8));
                 }

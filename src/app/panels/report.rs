@@ -17,9 +17,8 @@ use crate::{
         state::{Phase, RunResult, RunView, State},
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, Errors, error_rows},
+    evaluation::{ErrorRow, error_rows},
     export::{format_duration, format_number},
-    training::StopReason,
 };
 
 /// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
@@ -151,22 +150,18 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
     let baselines = &run.baselines;
-    let loses_to = |baseline: &Errors| result.errors.z_mm > baseline.z_mm;
-    let fault = if reason == StopReason::Diverged {
-        let epoch = result.best_epoch;
-        Some(format!(
-            "The error grew above its start; shown is the best network before that, of epoch {epoch}."
-        ))
-    } else if loses_to(&baselines.mean) {
-        Some("Always answering the mean of the training set would be better than this network.".to_owned())
-    } else if loses_to(&baselines.linear) {
-        Some("A linear map of the resistances is better on z than this network.".to_owned())
+    let fault = if let Some(flaw) = &result.flaw {
+        Some(sentence(&flaw.to_string()))
+    } else if result.errors.z_mm > baselines.linear.z_mm {
+        let remedy = reason.remedy(&run.settings.training.method);
+        Some(sentence(&format!(
+            "a linear map of the resistances is better on z than this network: {remedy}"
+        )))
     } else {
         None
     };
     if let Some(fault) = fault {
-        let remedy = remedy(reason, run.settings.training.method.parameter_name());
-        note_ui(ui, &format!("{fault} {remedy}"));
+        note_ui(ui, &fault);
     } else if result.errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
         let limit = baselines.reference.filter(|limit| limit.z_mm > 0.0);
@@ -184,18 +179,11 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     }
 }
 
-/// What to change after a training that ended so.
-fn remedy(reason: StopReason, parameter_name: &str) -> &'static str {
-    match reason {
-        StopReason::Diverged if parameter_name == "learning rate" => "Lower the learning rate.",
-        StopReason::Diverged => "Take another seed or another method.",
-        StopReason::EpochsReached | StopReason::Stopped => "Train for more epochs, or with more hidden nodes.",
-        StopReason::ValidationRose => "Draw more training samples, or take another seed or other hidden nodes.",
-        StopReason::GoalReached => "Set a lower goal.",
-        StopReason::GradientSmall | StopReason::MuLarge | StopReason::LambdaLarge => {
-            "It is stuck: take another seed, or more hidden nodes."
-        }
-    }
+/// The text with a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).chain(['.']).collect()
 }
 
 fn dim_ui(ui: &mut Ui, text: &str) {

@@ -7,7 +7,7 @@ use crate::{
         export_kind::ExportKind,
         test_view::{TestView, TestViewError},
     },
-    evaluation::{Baselines, Errors, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, Errors, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
@@ -101,6 +101,8 @@ pub struct RunResult {
     pub errors: Errors,
     /// The epoch of the network.
     pub best_epoch: usize,
+    /// Defect of its training, once that has ended.
+    pub flaw: Option<RunFlaw>,
     /// Epochs run by the start that is furthest.
     pub epochs_run: usize,
     /// How many starts have ended.
