@@ -84,7 +84,7 @@ pub enum SceneError {
     #[error("the indenter's largest tilt is {0} degrees: give from 0 to 45")]
     Tilt(f64),
     /// Noise out of range.
-    #[error("the {what} is {value}: give from 0 to {largest}")]
+    #[error("the {what} is {value:?}: give from 0 to {largest:?}")]
     Noise {
         /// Kind of noise.
         what: &'static str,
