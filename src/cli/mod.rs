@@ -3,6 +3,7 @@
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
+mod announcement;
 mod arguments;
 mod checkpointing;
 mod decode;

@@ -8,6 +8,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
+    announcement::announce,
     checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     interruption::Graceful,
@@ -61,7 +62,11 @@ impl Train {
         }
         let mut run = match &self.checkpoint.checkpoint {
             Some(path) if self.checkpoint.resume => self.resume(path)?,
-            _ => Run::prepare(self.training.settings()?)?,
+            _ => {
+                let settings = self.training.settings()?;
+                announce(&settings)?;
+                Run::prepare(settings)?
+            }
         };
         let end = self.train(&mut run, checkpointing);
         let file = NetworkFile::from_run(&run)?;
@@ -105,6 +110,7 @@ impl Train {
         let file = CheckpointFile::load(path)?;
         let saved = file.settings.training;
         let training = self.training.training_from(&file.settings)?;
+        announce(&file.settings)?;
         let mut run = file.resume().map_err(|source| Failure::Resume {
             path: path.to_owned(),
             source,
