@@ -86,8 +86,18 @@ fn infinite_errors_of_an_epoch_are_kept_and_infinite_results_are_refused() {
     assert_eq!(fs::read(&path).unwrap(), before, "the old file stays");
 }
 
+/// The file with the checksum that its contents have.
+fn resealed(text: &str) -> String {
+    let (heading, run) = text.split_once("\"run\":").unwrap();
+    let run = run.trim_end().strip_suffix('}').unwrap();
+    let (before, after) = heading.split_once("\"crc32\":\"").unwrap();
+    let crc32 = crc32fast::hash(run.as_bytes());
+    format!("{before}\"crc32\":\"{crc32:08x}{}\"run\":{run}}}\n", &after[8..])
+}
+
+/// Contents that are what their checksum says, but impossible.
 #[test]
-fn damage_is_named_and_said_where() {
+fn impossible_contents_are_named() {
     let (_folder, path) = place();
     trained().save(&path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
@@ -103,36 +113,6 @@ fn damage_is_named_and_said_where() {
     let first_weight = format!("\"hidden_layer\":[{}", number("\"hidden_layer\":["));
     let worst = format!("\"worst_mm\":{}", number("\"worst_mm\":"));
     let cases = [
-        ("an empty file", String::new(), "it is empty"),
-        ("another text", "epoch,mse\n1,2\n".to_owned(), "line 1 column 1"),
-        (
-            "JSON of another program",
-            "{\"a\": [1, 2]}".to_owned(),
-            "no field \"format\"",
-        ),
-        ("a number", "5".to_owned(), "no field \"format\""),
-        ("deep nesting", "[".repeat(100_000), "not a network file"),
-        (
-            "a file cut off",
-            text[..text.len() / 2].to_owned(),
-            "cut off at line 1, column",
-        ),
-        (
-            "a newer version",
-            replaced("\"version\":2", "\"version\":3"),
-            "install a newer one",
-        ),
-        (
-            "a newer version with other fields",
-            "{\"format\":\"decoupler network\",\"version\":9,\"w\":0}".to_owned(),
-            "version 9",
-        ),
-        ("no version", replaced("\"version\":2,", ""), "missing field `version`"),
-        (
-            "an impossible version",
-            replaced("\"version\":2", "\"version\":0"),
-            "no version 0",
-        ),
         (
             "a missing part",
             replaced("\"hidden_nodes\":5,", ""),
@@ -218,6 +198,79 @@ fn damage_is_named_and_said_where() {
             "a best epoch after the last",
             replaced("\"best_epoch\":", "\"best_epoch\":10"),
             "training.best_epoch",
+        ),
+        (
+            "a range of other channels",
+            replaced(
+                "\"reading_range\":{\"minimum\":[",
+                "\"reading_range\":{\"minimum\":[1.0,",
+            ),
+            "input scaling is damaged",
+        ),
+        (
+            "a range of impossible readings",
+            replaced("\"reading_range\":{\"minimum\":[", "\"reading_range\":{\"minimum\":[-"),
+            "input scaling is damaged",
+        ),
+    ];
+    for (sentence, text, expected) in cases {
+        fs::write(&path, &text).unwrap();
+        let message = NetworkFile::load(&path).unwrap_err().to_string();
+        assert!(message.contains("its checksum shows"), "{sentence}: {message}");
+        fs::write(&path, resealed(&text)).unwrap();
+        let message = NetworkFile::load(&path).unwrap_err().to_string();
+        assert!(message.contains(expected), "{sentence}: {message}");
+        assert!(
+            message.contains("network.json") && !message.contains('\n'),
+            "{sentence}: {message}"
+        );
+    }
+}
+
+#[test]
+fn other_files_and_versions_are_named() {
+    let (_folder, path) = place();
+    trained().save(&path).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let replaced = |old: &str, new: &str| {
+        assert!(text.contains(old), "{old}");
+        text.replacen(old, new, 1)
+    };
+    let cases = [
+        ("an empty file", String::new(), "it is empty"),
+        ("another text", "epoch,mse\n1,2\n".to_owned(), "line 1 column 1"),
+        (
+            "JSON of another program",
+            "{\"a\": [1, 2]}".to_owned(),
+            "no field \"format\"",
+        ),
+        ("a number", "5".to_owned(), "no field \"format\""),
+        ("deep nesting", "[".repeat(100_000), "not a network file"),
+        (
+            "a file cut off",
+            text[..text.len() / 2].to_owned(),
+            "cut off at line 1, column",
+        ),
+        (
+            "a newer version",
+            replaced("\"version\":3", "\"version\":4"),
+            "install a newer one",
+        ),
+        (
+            "a newer version with other fields",
+            "{\"format\":\"decoupler network\",\"version\":9,\"w\":0}".to_owned(),
+            "version 9",
+        ),
+        ("no version", replaced("\"version\":3,", ""), "unknown field `crc32`"),
+        (
+            "an impossible version",
+            replaced("\"version\":3", "\"version\":0"),
+            "unknown field `crc32`",
+        ),
+        (
+            "an old version",
+            replaced("\"version\":3", "\"version\":2"),
+            "unknown field `crc32`",
         ),
         ("something after the end", format!("{text}x"), "line 2 column 1"),
     ];

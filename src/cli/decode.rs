@@ -1,12 +1,17 @@
-use std::{fs::File, io::BufReader, path::PathBuf};
+use std::{
+    fs::File,
+    io::{BufReader, Write, stderr},
+    path::PathBuf,
+};
 
 use clap::Args;
 use ndarray::{Array2, Axis, Slice};
 
-use super::failure::Failure;
+use super::{failure::Failure, outside_readings::OutsideReadings, same_file::is_same};
 use crate::{
     dataset::{ReadError, Reading, ResistanceReader, SimulationError},
-    export::{AtomicFile, NetworkFile, WriteError, write_coordinates_header, write_numbers},
+    export::{AtomicFile, NetworkFile, WriteError, write_decoded, write_decoded_header},
+    network::Networks,
     scene::RowModel,
 };
 
@@ -18,7 +23,8 @@ const BLOCK: usize = 1024;
 /// The input has columns named r_1, r_2, … (one for each column-wire, in ohm), in any order and among others, or just
 /// as many columns without names. Each line is one row-wire. For networks of known rows a column named row has its
 /// number from 1; without one, lines are whole snapshots from the first row to the last. The output has a line x_1, y_1, z_1, x_2, … in mm for
-/// each line of the input.
+/// each line of the input, and in a last column readings_outside how many of its readings are outside the range seen in
+/// training by more than a tenth of it; such lines are warned of.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -34,7 +40,13 @@ pub(super) struct Decode {
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let NetworkFile { settings, network, .. } = NetworkFile::load(&self.network)?;
+        self.check_output()?;
+        let file = NetworkFile::load(&self.network)?;
+        if let Some(warning) = file.old_version_warning() {
+            // Nobody is left to tell if this fails.
+            let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
+        }
+        let NetworkFile { settings, network, .. } = file;
         let scale = settings.source.sensor.scale;
         let input = File::open(&self.input).map_err(|source| Failure::Open {
             path: self.input.clone(),
@@ -56,7 +68,8 @@ impl Decode {
         let mut lines_in_turn = 0;
         let mut output = AtomicFile::create(&self.output)?;
         let refused = |source| WriteError::io(&self.output, source);
-        write_coordinates_header(scale.nodes_per_row(), &mut output).map_err(refused)?;
+        write_decoded_header(scale.nodes_per_row(), &mut output).map_err(refused)?;
+        let mut outside = OutsideReadings::default();
         let mut is_empty = true;
         while let Some(reading) = reader.read(BLOCK).map_err(unreadable)? {
             is_empty = false;
@@ -74,30 +87,33 @@ impl Decode {
                     rows,
                 });
             }
-            let coordinates_mm = if let Some(only) = network.only() {
-                only.decouple(resistances_ohm.view())
-            } else {
-                let mut all_mm = Array2::zeros((lines.len(), scale.coordinates_per_row()));
-                if row_wires.is_none() {
+            let row_indices: Vec<usize> = match &row_wires {
+                _ if network.only().is_some() => vec![0; lines.len()],
+                Some(row_wires) => {
+                    let index = |row_wire| read.iter().position(|other| other == row_wire).unwrap_or(0);
+                    row_wires.iter().map(index).collect()
+                }
+                None => {
                     lines_in_turn += lines.len();
+                    turns.by_ref().take(lines.len()).collect()
                 }
-                for (line, mut row_mm) in all_mm.rows_mut().into_iter().enumerate() {
-                    let row_index = match &row_wires {
-                        Some(row_wires) => read.iter().position(|row_wire| *row_wire == row_wires[line]),
-                        None => turns.next(),
-                    };
-                    let resistances_ohm = resistances_ohm.slice_axis(Axis(0), Slice::from(line..=line));
-                    let network = network.at(row_index.unwrap_or(0));
-                    row_mm.assign(&network.decouple(resistances_ohm).row(0));
-                }
-                all_mm
             };
-            for (coordinates_mm, line) in coordinates_mm.rows().into_iter().zip(lines) {
+            let coordinates_mm = match network.only() {
+                Some(only) => only.decouple(resistances_ohm.view()),
+                None => decouple_lines(&network, &row_indices, &resistances_ohm),
+            };
+            let lines = lines.into_iter().zip(row_indices);
+            let decoded = resistances_ohm.rows().into_iter().zip(coordinates_mm.rows()).zip(lines);
+            for ((readings_ohm, coordinates_mm), (line, row_index)) in decoded {
                 if coordinates_mm.iter().any(|coordinate| !coordinate.is_finite()) {
                     let path = self.input.clone();
                     return Err(Failure::NoAnswer { path, line });
                 }
-                write_numbers(coordinates_mm, &mut output).map_err(refused)?;
+                let readings_ohm = readings_ohm
+                    .to_slice()
+                    .expect("a row of a standard array is contiguous");
+                let count = outside.count(network.at(row_index), line, readings_ohm);
+                write_decoded(coordinates_mm, count, &mut output).map_err(refused)?;
             }
         }
         if is_empty {
@@ -110,6 +126,31 @@ impl Decode {
                 rows: read.len(),
             });
         }
-        Ok(output.commit()?)
+        output.commit()?;
+        outside.warn();
+        Ok(())
     }
+
+    /// Checks that writing the output destroys no input.
+    fn check_output(&self) -> Result<(), Failure> {
+        for (name, path) in [("input", &self.input), ("network", &self.network)] {
+            if is_same(path, &self.output) {
+                let message = format!("--{name} and --output name the same file: give the output another name");
+                return Err(Failure::Arguments(message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Decodes each line with the network of its row.
+fn decouple_lines(networks: &Networks, row_indices: &[usize], resistances_ohm: &Array2<f64>) -> Array2<f64> {
+    let outputs = networks.at(0).outputs().channels();
+    let mut coordinates_mm = Array2::zeros((row_indices.len(), outputs));
+    for (line, &row_index) in row_indices.iter().enumerate() {
+        let resistances_ohm = resistances_ohm.slice_axis(Axis(0), Slice::from(line..=line));
+        let row_mm = networks.at(row_index).decouple(resistances_ohm);
+        coordinates_mm.row_mut(line).assign(&row_mm.row(0));
+    }
+    coordinates_mm
 }

@@ -3,14 +3,17 @@
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
+mod announcement;
 mod arguments;
 mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
+mod outside_readings;
 mod parsers;
 mod reproduce;
 mod reproduce_report;
+mod same_file;
 mod scene_arguments;
 mod simulate;
 mod spread_plot;

@@ -6,6 +6,7 @@ use std::{
 use clap::Args;
 
 use super::{
+    announcement::announce,
     failure::Failure,
     parsers::{count, seed},
     scene_arguments::SceneArguments,
@@ -95,6 +96,7 @@ impl Simulate {
             _ => return Err(Failure::Arguments("--decoder: give one here".to_owned())),
         };
         let networks = if kind.needs_network() {
+            announce(settings)?;
             let mut run = Run::prepare(*settings)?;
             while run.step().is_none() {}
             let errors = run.node_scores().map(|scores| scores.network);

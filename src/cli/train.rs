@@ -1,5 +1,5 @@
 use std::{
-    fs,
+    io::{Write, stderr},
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -8,9 +8,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
+    announcement::announce,
     checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     interruption::Graceful,
+    same_file::is_same,
     train_report::{print_json, print_text},
     training_arguments::TrainingArguments,
 };
@@ -60,25 +62,38 @@ impl Train {
         }
         let mut run = match &self.checkpoint.checkpoint {
             Some(path) if self.checkpoint.resume => self.resume(path)?,
-            _ => Run::prepare(self.training.settings()?)?,
+            _ => {
+                let settings = self.training.settings()?;
+                announce(&settings)?;
+                Run::prepare(settings)?
+            }
         };
         let end = self.train(&mut run, checkpointing);
         let file = NetworkFile::from_run(&run)?;
-        if let Some(path) = &self.out {
-            file.save(path)?;
-        }
-        let decoders = if end.is_ok() {
-            self.measure_decoders(&file, &run)?
+        // Whatever fails now, the figures are printed.
+        let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
+        let is_interrupted = matches!(end, Err(Failure::Interrupted(_)));
+        let decoders = if is_interrupted {
+            Ok(Vec::new())
         } else {
-            Vec::new()
+            self.measure_decoders(&file, &run)
         };
         let flaw = run.flaw(&file.errors);
+        let measured = decoders.as_deref().unwrap_or_default();
         if self.json {
-            print_json(&file, flaw.as_ref(), &decoders)?;
+            print_json(&file, flaw.as_ref(), measured)?;
         } else {
-            print_text(&file, flaw.as_ref(), &decoders)?;
+            print_text(&file, flaw.as_ref(), measured)?;
         }
-        end
+        decoders?;
+        match (saved, end) {
+            (Err(unsaved), Err(end)) => {
+                // Nobody is left to tell if this fails.
+                let _ = writeln!(stderr(), "{end}");
+                Err(unsaved.into())
+            }
+            (saved, end) => Ok(saved.map_err(Failure::from).and(end)?),
+        }
     }
 
     fn measure_decoders(&self, file: &NetworkFile, run: &Run) -> Result<Vec<DecoderReport>, Failure> {
@@ -96,6 +111,7 @@ impl Train {
         let file = CheckpointFile::load(path)?;
         let saved = file.settings.training;
         let training = self.training.training_from(&file.settings)?;
+        announce(&file.settings)?;
         let mut run = file.resume().map_err(|source| Failure::Resume {
             path: path.to_owned(),
             source,
@@ -191,17 +207,6 @@ fn show(run: &Run, bar: &ProgressBar) {
     bar.set_message(format!("mse {mse}{starts}"));
 }
 
-/// Returns true if two paths lead to the same file, existing or not.
-fn is_same(one: &Path, other: &Path) -> bool {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
-        let new = path.file_name().map(|name| folder.join(name));
-        fs::canonicalize(path).ok().or(new)
-    };
-    place(one).is_some() && place(one) == place(other)
-}
-
 /// Quotes a path for a POSIX shell.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
@@ -227,17 +232,5 @@ mod tests {
         for (path, expected) in cases {
             assert_eq!(quoted(Path::new(path)), expected);
         }
-    }
-
-    #[test]
-    fn a_file_is_the_same_by_any_of_its_paths() {
-        let folder = tempfile::tempdir().unwrap();
-        let [file, same, other] = ["a", "./a", "b"].map(|name| folder.path().join(name));
-        assert!(
-            is_same(&file, &same) && !is_same(&file, &other),
-            "before there is a file"
-        );
-        fs::write(&file, "").unwrap();
-        assert!(is_same(&file, &same) && !is_same(&file, &other));
     }
 }

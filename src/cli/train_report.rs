@@ -60,6 +60,8 @@ struct Decoder {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
+    /// Why figures are missing.
+    no_figures: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -155,6 +157,7 @@ fn decoder(report: &DecoderReport) -> Decoder {
         frame_us: report.cost.frame_us,
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
         fit_seconds: report.cost.fit_seconds,
+        no_figures: report.missing_figures().map(|reason| reason.to_string()),
     }
 }
 
@@ -316,6 +319,11 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
             write!(out, "{:>12}", format_number(value))?;
         }
         writeln!(out)?;
+    }
+    for report in decoders {
+        if let Some(reason) = report.missing_figures() {
+            writeln!(out, "{}: {reason}.", report.name())?;
+        }
     }
     writeln!(
         out,

@@ -1,4 +1,4 @@
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Read};
 
 use csv::{ByteRecord, ReaderBuilder};
 use ndarray::Array2;
@@ -92,20 +92,32 @@ pub enum ReadError {
     /// A line break does not end a row: it is within quotes, or a carriage return alone.
     #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
     LineBreak(u64),
+    /// A row is endless, or nothing but blank lines follow.
+    #[error("line {0}: no row ends within 1 MiB; give one line for each row-wire")]
+    Endless(u64),
     /// The file could not be read.
     #[error("{}", system_cause(.0))]
     Io(#[from] io::Error),
 }
 
+/// Most bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes some 100 kB.
+const LONGEST_ROW: u64 = 1 << 20;
+
 impl<R: BufRead> Rows<R> {
     /// Advances to the next row that is not blank; returns `false` at the end.
     fn advance(&mut self) -> Result<bool, ReadError> {
+        let mut left = LONGEST_ROW;
         loop {
             self.text.clear();
-            if self.source.read_until(b'\n', &mut self.text)? == 0 {
+            let read = (&mut self.source).take(left).read_until(b'\n', &mut self.text)? as u64;
+            if read == 0 && left > 0 {
                 return Ok(false);
             }
             self.line += 1;
+            left -= read;
+            if left == 0 {
+                return Err(ReadError::Endless(self.line));
+            }
             let byte_order_mark: &[u8] = if self.line == 1 { b"\xef\xbb\xbf" } else { b"" };
             let text = self
                 .text
@@ -289,6 +301,22 @@ mod tests {
                 "{text}"
             );
         }
+    }
+
+    #[test]
+    fn what_has_no_end_is_refused() {
+        let endless = |byte| {
+            ResistanceReader::new(io::BufReader::new(io::repeat(byte)), 2)
+                .err()
+                .unwrap()
+        };
+        for byte in [b'1', b'\n', b',', b'"', 0, 255] {
+            assert!(matches!(endless(byte), ReadError::Endless(_)), "{byte}");
+        }
+        let long = format!("1,2\n{}\n", "1".repeat(1 << 20));
+        assert!(matches!(read(&long), Err(ReadError::Endless(2))));
+        let with_note = format!("r_1,r_2,note\n1,2,{}\n", "x".repeat(1 << 19));
+        assert_eq!(read(&with_note).unwrap().lines, [2]);
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::{
     sets::check_sets,
     starts::lowest,
     task::{Task, tasks},
+    workload::Workload,
 };
 use crate::{
     dataset::{Dataset, PerRow, Split, Stream},
@@ -45,7 +46,7 @@ pub struct NodeScores {
 }
 
 /// Largest memory for the equations of all restarts together.
-const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
+const LARGEST_EQUATIONS_BYTES: usize = 8_000_000_000;
 
 impl Run {
     /// Draws and scales the sets, initialises the networks and measures the baselines.
@@ -53,6 +54,7 @@ impl Run {
     /// # Errors
     /// If the settings are invalid.
     pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
+        Workload::of(&settings)?.check_memory()?;
         let (split, test) = settings.draw()?;
         Self::on_sets(settings.into(), split, test)
     }

@@ -90,6 +90,19 @@ pub enum RunError {
         /// Memory needed, in bytes.
         bytes: usize,
     },
+    /// The run would take more memory than the machine has.
+    #[error(
+        "this would take about {:.1} GB of memory, and the machine has {:.1} GB: use fewer samples, hidden nodes or starts, \
+         or the scaled conjugate gradient (scg)",
+        *.bytes as f64 * 1e-9,
+        *.machine_bytes as f64 * 1e-9
+    )]
+    Memory {
+        /// Memory needed, in bytes.
+        bytes: u64,
+        /// Memory of the machine, in bytes.
+        machine_bytes: u64,
+    },
     /// A saved training cannot be resumed.
     #[error("start {}: {source}", .start + 1)]
     Resume {

@@ -102,14 +102,35 @@ impl Place {
                     permissions,
                 })
             }
-            Err(missing) if missing.kind() == ErrorKind::NotFound => Ok(Self::File {
-                target: path.to_owned(),
-                folder,
-                permissions: None,
-            }),
+            Err(missing) if missing.kind() == ErrorKind::NotFound => {
+                let target = link_target(path);
+                let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
+                let folder = parent.unwrap_or(Path::new(".")).to_owned();
+                if !folder.is_dir() {
+                    let path = path.to_owned();
+                    return Err(WriteError::NoFolder { path, folder });
+                }
+                Ok(Self::File {
+                    target,
+                    folder,
+                    permissions: None,
+                })
+            }
             Err(source) => Err(error(source)),
         }
     }
+}
+
+/// Follows a link to a file that is missing, through further links.
+fn link_target(path: &Path) -> PathBuf {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = fs::read_link(&target) else { break };
+        target = target.parent().unwrap_or(Path::new("")).join(next);
+    }
+    target
 }
 
 impl AtomicFile {

@@ -1,16 +1,18 @@
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::value::RawValue;
+use serde_json::value::to_raw_value;
 use thiserror::Error;
 
 use super::{
     WriteError, atomic_write,
     heading::{Heading, NoHeading},
+    limited::read_limited,
     network_file::PROGRAM,
+    sealed::Sealed,
     soundness::settings_flaw,
 };
 use crate::{
@@ -104,18 +106,6 @@ pub enum CheckpointFileError {
     Write(#[from] WriteError),
 }
 
-/// Layout of the file. `crc32` is that of the text of `run`, as hexadecimal digits.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document<'a> {
-    format: String,
-    version: u64,
-    program: String,
-    crc32: String,
-    #[serde(borrow)]
-    run: &'a RawValue,
-}
-
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RunDocument {
@@ -153,22 +143,17 @@ impl CheckpointFile {
             path: path.to_owned(),
             flaw: error.to_string(),
         };
-        let run = serde_json::value::to_raw_value(&RunDocument {
+        let run = to_raw_value(&RunDocument {
             settings: self.settings,
             starts: self.starts.clone(),
         });
         let run = run.map_err(unsound)?;
         // What was written must be readable: a weight that is not finite would be `null`.
         serde_json::from_str::<RunDocument>(run.get()).map_err(unsound)?;
-        let document = Document {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            program: self.program.clone(),
-            crc32: checksum(&run),
-            run: &run,
-        };
+        let sealed = Sealed::new(FORMAT, VERSION, &self.program, &run);
         atomic_write(path, |writer| {
-            serde_json::to_writer(&mut *writer, &document)?;
+            sealed.check_size()?;
+            serde_json::to_writer(&mut *writer, &sealed)?;
             writeln!(writer)
         })?;
         Ok(())
@@ -179,7 +164,7 @@ impl CheckpointFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, CheckpointFileError> {
-        let bytes = fs::read(path).map_err(|source| CheckpointFileError::Read {
+        let bytes = read_limited(path).map_err(|source| CheckpointFileError::Read {
             path: path.to_owned(),
             source,
         })?;
@@ -210,27 +195,18 @@ impl CheckpointFile {
                 program: heading.program(),
             });
         }
-        let document: Document<'_> = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
-        if document.version < OLDEST_VERSION {
-            return Err(damaged(format!("there is no version {}", document.version)));
+        let sealed = Sealed::read(bytes).map_err(damaged)?;
+        if sealed.version < OLDEST_VERSION {
+            return Err(damaged(format!("there is no version {}", sealed.version)));
         }
-        if document.crc32 != checksum(document.run) {
-            return Err(damaged(
-                "its checksum shows that something in it has changed".to_owned(),
-            ));
-        }
-        let run: RunDocument = serde_json::from_str(document.run.get()).map_err(|error| damaged(error.to_string()))?;
+        let run: RunDocument = serde_json::from_str(sealed.run.get()).map_err(|error| damaged(error.to_string()))?;
         if let Some(flaw) = settings_flaw(&run.settings) {
             return Err(damaged(flaw));
         }
         Ok(Self {
-            program: document.program,
+            program: sealed.program,
             settings: run.settings,
             starts: run.starts,
         })
     }
-}
-
-fn checksum(run: &RawValue) -> String {
-    format!("{:08x}", crc32fast::hash(run.get().as_bytes()))
 }

@@ -13,8 +13,11 @@ mod experiment_words;
 pub mod figures;
 mod format;
 mod heading;
+mod limited;
+mod network_document;
 mod network_file;
 mod samples;
+mod sealed;
 mod soundness;
 mod tables;
 #[cfg(feature = "figures")]
@@ -34,7 +37,7 @@ pub use experiment_words::{describe_conditions, describe_failures};
 pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
 #[cfg(feature = "cli")]
-pub(crate) use samples::{write_coordinates_header, write_numbers};
+pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
 pub use trade_file::write_trade;

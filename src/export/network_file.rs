@@ -1,26 +1,30 @@
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 use thiserror::Error;
 
 use super::{
     WriteError, atomic_write,
     heading::{Heading, NoHeading},
+    limited::read_limited,
+    network_document::{RunDocument, UnsealedDocument},
+    sealed::Sealed,
     soundness::flaw,
 };
 use crate::{
     dataset::system_cause,
     evaluation::{Baselines, Errors, Run, SimulatedSettings, StartRecord},
     network::Networks,
-    training::{EpochRecord, History, Stage, StopReason},
+    training::{EpochRecord, Stage, StopReason},
 };
 
 const FORMAT: &str = "decoupler network";
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
+/// First version with a checksum, and with the ranges of the readings in training.
+const SEALED_VERSION: u64 = 3;
 /// Oldest version that can be read, which had one network and the paper's scene only.
 const OLDEST_VERSION: u64 = 1;
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
@@ -31,6 +35,8 @@ pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARG
 pub struct NetworkFile {
     /// Program and version that wrote the file.
     pub program: String,
+    /// Version of the format in which the file was found, or will be written.
+    pub version: u64,
     /// Settings of the run: sensor, scene, samples, method, stopping rules, seed.
     pub settings: SimulatedSettings,
     /// Best network of the training, or best network of each row-wire.
@@ -131,34 +137,6 @@ pub enum NetworkFileError {
     Write(#[from] WriteError),
 }
 
-/// Layout of the file.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    format: String,
-    version: u64,
-    program: String,
-    settings: SimulatedSettings,
-    network: Networks,
-    training: TrainingDocument,
-    errors: Errors,
-    baselines: Baselines,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TrainingDocument {
-    stop_reason: Option<StopReason>,
-    best_epoch: usize,
-    epochs: usize,
-    seconds: f64,
-    history: History,
-    #[serde(default)]
-    stages: Vec<Stage>,
-    #[serde(default)]
-    starts: Vec<StartRecord>,
-}
-
 impl NetworkFile {
     /// Takes the best network of `run` so far, with its record and errors.
     ///
@@ -170,6 +148,7 @@ impl NetworkFile {
         let trainer = run.leader();
         Ok(Self {
             program: PROGRAM.to_owned(),
+            version: VERSION,
             settings,
             network: run.network(),
             training: TrainingRecord {
@@ -194,9 +173,15 @@ impl NetworkFile {
             let path = path.to_owned();
             return Err(NetworkFileError::Unsound { path, flaw });
         }
-        let document = self.document();
+        let unsound = |flaw: String| NetworkFileError::Unsound {
+            path: path.to_owned(),
+            flaw,
+        };
+        let run = self.run_text().map_err(unsound)?;
+        let sealed = self.sealed(&run);
         atomic_write(path, |writer| {
-            serde_json::to_writer(&mut *writer, &document)?;
+            sealed.check_size()?;
+            serde_json::to_writer(&mut *writer, &sealed)?;
             writeln!(writer)
         })?;
         Ok(())
@@ -207,7 +192,7 @@ impl NetworkFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, NetworkFileError> {
-        let bytes = fs::read(path).map_err(|source| NetworkFileError::Read {
+        let bytes = read_limited(path).map_err(|source| NetworkFileError::Read {
             path: path.to_owned(),
             source,
         })?;
@@ -223,8 +208,30 @@ impl NetworkFile {
     pub(super) fn to_raw(&self) -> Result<Box<RawValue>, String> {
         match flaw(self) {
             Some(flaw) => Err(flaw),
-            None => to_raw_value(&self.document()).map_err(|error| error.to_string()),
+            None => {
+                let run = self.run_text()?;
+                to_raw_value(&self.sealed(&run)).map_err(|error| error.to_string())
+            }
         }
+    }
+
+    fn run_text(&self) -> Result<Box<RawValue>, String> {
+        to_raw_value(&RunDocument::of(self)).map_err(|error| error.to_string())
+    }
+
+    fn sealed<'a>(&self, run: &'a RawValue) -> Sealed<'a> {
+        Sealed::new(FORMAT, VERSION, &self.program, run)
+    }
+
+    /// Tells what cannot be noticed because an old version of the program wrote the file.
+    pub fn old_version_warning(&self) -> Option<String> {
+        (self.version < SEALED_VERSION).then(|| {
+            format!(
+                "the file has version {} of the format, without a checksum and without the range of the readings in \
+                 training: neither damage nor readings outside that range are noticed; train again to have both",
+                self.version
+            )
+        })
     }
 
     pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
@@ -249,68 +256,33 @@ impl NetworkFile {
             });
         }
         let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
-        let document: Document = serde_json::from_slice(bytes).map_err(|error| damaged(error.to_string()))?;
-        if document.version < OLDEST_VERSION {
-            return Err(damaged(format!("version: there is no version {}", document.version)));
-        }
-        let epochs = document.training.epochs;
-        let file = Self::of(document);
-        let last = file.training.history.last().map_or(0, |record| record.epoch);
-        if epochs != last {
-            let flaw = format!("training.epochs: it is {epochs}, but the history ends with epoch {last}");
-            return Err(damaged(flaw));
-        }
+        let is_sealed = heading.version.as_u64() >= Some(SEALED_VERSION);
+        let read = if is_sealed {
+            Self::read_sealed(bytes)
+        } else {
+            Self::read_unsealed(bytes)
+        };
+        let file = read.map_err(damaged)?;
         match flaw(&file) {
             Some(flaw) => Err(damaged(flaw)),
             None => Ok(file),
         }
     }
 
-    fn document(&self) -> Document {
-        let Self {
-            program,
-            settings,
-            network,
-            training,
-            errors,
-            baselines,
-        } = self.clone();
-        Document {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            program,
-            settings,
-            network,
-            training: TrainingDocument {
-                stop_reason: training.stop_reason,
-                best_epoch: training.best_epoch,
-                epochs: training.history.last().map_or(0, |record| record.epoch),
-                seconds: training.seconds,
-                history: History(training.history),
-                stages: training.stages,
-                starts: training.starts,
-            },
-            errors,
-            baselines,
-        }
+    fn read_sealed(bytes: &[u8]) -> Result<Self, String> {
+        let Sealed {
+            version, program, run, ..
+        } = Sealed::read(bytes)?;
+        let run: RunDocument = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
+        run.into_file(program, version)
     }
 
-    fn of(document: Document) -> Self {
-        let training = document.training;
-        Self {
-            program: document.program,
-            settings: document.settings,
-            network: document.network,
-            training: TrainingRecord {
-                stop_reason: training.stop_reason,
-                best_epoch: training.best_epoch,
-                seconds: training.seconds,
-                history: training.history.0,
-                stages: training.stages,
-                starts: training.starts,
-            },
-            errors: document.errors,
-            baselines: document.baselines,
+    fn read_unsealed(bytes: &[u8]) -> Result<Self, String> {
+        let document: UnsealedDocument = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+        if document.version < OLDEST_VERSION {
+            return Err(format!("version: there is no version {}", document.version));
         }
+        let (program, version) = (document.program.clone(), document.version);
+        RunDocument::from(document).into_file(program, version)
     }
 }

@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 
 use crate::{dataset::Dataset, sensor::ArrayScale};
 
@@ -18,10 +18,11 @@ pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut 
         for node in 1..=scale.nodes_per_row() {
             write!(writer, "x_{node},y_{node},z_{node},")?;
         }
-        write_names("decoded_", scale.nodes_per_row(), writer)
+        write_names("decoded_", scale.nodes_per_row(), writer)?;
     } else {
-        write_coordinates_header(scale.nodes_per_row(), writer)
+        write_names("", scale.nodes_per_row(), writer)?;
     }
+    writeln!(writer)
 }
 
 /// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
@@ -46,35 +47,50 @@ pub fn write_samples(
         let decoded_mm = decoded_mm.iter().flatten();
         let measured = set.sample_readings(sample).iter().chain(set.sample_targets(sample));
         write_numbers(measured.chain(decoded_mm), writer)?;
+        writeln!(writer)?;
     }
     Ok(())
 }
 
-/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, and ends the line.
+/// Writes the names of the columns of [`write_decoded`], and ends the line.
 ///
 /// # Errors
 /// Any error of `writer`.
-pub(crate) fn write_coordinates_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
-    write_names("", nodes, writer)
+pub(crate) fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
+    write_names("", nodes, writer)?;
+    writeln!(writer, ",readings_outside")
 }
 
+/// Writes decoded coordinates in millimetres and how many of the readings were outside the range seen in training, empty
+/// if that is not known.
+///
+/// # Errors
+/// Any error of `writer`.
+pub(crate) fn write_decoded(
+    coordinates_mm: ArrayView1<'_, f64>,
+    readings_outside: Option<usize>,
+    writer: &mut dyn Write,
+) -> io::Result<()> {
+    write_numbers(coordinates_mm, writer)?;
+    let count = readings_outside.map_or_else(String::new, |count| count.to_string());
+    writeln!(writer, ",{count}")
+}
+
+/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name after `before`.
 fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     for node in 1..=nodes {
-        let end = if node == nodes { "\n" } else { "," };
-        write!(writer, "{before}x_{node},{before}y_{node},{before}z_{node}{end}")?;
+        let separator = if node == 1 { "" } else { "," };
+        write!(writer, "{separator}{before}x_{node},{before}y_{node},{before}z_{node}")?;
     }
     Ok(())
 }
 
-/// Writes a line of numbers so that reading gives the same bits.
-///
-/// # Errors
-/// Any error of `writer`.
-pub(crate) fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
+/// Writes numbers, separated by commas, so that reading gives the same bits.
+fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
     let mut separator = "";
     for number in numbers {
         write!(writer, "{separator}{number:?}")?;
         separator = ",";
     }
-    writeln!(writer)
+    Ok(())
 }

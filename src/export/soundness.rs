@@ -12,6 +12,7 @@ use crate::{
 pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     let NetworkFile {
         program: _,
+        version: _,
         settings,
         network,
         training,

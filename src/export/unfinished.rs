@@ -1,12 +1,16 @@
 use std::{
     collections::BTreeSet,
-    fs::File,
+    ffi::OsStr,
+    fs::{self, File},
     io,
     path::{Path, PathBuf},
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use tempfile::NamedTempFile;
+
+const PREFIX: &str = ".decoupler-";
+const SUFFIX: &str = ".part";
 
 /// Paths of all files in the making. A program that is ended from another thread drops nothing, so it looks here.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -16,7 +20,11 @@ fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file in the making, removed when dropped.
+/// Folders in which this program has looked for what others left.
+static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// A file in the making, removed when dropped. It is locked while it is worked on: one that is not locked was left by a
+/// program that was killed.
 #[derive(Debug)]
 pub(super) struct Unfinished {
     file: NamedTempFile,
@@ -34,10 +42,18 @@ impl Drop for Listed {
 }
 
 impl Unfinished {
-    /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask).
+    /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask). The first time
+    /// it removes what killed programs left there.
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
+        let is_new = SWEPT
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(folder.to_owned());
+        if is_new {
+            sweep(folder);
+        }
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".decoupler-").suffix(".part");
+        builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
         {
             use std::{fs::Permissions, os::unix::fs::PermissionsExt};
@@ -46,7 +62,15 @@ impl Unfinished {
         // The default error repeats the temporary name, which means nothing to the user.
         let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
         let mut all = all();
-        let file = builder.tempfile_in(folder).map_err(plain)?;
+        let file = loop {
+            let file = builder.tempfile_in(folder).map_err(plain)?;
+            // Some file systems have no locks: nobody will sweep there.
+            let _ = file.as_file().lock();
+            // Another program may have swept it before it was locked.
+            if file.path().exists() {
+                break file;
+            }
+        };
         all.insert(file.path().to_owned());
         let listed = Listed(file.path().to_owned());
         Ok(Self { file, listed })
@@ -63,6 +87,30 @@ impl Unfinished {
         drop(listed);
         persisted.map(drop).map_err(|error| error.error)
     }
+}
+
+/// Removes the files of [`Unfinished`] in `folder` that nobody works on. What cannot be removed stays.
+fn sweep(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if !is_file || !is_our_name(&entry.file_name()) {
+            continue;
+        }
+        let left = File::options().read(true).write(true).open(entry.path());
+        if left.is_ok_and(|left| left.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn is_our_name(name: &OsStr) -> bool {
+    /// As many as the random part has by default.
+    const RANDOM: usize = 6;
+    let random = name
+        .to_str()
+        .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX));
+    random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
 }
 
 /// Ends the program with this exit status, from any thread. Files in the making leave nothing.

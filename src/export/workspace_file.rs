@@ -13,6 +13,7 @@ use thiserror::Error;
 use super::{
     NetworkFile, WriteError, atomic_write,
     heading::{Heading, NoHeading},
+    limited::read_limited,
     network_file::PROGRAM,
 };
 use crate::dataset::system_cause;
@@ -138,7 +139,7 @@ impl Workspace {
     /// # Errors
     /// The file can be neither read nor copied.
     pub fn load(path: &Path) -> Result<FoundWorkspace, WorkspaceError> {
-        let bytes = match fs::read(path) {
+        let bytes = match read_limited(path) {
             Ok(bytes) => bytes,
             Err(missing) if missing.kind() == io::ErrorKind::NotFound => {
                 return Ok(FoundWorkspace {

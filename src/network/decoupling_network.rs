@@ -2,7 +2,7 @@ use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, Shape};
+use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, ReadingRange, Shape};
 
 /// A network together with its scaling, from resistances in ohm to coordinates in millimetres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,7 +17,7 @@ pub struct DecouplingNetwork {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NetworkError {
-    /// The limits of a scaling are missing, not finite, or out of order.
+    /// The limits of a scaling, or of the readings in training, are missing, not finite, or out of order.
     #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
     Scaling(&'static str),
     /// The number of weights in a layer does not match the scaling and the hidden nodes.
@@ -81,6 +81,8 @@ struct Record {
     #[serde(default)]
     input_quantity: Quantity,
     input_scaling: InputScaling,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reading_range: Option<ReadingRange>,
     hidden_nodes: usize,
     /// (varying inputs + 1) × hidden nodes.
     hidden_layer: Vec<f64>,
@@ -98,6 +100,7 @@ impl From<DecouplingNetwork> for Record {
             output_layer: output_layer.to_vec(),
             input_quantity: network.inputs.quantity(),
             input_scaling: network.inputs.scaling().clone(),
+            reading_range: network.inputs.range().cloned(),
             output_scaling: network.outputs,
         }
     }
@@ -107,7 +110,7 @@ impl TryFrom<Record> for DecouplingNetwork {
     type Error = NetworkError;
 
     fn try_from(record: Record) -> Result<Self, NetworkError> {
-        let inputs = Inputs::new(record.input_quantity, record.input_scaling);
+        let inputs = Inputs::new(record.input_quantity, record.input_scaling).with_range(record.reading_range);
         for (side, is_sound) in [
             ("input", inputs.is_sound()),
             ("output", record.output_scaling.is_sound()),

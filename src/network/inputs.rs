@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{MinMax, Quantity, ScalingError, Whitening};
+use super::{MinMax, Quantity, ReadingRange, ScalingError, Whitening};
 
 /// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +50,8 @@ pub enum ScalingChoice {
 pub struct Inputs {
     quantity: Quantity,
     scaling: InputScaling,
+    /// `None` where the training set is not known.
+    range: Option<ReadingRange>,
 }
 
 /// Scaling fitted to a training set.
@@ -95,9 +97,19 @@ impl From<MinMax> for Inputs {
 }
 
 impl Inputs {
-    /// Creates inputs from a quantity and its fitted scaling.
+    /// Creates inputs from a quantity and its fitted scaling, of an unknown training set.
     pub fn new(quantity: Quantity, scaling: InputScaling) -> Self {
-        Self { quantity, scaling }
+        Self {
+            quantity,
+            scaling,
+            range: None,
+        }
+    }
+
+    /// Adds the range of the readings in training.
+    #[must_use]
+    pub(super) fn with_range(self, range: Option<ReadingRange>) -> Self {
+        Self { range, ..self }
     }
 
     /// Fits the scaling to training resistances in ohm (samples × M4).
@@ -127,7 +139,12 @@ impl Inputs {
                 InputScaling::Whitening(Whitening::fit(values.view(), &noise)?)
             }
         };
-        Ok(Self { quantity, scaling })
+        Ok(Self::new(quantity, scaling).with_range(ReadingRange::of(resistances_ohm)))
+    }
+
+    /// Returns the range of the readings in training, where that is known.
+    pub fn range(&self) -> Option<&ReadingRange> {
+        self.range.as_ref()
     }
 
     /// Returns the quantity computed from each resistance.
@@ -175,11 +192,14 @@ impl Inputs {
 
     /// Returns `true` if the limits, which may come from a file, are valid.
     pub(crate) fn is_sound(&self) -> bool {
-        match &self.scaling {
+        let is_scaling_sound = match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.is_sound(),
             // Validated when it is deserialised.
             InputScaling::Whitening(_) => true,
-        }
+        };
+        let (quantity, channels) = (self.quantity, self.channels());
+        let mut range = self.range.iter();
+        is_scaling_sound && range.all(|range| range.is_sound(quantity, channels))
     }
 }
 

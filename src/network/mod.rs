@@ -8,6 +8,7 @@ mod inputs;
 mod mlp;
 mod networks;
 mod quantity;
+mod reading_range;
 mod scaling;
 mod start;
 mod suggestions;
@@ -19,6 +20,7 @@ pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoice
 pub use mlp::{Mlp, Shape};
 pub use networks::Networks;
 pub use quantity::{Quantity, QuantityError};
+pub use reading_range::ReadingRange;
 pub use scaling::{MinMax, ScalingError};
 pub use start::nguyen_widrow;
 pub use suggestions::{HiddenSuggestions, LARGEST_HIDDEN};

@@ -38,6 +38,9 @@ pub enum NoisySets {
     Test,
 }
 
+/// Largest additive noise: the squares of readings with it are still finite numbers.
+const LARGEST_ADDITIVE_OHM: f64 = 1e150;
+
 /// The steps of a converter: it reads from 0 to twice the largest resistance at rest, and clips beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Converter {
@@ -83,7 +86,7 @@ impl Noise {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         let values = [
             ("relative noise", self.relative, 1.0),
-            ("additive noise", self.additive_ohm, f64::MAX),
+            ("additive noise", self.additive_ohm, LARGEST_ADDITIVE_OHM),
             ("drift", self.drift, 1.0),
         ];
         for (what, value, largest) in values {

@@ -34,6 +34,11 @@ pub(super) trait Algorithm: Sized + Send + Sync {
         0
     }
 
+    /// About how many multiplications an epoch takes: one run of the network over the samples and the gradient.
+    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
+        3.0 * samples as f64 * shape.weights() as f64
+    }
+
     /// Starts from the weights of `mlp`.
     fn new(settings: Self::Settings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation);
 

@@ -110,7 +110,11 @@ impl Algorithm for BayesianRegularization {
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {
-        FactoredEquations::factored_bytes(shape, samples)
+        FactoredEquations::factored_bytes(shape, samples).saturating_add(FactoredEquations::inverse_bytes(shape))
+    }
+
+    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
+        FactoredEquations::factored_multiplications(shape, samples) + FactoredEquations::trace_multiplications(shape)
     }
 
     /// Starts with γ = N, as if the data determined all weights.

@@ -55,6 +55,10 @@ impl Algorithm for LevenbergMarquardt {
         NormalEquations::cheapest_bytes(shape, samples)
     }
 
+    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
+        NormalEquations::cheapest_multiplications(shape, samples)
+    }
+
     fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut equations = NormalEquations::cheapest(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);

@@ -80,6 +80,13 @@ macro_rules! methods {
                 }
             }
 
+            /// About how many multiplications an epoch takes for a network of this shape and so many samples.
+            pub fn epoch_multiplications(&self, shape: Shape, samples: usize) -> f64 {
+                match self {
+                    $(Self::$name(_) => $name::epoch_multiplications(shape, samples),)*
+                }
+            }
+
             /// Starts the method from the weights of `mlp`.
             pub(super) fn start(&self, mlp: &Mlp, examples: &Examples) -> (Running, Evaluation) {
                 match *self {

@@ -69,7 +69,7 @@ pub enum TrainingError {
 }
 
 /// Most memory that the equations of a method may take.
-const LARGEST_EQUATIONS_BYTES: usize = 4_000_000_000;
+const LARGEST_EQUATIONS_BYTES: usize = 8_000_000_000;
 
 /// Refuses a method whose equations would not fit into memory.
 pub(super) fn check_width(method: &Method, shape: Shape, samples: usize) -> Result<(), TrainingError> {

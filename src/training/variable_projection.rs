@@ -83,6 +83,10 @@ impl Algorithm for VariableProjection {
         FactoredEquations::factored_bytes(shape, samples)
     }
 
+    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
+        FactoredEquations::factored_multiplications(shape, samples)
+    }
+
     fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut equations = FactoredEquations::factored(mlp.shape(), examples);
         let now = equations.gather(mlp, examples);

@@ -92,7 +92,12 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     let rows: Vec<Row> = rows.chain(of_limit).collect();
     ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
-        if let Some(Err(reason)) = &result.report {
+        let reason = match &result.report {
+            Some(Err(reason)) => Some(reason.clone()),
+            Some(Ok(report)) => report.missing_figures().map(|reason| reason.to_string()),
+            None => None,
+        };
+        if let Some(reason) = reason {
             let name = result.kind.name(result.precision);
             note_ui(ui, &format!("{name}: {reason}"));
         }

@@ -52,6 +52,15 @@ impl NormalEquations {
             ConjugateGradient::cost(shape, samples).bytes()
         }
     }
+
+    /// About how many multiplications gathering and solving once with [`Self::cheapest`] take.
+    pub(in crate::training) fn cheapest_multiplications(shape: Shape, samples: usize) -> f64 {
+        if factoring_is_cheaper(shape, samples) {
+            SchurComplement::cost(shape, samples).total()
+        } else {
+            ConjugateGradient::cost(shape, samples).total()
+        }
+    }
 }
 
 impl NormalEquations<SchurComplement> {
@@ -64,6 +73,25 @@ impl NormalEquations<SchurComplement> {
     /// About how many bytes [`Self::factored`] takes, beside the samples.
     pub(in crate::training) fn factored_bytes(shape: Shape, samples: usize) -> usize {
         SchurComplement::cost(shape, samples).bytes()
+    }
+
+    /// About how many multiplications gathering and solving once with [`Self::factored`] take.
+    pub(in crate::training) fn factored_multiplications(shape: Shape, samples: usize) -> f64 {
+        SchurComplement::cost(shape, samples).total()
+    }
+
+    /// How many bytes [`Self::trace_of_inverse`] takes in addition.
+    pub(in crate::training) fn inverse_bytes(shape: Shape) -> usize {
+        let (order, h1) = (shape.hidden_weights(), shape.hidden + 1);
+        let entries = order.saturating_mul(order + h1).saturating_add(h1 * h1);
+        entries.saturating_mul(size_of::<f64>())
+    }
+
+    /// About how many multiplications [`Self::trace_of_inverse`] takes: factor and inverse of S, and a triangular system
+    /// of h + 1 columns for each output.
+    pub(in crate::training) fn trace_multiplications(shape: Shape) -> f64 {
+        let (order, h1) = (shape.hidden_weights() as f64, shape.hidden as f64 + 1.0);
+        order * order * (order / 3.0 + h1 / 2.0 + shape.outputs as f64 * h1 / 2.0)
     }
 
     /// Returns tr (JᵀJ + damping·I)⁻¹ from the products last gathered; `None` if the matrix is not positive definite in

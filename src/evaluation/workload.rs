@@ -1,0 +1,192 @@
+use std::time::Duration;
+
+use super::{
+    RunError, SimulatedSettings,
+    machine::{Speed, memory_bytes, node_pairs_per_row},
+};
+use crate::{
+    network::Shape,
+    scene::{Loading, Movement, Rows},
+};
+
+/// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Workload {
+    /// Memory at its peak, in bytes: samples, drawn and scaled, equations of all trainings, and priors of the rows.
+    pub bytes: u64,
+    /// Pairs of nodes in the resistances of all samples that are drawn.
+    node_pairs: f64,
+    /// Multiplications of an epoch of all trainings.
+    epoch_multiplications: f64,
+    /// Largest number of epochs.
+    epochs: usize,
+}
+
+/// Time of a run on this machine, from rates measured on one thread. With more threads large runs are faster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkloadTime {
+    /// Time to draw the samples.
+    pub drawing: Duration,
+    /// Time of an epoch.
+    pub epoch: Duration,
+    /// Time of all epochs, if none of the other stopping rules ends the training.
+    pub all_epochs: Duration,
+}
+
+impl Workload {
+    /// Computes the workload of `settings`.
+    ///
+    /// # Errors
+    /// If the array lacks a row of the scene.
+    pub fn of(settings: &SimulatedSettings) -> Result<Self, RunError> {
+        let source = &settings.source;
+        let size = source.model_size()?;
+        let scale = source.sensor.scale;
+        let whole = |samples: usize| samples.div_ceil(size.rows) * size.rows;
+        let training = whole(source.samples);
+        let held_out = whole(source.validation_samples) + whole(source.test_samples);
+        let shape = largest_shape(settings);
+        // Readings and targets: drawn, split, scaled, and in blocks for the training.
+        let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + shape.inputs + 1 + shape.outputs;
+        let samples = float_bytes(training.saturating_add(held_out), per_sample);
+        let trainings = settings.starts * size.networks;
+        let of_each = training.div_ceil(size.networks);
+        let method = &settings.training.method;
+        /// Vectors of a method and its trainer with an entry for each weight.
+        const VECTORS: usize = 8;
+        let training_bytes =
+            (method.equations_bytes(shape, of_each) as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
+        // Nodes that move on their own have priors in closed form.
+        let unknowns = size.unknowns / size.rows;
+        let priors = match source.scene.loading {
+            Loading::RandomNodes => 0,
+            _ => float_bytes(size.rows, unknowns * unknowns),
+        };
+        let bytes = samples
+            .saturating_add(training_bytes.saturating_mul(trainings as u64))
+            .saturating_add(priors);
+        Ok(Self {
+            bytes,
+            node_pairs: (training + held_out) as f64 * node_pairs_per_row(&source.sensor),
+            epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
+            epochs: settings.training.stopping.epochs,
+        })
+    }
+
+    /// Returns `true` if it takes so much memory or time that the user should know before it begins: a gigabyte, some
+    /// seconds to draw the samples, or a second an epoch.
+    pub fn is_large(&self) -> bool {
+        self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
+    }
+
+    /// Computes the time on this machine. The first time its speed is measured, which takes some 20 ms.
+    pub fn time(&self) -> WorkloadTime {
+        let speed = Speed::measured();
+        let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+        let epoch = self.epoch_multiplications / speed.multiplications;
+        WorkloadTime {
+            drawing: duration(self.node_pairs / speed.node_pairs),
+            epoch: duration(epoch),
+            all_epochs: duration(epoch * self.epochs as f64),
+        }
+    }
+
+    /// Memory of this machine in bytes, where the system tells.
+    pub fn machine_bytes() -> Option<u64> {
+        memory_bytes()
+    }
+
+    /// Checks that the machine has the memory.
+    ///
+    /// # Errors
+    /// [`RunError::Memory`] if it has not.
+    pub(super) fn check_memory(&self) -> Result<(), RunError> {
+        if !self.is_large() {
+            return Ok(());
+        }
+        match memory_bytes() {
+            Some(machine_bytes) if self.bytes > machine_bytes => Err(RunError::Memory {
+                bytes: self.bytes,
+                machine_bytes,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Shape of a network of these settings if no input is left out by its scaling.
+fn largest_shape(settings: &SimulatedSettings) -> Shape {
+    let (scene, scale) = (&settings.source.scene, settings.source.sensor.scale);
+    let varying_axes = match (scene.movement, scene.rows) {
+        (Movement::Xyz { .. }, _) => 3,
+        // A network that is not told the row also learns its x.
+        (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
+        (Movement::Z, _) => 1,
+    };
+    Shape {
+        inputs: scale.columns(),
+        hidden: settings.hidden,
+        outputs: varying_axes * scale.nodes_per_row(),
+    }
+}
+
+/// Bytes of so many rows of numbers.
+fn float_bytes(rows: usize, columns: usize) -> u64 {
+    (rows as u64).saturating_mul((columns * size_of::<f64>()) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::Method;
+
+    fn settings(array: &str, method: &str, hidden: usize) -> SimulatedSettings {
+        let mut settings = SimulatedSettings {
+            hidden,
+            ..SimulatedSettings::default()
+        };
+        settings.source.sensor.scale = array.parse().unwrap();
+        let mut methods = Method::all().into_iter();
+        settings.training.method = methods.find(|other| other.short_name() == method).unwrap();
+        settings
+    }
+
+    #[test]
+    fn large_runs_are_told_from_ordinary_ones() {
+        let cases = [
+            ("10x10_5x30", "lm", 12, false),
+            ("10x10_5x30", "br", 16, false),
+            ("10x6_3x18", "rp", 64, false),
+            ("10x10_5x30", "br", 512, true),
+            ("512x512_512x512", "lm", 4, true),
+            ("512x512_512x512", "gd", 1, true),
+        ];
+        for (array, method, hidden, is_large) in cases {
+            let workload = Workload::of(&settings(array, method, hidden)).unwrap();
+            assert_eq!(workload.is_large(), is_large, "{array} {method} {hidden}: {workload:?}");
+        }
+    }
+
+    /// Bayesian regularisation holds the factor and the inverse of the equations of the hidden layer: (31·512)² each.
+    #[test]
+    fn the_equations_dominate_the_memory_of_wide_networks() {
+        let bytes = Workload::of(&settings("10x10_5x30", "br", 512)).unwrap().bytes as f64;
+        let two_matrices = 2.0 * 8.0 * (31.0 * 512.0_f64).powi(2);
+        assert!((1.0..1.4).contains(&(bytes / two_matrices)), "{bytes}");
+    }
+
+    #[test]
+    fn what_no_machine_has_is_refused() {
+        let mut settings = settings("512x512_512x1", "lm", 1);
+        settings.source.samples = 1_000_000;
+        settings.source.sensor.scale = "512x512_1x512".parse().unwrap();
+        settings.starts = 100;
+        settings.hidden = 512;
+        let workload = Workload::of(&settings).unwrap();
+        assert!(workload.bytes > 1 << 40, "{workload:?}");
+        if Workload::machine_bytes().is_some() {
+            let message = workload.check_memory().unwrap_err().to_string();
+            assert!(message.contains("GB of memory, and the machine has"), "{message}");
+        }
+    }
+}

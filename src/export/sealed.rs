@@ -1,0 +1,59 @@
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
+
+use super::limited::{LARGEST_BYTES, too_large};
+
+/// Layout of a file with a checksum: a heading and the record of a run. A change anywhere in the record is noticed.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sealed<'a> {
+    format: String,
+    pub(super) version: u64,
+    pub(super) program: String,
+    /// CRC-32 of the text of `run`, as hexadecimal digits.
+    crc32: String,
+    #[serde(borrow)]
+    pub(super) run: &'a RawValue,
+}
+
+impl<'a> Sealed<'a> {
+    pub(super) fn new(format: &str, version: u64, program: &str, run: &'a RawValue) -> Self {
+        Self {
+            format: format.to_owned(),
+            version,
+            program: program.to_owned(),
+            crc32: checksum(run),
+            run,
+        }
+    }
+
+    /// Reads a file and checks its checksum.
+    ///
+    /// # Errors
+    /// A description of the damage.
+    pub(super) fn read(bytes: &'a [u8]) -> Result<Self, String> {
+        let sealed: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+        if sealed.crc32 == checksum(sealed.run) {
+            Ok(sealed)
+        } else {
+            Err("its checksum shows that something in it has changed".to_owned())
+        }
+    }
+
+    /// Checks that the file will not be too large to be read again.
+    ///
+    /// # Errors
+    /// It will.
+    pub(super) fn check_size(&self) -> std::io::Result<()> {
+        /// More than the heading takes.
+        const HEADING: u64 = 1 << 10;
+        if self.run.get().len() as u64 + HEADING > LARGEST_BYTES {
+            return Err(too_large());
+        }
+        Ok(())
+    }
+}
+
+fn checksum(run: &RawValue) -> String {
+    format!("{:08x}", crc32fast::hash(run.get().as_bytes()))
+}
