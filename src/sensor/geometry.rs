@@ -2,7 +2,10 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::ArrayScale;
+use super::{
+    ArrayScale,
+    fixed_point::{FixedPoint, Parts},
+};
 
 /// Positions of the electrode nodes of the undeformed sensor, in millimetres.
 ///
@@ -146,6 +149,69 @@ impl Geometry {
             self.column_y0_mm + self.column_pitch_mm * column as f64,
             0.0,
         )
+    }
+
+    /// Returns what differences of coordinates are made of, for nodes shifted sideways by at most `shift_mm`.
+    pub(super) fn differences(&self, scale: ArrayScale, row: usize, shift_mm: f64) -> Differences {
+        let x_mm = (self.row_x0_mm - self.column_node_x0_mm).abs()
+            + self.row_pitch_mm * scale.rows() as f64
+            + self.column_node_pitch_mm * scale.nodes_per_column() as f64;
+        let y_mm = self.node_pitch_mm * scale.nodes_per_row() as f64 + self.column_pitch_mm * scale.columns() as f64;
+        let grid = FixedPoint::new(x_mm + y_mm + shift_mm);
+        let first_row_x = grid.sum(self.row_x0_mm, -self.column_node_x0_mm);
+        Differences {
+            grid,
+            row_x: first_row_x.plus(grid.split(self.row_pitch_mm).times(row as f64)),
+            electrode_pitch: grid.split(self.column_node_pitch_mm),
+            half_node_pitch: grid.split(0.5 * self.node_pitch_mm),
+            half_column_pitch: grid.split(0.5 * self.column_pitch_mm),
+            nodes: scale.nodes_per_row(),
+            columns: scale.columns(),
+        }
+    }
+}
+
+/// Differences of coordinates between a row-wire's nodes and the electrodes of column-wires, in which the origin
+/// cancels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Differences {
+    grid: FixedPoint,
+    /// x of the row-wire minus that of the first node on the column-wires.
+    row_x: Parts,
+    electrode_pitch: Parts,
+    half_node_pitch: Parts,
+    half_column_pitch: Parts,
+    nodes: usize,
+    columns: usize,
+}
+
+impl Differences {
+    /// x of a node shifted by `shift_mm` minus that of the first node on the column-wires.
+    #[inline(always)]
+    pub(super) fn node_x(&self, shift_mm: f64) -> Parts {
+        self.row_x.plus(self.grid.split(shift_mm))
+    }
+
+    /// x of the first node on the column-wires minus that of node `electrode`.
+    #[inline(always)]
+    pub(super) fn electrode_x(&self, electrode: usize) -> Parts {
+        self.electrode_pitch.times(-(electrode as f64))
+    }
+
+    /// y of node `node` shifted by `shift_mm` minus that of the middle of the array.
+    #[inline(always)]
+    pub(super) fn node_y(&self, node: usize, shift_mm: f64) -> Parts {
+        let twice_from_centre = (2 * node) as f64 - (self.nodes - 1) as f64;
+        self.half_node_pitch
+            .times(twice_from_centre)
+            .plus(self.grid.split(shift_mm))
+    }
+
+    /// y of the middle of the array minus that of column-wire `column`.
+    #[inline(always)]
+    pub(super) fn column_y(&self, column: usize) -> Parts {
+        let twice_to_centre = (self.columns - 1) as f64 - (2 * column) as f64;
+        self.half_column_pitch.times(twice_to_centre)
     }
 }
 

@@ -4,6 +4,7 @@
 mod array_scale;
 mod axes;
 mod conductance;
+mod fixed_point;
 mod geometry;
 mod identifiability;
 mod reciprocal_distances;

@@ -134,29 +134,19 @@ impl SensorModel {
     /// Analytic derivatives ∂R_lk/∂u_li of row-wire `row`, in ohm per millimetre: shape M4 × M2 × 3, the last axis
     /// being ux, uy, uz (uz downwards).
     ///
-    /// With s = Σ 1/d and R = g/s, ∂R/∂u = (g/s²) Σ_j (∂d/∂u)/d² and ∂d/∂u = (dx, dy, −z)/d.
+    /// With s = Σ 1/d and R = g/s, ∂R/∂u = −(R/s) ∂s/∂u.
     ///
     /// # Errors
     /// A resistance that is not a positive finite number.
     pub fn row_jacobian(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Array3<f64>, SensorError> {
         let resistances_ohm = self.row_resistances(row, displacements_mm)?;
-        let shape = (self.scale.columns(), self.scale.nodes_per_row(), 3);
-        let mut jacobian = Array3::zeros(shape);
-        for (column, &resistance) in resistances_ohm.iter().enumerate() {
-            let per_sum = resistance * resistance / self.resistivity_ohm_per_mm;
-            for (node, &displacement) in displacements_mm.iter().enumerate() {
-                let position = self.displaced_mm(row, node, displacement);
-                let mut derivative = DVec3::ZERO;
-                for j in 0..self.scale.nodes_per_column() {
-                    let apart = position - self.geometry.column_node_mm(column, j);
-                    derivative += DVec3::new(apart.x, apart.y, -apart.z) / apart.length().powi(3);
-                }
-                for (axis, value) in derivative.to_array().into_iter().enumerate() {
-                    jacobian[[column, node, axis]] = per_sum * value;
-                }
-            }
-        }
-        Ok(jacobian)
+        let (columns, nodes) = (self.scale.columns(), self.scale.nodes_per_row());
+        let (mut sums, mut derivatives) = (vec![0.0; columns], vec![0.0; 3 * nodes * columns]);
+        let sensor = (self.scale, &self.geometry);
+        sum_reciprocal_distances::<3>(sensor, row, displacements_mm, &mut sums, &mut derivatives);
+        Ok(Array3::from_shape_fn((columns, nodes, 3), |(column, node, axis)| {
+            -resistances_ohm[column] / sums[column] * derivatives[(3 * node + axis) * columns + column]
+        }))
     }
 }
 
