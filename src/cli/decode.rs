@@ -7,7 +7,7 @@ use std::{
 use clap::Args;
 use ndarray::{Array2, Axis, Slice};
 
-use super::{failure::Failure, outside_readings::OutsideReadings, same_file::is_same};
+use super::{failure::Failure, outside_training::OutsideTraining, same_file::is_same};
 use crate::{
     dataset::{ReadError, Reading, ResistanceReader, SimulationError},
     export::{AtomicFile, NetworkFile, WriteError, write_decoded, write_decoded_header},
@@ -23,8 +23,9 @@ const BLOCK: usize = 1024;
 /// The input has columns named r_1, r_2, … (one for each column-wire, in ohm), in any order and among others, or just
 /// as many columns without names. Each line is one row-wire. For networks of known rows a column named row has its
 /// number from 1; without one, lines are whole snapshots from the first row to the last. The output has a line x_1, y_1, z_1, x_2, … in mm for
-/// each line of the input, and in a last column readings_outside how many of its readings are outside the range seen in
-/// training by more than a tenth of it; such lines are warned of.
+/// each line of the input, then readings_outside, the number of its readings that are outside the range seen in training
+/// by more than a tenth of that, and coordinates_outside, the number of coordinates that are outside by more than all of
+/// it; such lines are warned of.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -69,7 +70,7 @@ impl Decode {
         let mut output = AtomicFile::create(&self.output)?;
         let refused = |source| WriteError::io(&self.output, source);
         write_decoded_header(scale.nodes_per_row(), &mut output).map_err(refused)?;
-        let mut outside = OutsideReadings::default();
+        let mut outside = OutsideTraining::default();
         let mut is_empty = true;
         while let Some(reading) = reader.read(BLOCK).map_err(unreadable)? {
             is_empty = false;
@@ -109,11 +110,10 @@ impl Decode {
                     let path = self.input.clone();
                     return Err(Failure::NoAnswer { path, line });
                 }
-                let readings_ohm = readings_ohm
-                    .to_slice()
-                    .expect("a row of a standard array is contiguous");
-                let count = outside.count(network.at(row_index), line, readings_ohm);
-                write_decoded(coordinates_mm, count, &mut output).map_err(refused)?;
+                let readings_ohm = readings_ohm.to_slice().expect("a row of a standard array is contiguous");
+                let coordinates = coordinates_mm.to_slice().expect("a row of a standard array is contiguous");
+                let of_line = outside.count(network.at(row_index), line, readings_ohm, coordinates);
+                write_decoded(coordinates_mm, of_line.readings, of_line.coordinates, &mut output).map_err(refused)?;
             }
         }
         if is_empty {

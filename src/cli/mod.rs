@@ -9,7 +9,7 @@ mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
-mod outside_readings;
+mod outside_training;
 mod parsers;
 mod reproduce;
 mod reproduce_report;

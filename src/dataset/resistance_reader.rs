@@ -248,9 +248,14 @@ impl<R: BufRead> ResistanceReader<R> {
     }
 }
 
-/// Returns the text of a field, shortened to 40 characters for a message.
+/// Returns the text of a field, shortened to 40 characters for a message, control characters escaped.
 fn excerpt(field: &[u8]) -> String {
-    String::from_utf8_lossy(field).chars().take(40).collect()
+    let text: String = String::from_utf8_lossy(field).chars().take(40).collect();
+    if text.contains(char::is_control) {
+        text.escape_debug().to_string()
+    } else {
+        text
+    }
 }
 
 fn number(field: &[u8]) -> Option<f64> {
@@ -373,7 +378,7 @@ mod tests {
             ("zero", "0,2\n", "column 1: '0'"),
             ("empty", "r_1,r_2\n\n\n1,\n", "line 4, column 2: ''"),
             ("old line ends", "1,2\r3,4\r", "line 1: there is a line break"),
-            ("not text", "1,\u{0}\n", "column 2"),
+            ("not text", "1,\u{0}\u{1b}[2J\n", "column 2: '\\0\\u{1b}[2J'"),
         ];
         for (sentence, text, expected) in cases {
             let message = read(text).unwrap_err().to_string();

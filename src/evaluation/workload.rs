@@ -19,7 +19,7 @@ pub struct Workload {
     /// Multiplications of an epoch of all trainings.
     epoch_multiplications: f64,
     /// Largest number of epochs.
-    epochs: usize,
+    pub epochs: usize,
 }
 
 /// Time of a run on this machine, from rates measured on one thread. With more threads large runs are faster.

@@ -26,6 +26,7 @@ mod trade_file;
 #[cfg(feature = "figures")]
 mod trade_plot;
 mod unfinished;
+mod workload_words;
 mod workspace_file;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
@@ -45,4 +46,5 @@ pub use trade_file::write_trade;
 pub use trade_plot::trade_plot;
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
+pub use workload_words::describe_workload;
 pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

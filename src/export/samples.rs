@@ -58,22 +58,23 @@ pub fn write_samples(
 /// Any error of `writer`.
 pub(crate) fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     write_names("", nodes, writer)?;
-    writeln!(writer, ",readings_outside")
+    writeln!(writer, ",readings_outside,coordinates_outside")
 }
 
-/// Writes decoded coordinates in millimetres and how many of the readings were outside the range seen in training, empty
-/// if that is not known.
+/// Writes decoded coordinates in millimetres, how many of the readings were outside the range seen in training, empty if
+/// that is not known, and how many of the coordinates.
 ///
 /// # Errors
 /// Any error of `writer`.
 pub(crate) fn write_decoded(
     coordinates_mm: ArrayView1<'_, f64>,
     readings_outside: Option<usize>,
+    coordinates_outside: usize,
     writer: &mut dyn Write,
 ) -> io::Result<()> {
     write_numbers(coordinates_mm, writer)?;
     let count = readings_outside.map_or_else(String::new, |count| count.to_string());
-    writeln!(writer, ",{count}")
+    writeln!(writer, ",{count},{coordinates_outside}")
 }
 
 /// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name after `before`.

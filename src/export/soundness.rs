@@ -1,5 +1,7 @@
 use std::fmt::Display;
 
+use glam::DVec3;
+
 use super::NetworkFile;
 use crate::{
     evaluation::{Baselines, Errors, SimulatedSettings, StartRecord},
@@ -33,6 +35,7 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
             .map(|index| format!("network: weight {index} is not a finite number")),
         number_flaw(network, settings),
         (network.values().iter()).find_map(|network| mismatch(network, settings.source.sensor.scale, settings.hidden)),
+        place_flaw(network, settings),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
@@ -115,6 +118,42 @@ fn mismatch(network: &DecouplingNetwork, scale: ArrayScale, hidden: usize) -> Op
     Some(format!(
         "network: it {verb} {found} {what}, but array {scale} with {hidden} hidden nodes needs {expected}"
     ))
+}
+
+/// Describes the first coordinate of a training whose range no node of the scene reaches, even with a stroke to spare.
+/// Expects networks whose sizes and number fit the settings, and says nothing of others.
+fn place_flaw(networks: &Networks, settings: &SimulatedSettings) -> Option<String> {
+    let source = &settings.source;
+    let (sensor, scene) = (&source.sensor, &source.scene);
+    let rows = scene.rows.read(sensor.scale.rows()).ok()?;
+    let spare_mm = source.stroke_mm() + scene.movement.largest_shift_mm();
+    for (index, network) in networks.values().iter().enumerate() {
+        let outputs = network.outputs();
+        let rows = match networks.only() {
+            Some(_) => &rows[..],
+            None => rows.get(index..=index)?,
+        };
+        if outputs.channels() != sensor.scale.coordinates_per_row() {
+            return None;
+        }
+        for channel in 0..outputs.channels() {
+            let (node, axis) = (channel / 3, channel % 3);
+            let rest_mm = rows.iter().map(|&row| sensor.displaced_mm(row, node, DVec3::ZERO).to_array()[axis]);
+            let (low, high) = rest_mm.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rest_mm| {
+                (low.min(rest_mm), high.max(rest_mm))
+            });
+            let rounding_mm = 1e-9 * (low.abs().max(high.abs()) + spare_mm);
+            let possible = low - spare_mm - rounding_mm..=high + spare_mm + rounding_mm;
+            let (least, most) = outputs.extremes(channel);
+            if !(possible.contains(&least) && possible.contains(&most)) {
+                return Some(format!(
+                    "network: node {} was trained from {least:e} to {most:e} mm, but lies from {low} to {high} mm",
+                    node + 1
+                ));
+            }
+        }
+    }
+    None
 }
 
 fn unmeasured(place: &str, errors: &Errors) -> Option<String> {

@@ -114,6 +114,20 @@ impl MinMax {
             .collect()
     }
 
+    /// Smallest and largest training value of a channel.
+    pub fn extremes(&self, channel: usize) -> (f64, f64) {
+        (self.minimum[channel], self.maximum[channel])
+    }
+
+    /// Returns the channels whose value is farther outside the training range than that is wide.
+    pub fn far_outside<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = usize> + 'a {
+        (0..self.channels()).filter(move |&channel| {
+            let (low, high) = self.extremes(channel);
+            let width = high - low;
+            !(low - width..=high + width).contains(&values[channel])
+        })
+    }
+
     /// Middle and half width of a channel's range.
     fn range(&self, channel: usize) -> (f64, f64) {
         let half_width = 0.5 * (self.maximum[channel] - self.minimum[channel]);
@@ -176,6 +190,18 @@ mod tests {
         let scaled = scaling.scale(values.view());
         assert_eq!(scaled, array![[-1.0, -1.0], [1.0, 1.0], [0.0, 0.0]]);
         assert_eq!(scaling.restore(scaled.view()), values);
+    }
+
+    #[test]
+    fn far_outside_is_beyond_the_width_of_the_range() {
+        let scaling = MinMax::fit(array![[4.0, 7.0], [5.0, 7.0]].view()).unwrap();
+        let far = |first| scaling.far_outside(&[first, 7.0]).collect::<Vec<_>>();
+        for near in [3.0, 4.5, 6.0] {
+            assert!(far(near).is_empty(), "{near}");
+        }
+        for beyond in [2.9, 6.1, 1e308, f64::NAN] {
+            assert_eq!(far(beyond), [0], "{beyond}");
+        }
     }
 
     #[test]

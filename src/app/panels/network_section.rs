@@ -3,7 +3,8 @@ use eframe::egui::{RichText, Slider, Stroke, Ui};
 use super::fields::{capitalised, count_ui, list_ui, options_ui};
 use crate::{
     app::theme::{Theme, section_heading_ui, slider_style, space, type_size},
-    evaluation::SimulatedSettings,
+    evaluation::{SimulatedSettings, Workload},
+    export::describe_workload,
     network::{HiddenSuggestions, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     scene::{Movement, Rows},
 };
@@ -27,6 +28,18 @@ pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
              (Eq. 12). A start, not a bound."
         ));
     weights_ui(ui, draft);
+    workload_ui(ui, draft);
+}
+
+/// Memory and time of a training that takes much of either.
+fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+    if let Ok(workload) = Workload::of(draft)
+        && workload.is_large()
+    {
+        let warning = Theme::of(ui).palette.warning;
+        let text = capitalised(&describe_workload(&workload));
+        ui.label(RichText::new(text).size(type_size().note).color(warning));
+    }
 }
 
 fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {

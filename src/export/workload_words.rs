@@ -1,0 +1,23 @@
+use super::format_duration;
+use crate::evaluation::{Workload, WorkloadTime};
+
+/// Tells how much memory and time a run will take on this machine. The first time its speed is measured, which takes
+/// some 20 ms.
+pub fn describe_workload(workload: &Workload) -> String {
+    let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
+    let machine = Workload::machine_bytes().map_or_else(String::new, |bytes| format!(" of {}", gigabytes(bytes)));
+    let WorkloadTime {
+        drawing,
+        epoch,
+        all_epochs,
+    } = workload.time();
+    format!(
+        "about {}{machine} of memory; on one thread about {} to draw the samples and {} an epoch, {} for {} epochs; the \
+         figures of the decoders take further time",
+        gigabytes(workload.bytes),
+        format_duration(drawing),
+        format_duration(epoch),
+        format_duration(all_epochs),
+        workload.epochs
+    )
+}

@@ -1,0 +1,38 @@
+use std::fs;
+
+use decoupler::export::CheckpointFile;
+
+use crate::{
+    mutation::{for_each_seed, mutated},
+    sealing::resealed,
+    trained::trained,
+};
+
+#[test]
+fn damage_is_noticed_and_impossible_states_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    for run in trained() {
+        let file = CheckpointFile::from_run(&run).unwrap();
+        file.save(&path).unwrap();
+        let valid = fs::read(&path).unwrap();
+        for_each_seed(200, |rng| {
+            let damaged = mutated(&valid, rng);
+            fs::write(&path, &damaged).unwrap();
+            if let Ok(mut read) = CheckpointFile::load(&path) {
+                read.program.clone_from(&file.program);
+                assert_eq!(read, file, "{}", String::from_utf8_lossy(&damaged));
+            }
+            let Some(sealed) = resealed(&damaged) else { return };
+            fs::write(&path, sealed).unwrap();
+            // Other settings may ask for other samples, as many as a million.
+            if let Ok(read) = CheckpointFile::load(&path)
+                && read.settings.source == file.settings.source
+                && let Ok(mut resumed) = read.resume()
+            {
+                resumed.step();
+                assert!(resumed.node_scores().is_some());
+            }
+        });
+    }
+}

@@ -1,0 +1,86 @@
+//! Random changes of a valid input.
+
+use std::ops::Range;
+
+use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+/// Text that readers have stumbled over.
+const TOKENS: [&str; 30] = [
+    "0", "-1", "-", "1e308", "-1e308", "1e-308", "1e999", "5e-324", "NaN", "inf", "null", "18446744073709551616",
+    "99999999", "\"", "\\u0000", "{", "}", "[", "]", ",", ":", "\n", "\r", "\u{feff}", "×", "\0", "1.", ".5", "[[[[", "true",
+];
+
+/// Calls `check` with `default` seeded generators, or with `FUZZ_ROUNDS` times as many.
+pub(crate) fn for_each_seed(default: u64, mut check: impl FnMut(&mut ChaCha8Rng)) {
+    let rounds = std::env::var("FUZZ_ROUNDS").ok().and_then(|text| text.parse().ok());
+    for seed in 0..default * rounds.unwrap_or(1) {
+        check(&mut ChaCha8Rng::seed_from_u64(seed));
+    }
+}
+
+/// `valid` with one to four random changes.
+pub(crate) fn mutated(valid: &[u8], rng: &mut impl Rng) -> Vec<u8> {
+    let mut bytes = valid.to_vec();
+    for _ in 0..rng.random_range(1..=4) {
+        change(&mut bytes, rng);
+    }
+    bytes
+}
+
+fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {
+    if bytes.is_empty() {
+        bytes.push(rng.random());
+        return;
+    }
+    let place = rng.random_range(0..bytes.len());
+    match rng.random_range(0..10) {
+        0 => bytes[place] ^= 1 << rng.random_range(0..8),
+        1 => bytes[place] = rng.random(),
+        2 => bytes.truncate(place),
+        3 => {
+            let end = (place + rng.random_range(1..40)).min(bytes.len());
+            bytes.drain(place..end);
+        }
+        4 => {
+            let end = (place + rng.random_range(1..40)).min(bytes.len());
+            let part = bytes[place..end].to_vec();
+            bytes.splice(place..place, part);
+        }
+        5 => other_digit(bytes, rng),
+        6 => swap(bytes, b'\n', rng),
+        7 => swap(bytes, b',', rng),
+        8 => {
+            let token = TOKENS[rng.random_range(0..TOKENS.len())].bytes();
+            bytes.splice(place..place, token);
+        }
+        _ => {
+            let token = TOKENS[rng.random_range(0..TOKENS.len())].bytes();
+            let number = number_at(bytes, place);
+            bytes.splice(number, token);
+        }
+    }
+}
+
+/// Replaces a digit by another.
+fn other_digit(bytes: &mut [u8], rng: &mut impl Rng) {
+    let digits: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place].is_ascii_digit()).collect();
+    if let Some(&place) = digits.get(rng.random_range(0..digits.len().max(1))) {
+        bytes[place] = b'0' + (bytes[place] - b'0' + rng.random_range(1..10)) % 10;
+    }
+}
+
+/// Exchanges two of the parts between separators.
+fn swap(bytes: &mut Vec<u8>, separator: u8, rng: &mut impl Rng) {
+    let mut parts: Vec<&[u8]> = bytes.split(|&byte| byte == separator).collect();
+    let (one, other) = (rng.random_range(0..parts.len()), rng.random_range(0..parts.len()));
+    parts.swap(one, other);
+    *bytes = parts.join(&separator);
+}
+
+/// The number that begins at `place` or later.
+fn number_at(bytes: &[u8], place: usize) -> Range<usize> {
+    let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.e".contains(byte);
+    let begin = place + bytes[place..].iter().position(is_part).unwrap_or(0);
+    let length = bytes[begin..].iter().position(|byte| !is_part(byte));
+    begin..length.map_or(bytes.len(), |length| begin + length)
+}

@@ -1,0 +1,51 @@
+//! Parsers of words: what they accept is printed and read again as the same.
+
+use std::{fmt::Display, str::FromStr};
+
+use decoupler::{
+    decoupling::DecoderKind,
+    evaluation::Preset,
+    network::{Quantity, ScalingChoice},
+    scene::{Loading, Movement, Rows},
+    sensor::ArrayScale,
+};
+
+use crate::mutation::{for_each_seed, mutated};
+
+fn check<T: FromStr<Err: Display> + Display + PartialEq>(words: &[&str]) {
+    for word in words {
+        assert!(word.parse::<T>().is_ok(), "{word}");
+        for_each_seed(300, |rng| {
+            let bytes = mutated(word.as_bytes(), rng);
+            let text = String::from_utf8_lossy(&bytes);
+            match text.parse::<T>() {
+                Ok(value) => {
+                    let printed = value.to_string();
+                    let again = printed.parse::<T>();
+                    assert!(again.is_ok_and(|again| again == value), "{text}: {printed}");
+                }
+                Err(error) => assert!(!error.to_string().is_empty()),
+            }
+        });
+    }
+}
+
+#[test]
+fn array_scales() {
+    check::<ArrayScale>(&["10x10_5x30", "10×6_3×18", "1x1_1x1", "512X512_512x512"]);
+}
+
+#[test]
+fn scenes() {
+    check::<Rows>(&["all", "known", "7"]);
+    check::<Loading>(&["random", "smooth:3.5", "indenter", "indenter:sphere", "indenter:flat-punch"]);
+    check::<Movement>(&["z", "xyz"]);
+}
+
+#[test]
+fn choices() {
+    check::<Quantity>(&["resistance", "conductance", "log"]);
+    check::<ScalingChoice>(&["minmax", "whiten"]);
+    check::<DecoderKind>(&["mean", "network", "rbf"]);
+    check::<Preset>(&["paper", "best"]);
+}
