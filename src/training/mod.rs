@@ -7,6 +7,8 @@ mod adaptive_descent;
 mod algorithm;
 mod backpropagation;
 mod bayesian_regularization;
+#[cfg(test)]
+mod certified;
 mod checkpoint;
 mod continuation;
 mod damping;

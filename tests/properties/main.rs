@@ -1,6 +1,10 @@
 //! Properties that hold for arbitrary inputs, drawn from a fixed seed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod files;
+mod folds;
+mod scaling;
+mod sensor;
 mod surfaces;
 
 use proptest::test_runner::{Config, RngSeed};
