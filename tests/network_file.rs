@@ -200,7 +200,10 @@ fn impossible_contents_are_named() {
         ),
         (
             "a range of other channels",
-            replaced("\"reading_range\":{\"minimum\":[", "\"reading_range\":{\"minimum\":[1.0,"),
+            replaced(
+                "\"reading_range\":{\"minimum\":[",
+                "\"reading_range\":{\"minimum\":[1.0,",
+            ),
             "input scaling is damaged",
         ),
         (
@@ -263,7 +266,11 @@ fn other_files_and_versions_are_named() {
             replaced("\"version\":3", "\"version\":0"),
             "unknown field `crc32`",
         ),
-        ("an old version", replaced("\"version\":3", "\"version\":2"), "unknown field `crc32`"),
+        (
+            "an old version",
+            replaced("\"version\":3", "\"version\":2"),
+            "unknown field `crc32`",
+        ),
         ("something after the end", format!("{text}x"), "line 2 column 1"),
     ];
     for (sentence, text, expected) in cases {

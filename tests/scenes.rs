@@ -159,7 +159,10 @@ fn files_of_older_programs_still_load() {
         .unwrap();
     assert_eq!(run.settings().simulated().unwrap(), file.settings);
     let (resumed, read) = (run.network(), file.network);
-    assert_eq!((resumed.at(0).mlp(), resumed.at(0).outputs()), (read.at(0).mlp(), read.at(0).outputs()));
+    assert_eq!(
+        (resumed.at(0).mlp(), resumed.at(0).outputs()),
+        (read.at(0).mlp(), read.at(0).outputs())
+    );
     assert_eq!(resumed.at(0).inputs().scaling(), read.at(0).inputs().scaling());
     assert_eq!(run.node_scores().unwrap().network, file.errors);
 }

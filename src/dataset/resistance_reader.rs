@@ -308,7 +308,11 @@ mod tests {
 
     #[test]
     fn what_has_no_end_is_refused() {
-        let endless = |byte| ResistanceReader::new(io::BufReader::new(io::repeat(byte)), 2).err().unwrap();
+        let endless = |byte| {
+            ResistanceReader::new(io::BufReader::new(io::repeat(byte)), 2)
+                .err()
+                .unwrap()
+        };
         for byte in [b'1', b'\n', b',', b'"', 0, 255] {
             assert!(matches!(endless(byte), ReadError::Endless(_)), "{byte}");
         }

@@ -71,7 +71,9 @@ pub(super) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
 
 /// Memory of the machine in bytes, or what a container leaves of it; `None` where the system does not tell.
 pub(super) fn memory_bytes() -> Option<u64> {
-    let total = fs::read_to_string("/proc/meminfo").ok().and_then(|text| total_bytes(&text));
+    let total = fs::read_to_string("/proc/meminfo")
+        .ok()
+        .and_then(|text| total_bytes(&text));
     let limit = fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
     let limit = limit.and_then(|text| text.trim().parse().ok());
     [total, limit].into_iter().flatten().min()

@@ -67,7 +67,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "{\"format\":\"").unwrap();
-        File::options().write(true).open(&path).unwrap().set_len(1 << 40).unwrap();
+        File::options()
+            .write(true)
+            .open(&path)
+            .unwrap()
+            .set_len(1 << 40)
+            .unwrap();
         assert_eq!(read_limited(&path).unwrap_err().kind(), ErrorKind::FileTooLarge);
     }
 }

@@ -98,7 +98,9 @@ impl RunDocument {
         let last = training.history.0.last().map_or(0, |record| record.epoch);
         if training.epochs != last {
             let epochs = training.epochs;
-            return Err(format!("training.epochs: it is {epochs}, but the history ends with epoch {last}"));
+            return Err(format!(
+                "training.epochs: it is {epochs}, but the history ends with epoch {last}"
+            ));
         }
         Ok(NetworkFile {
             program,

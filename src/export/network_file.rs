@@ -256,7 +256,11 @@ impl NetworkFile {
         }
         let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
         let is_sealed = heading.version.as_u64() >= Some(SEALED_VERSION);
-        let read = if is_sealed { Self::read_sealed(bytes) } else { Self::read_unsealed(bytes) };
+        let read = if is_sealed {
+            Self::read_sealed(bytes)
+        } else {
+            Self::read_unsealed(bytes)
+        };
         let file = read.map_err(damaged)?;
         match flaw(&file) {
             Some(flaw) => Err(damaged(flaw)),

@@ -45,7 +45,10 @@ impl Unfinished {
     /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask). The first time
     /// it removes what killed programs left there.
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
-        let is_new = SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_owned());
+        let is_new = SWEPT
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(folder.to_owned());
         if is_new {
             sweep(folder);
         }

@@ -83,7 +83,11 @@ mod tests {
         let outside = |quantity, first| range.outside(quantity, &[first, 0.0]).collect::<Vec<_>>();
         // 4^0.1 = 1.1487
         for inside in [10.0, 40.0, 8.8, 45.9] {
-            assert!(range.outside(Quantity::Resistance, &[inside, -5.0]).all(|channel| channel == 1));
+            assert!(
+                range
+                    .outside(Quantity::Resistance, &[inside, -5.0])
+                    .all(|channel| channel == 1)
+            );
         }
         for beyond in [8.6, 46.1, 1e300, 1e-300] {
             assert_eq!(outside(Quantity::Resistance, beyond)[0], 0, "{beyond}");
