@@ -221,7 +221,11 @@ fn simulate_and_decode_agree_with_the_library() {
     let lines = text.lines().skip(1);
     assert_eq!(lines.clone().count(), 100);
     for (line, row) in lines.zip(decoded.rows()) {
-        let numbers = line.strip_suffix(",0,0").unwrap().split(',').map(|number| number.parse::<f64>().unwrap().to_bits());
+        let numbers = line
+            .strip_suffix(",0,0")
+            .unwrap()
+            .split(',')
+            .map(|number| number.parse::<f64>().unwrap().to_bits());
         assert!(numbers.eq(row.iter().map(|number| number.to_bits())));
     }
     let errors = Errors::measure(&truth, &decoded, SimulatedSettings::default().source.stroke_mm());

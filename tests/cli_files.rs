@@ -55,8 +55,20 @@ fn an_input_is_never_overwritten_by_the_output() {
     std::os::unix::fs::symlink("n.json", path("link.json")).unwrap();
     fs::hard_link(path("readings.csv"), path("hard.csv")).unwrap();
     fs::hard_link(path("n.json"), path("hard.json")).unwrap();
-    let before = [fs::read(path("readings.csv")).unwrap(), fs::read(path("n.json")).unwrap()];
-    let outputs = ["readings.csv", "./readings.csv", "link.csv", "hard.csv", "n.json", "./n.json", "link.json", "hard.json"];
+    let before = [
+        fs::read(path("readings.csv")).unwrap(),
+        fs::read(path("n.json")).unwrap(),
+    ];
+    let outputs = [
+        "readings.csv",
+        "./readings.csv",
+        "link.csv",
+        "hard.csv",
+        "n.json",
+        "./n.json",
+        "link.json",
+        "hard.json",
+    ];
     for output in outputs {
         let message = failure(
             &format!("decode --network n.json --input readings.csv --output {output}"),
@@ -67,7 +79,10 @@ fn an_input_is_never_overwritten_by_the_output() {
         assert_eq!(fs::read(path("readings.csv")).unwrap(), before[0], "{output}");
         assert_eq!(fs::read(path("n.json")).unwrap(), before[1], "{output}");
     }
-    let copied = decoupler("decode --network n.json --input readings.csv --output new.csv", folder.path());
+    let copied = decoupler(
+        "decode --network n.json --input readings.csv --output new.csv",
+        folder.path(),
+    );
     assert!(copied.status.success());
 }
 
@@ -99,16 +114,13 @@ fn what_never_ends_is_refused_at_a_stated_limit() {
             1,
         );
         assert!(message.contains("is not a network file"), "{endless}: {message}");
-        let message = failure(
-            &format!("train --checkpoint {endless} --resume"),
-            folder.path(),
-            1,
-        );
+        let message = failure(&format!("train --checkpoint {endless} --resume"), folder.path(), 1);
         assert!(message.contains("is not a checkpoint"), "{endless}: {message}");
     }
     // A file that begins as ours and has no end takes no more room on the disk than its beginning.
     let mut file = File::create(folder.path().join("endless.json")).unwrap();
-    file.write_all(b"{\"format\":\"decoupler network\",\"program\":\"").unwrap();
+    file.write_all(b"{\"format\":\"decoupler network\",\"program\":\"")
+        .unwrap();
     file.set_len(1 << 40).unwrap();
     let message = failure(
         "decode --network endless.json --input readings.csv --output out.csv",
@@ -146,7 +158,11 @@ fn a_link_to_a_missing_file_stays_and_its_target_is_written() {
     assert_eq!(written.lines().count(), 3);
     let astray = folder.path().join("astray.csv");
     std::os::unix::fs::symlink("missing/new.csv", &astray).unwrap();
-    let message = failure("simulate --array 2x2_2x6 --samples 2 --out astray.csv", folder.path(), 1);
+    let message = failure(
+        "simulate --array 2x2_2x6 --samples 2 --out astray.csv",
+        folder.path(),
+        1,
+    );
     assert!(message.contains("does not exist"), "{message}");
     assert!(astray.symlink_metadata().unwrap().is_symlink());
 }
@@ -157,7 +173,12 @@ fn what_a_killed_program_left_is_removed_by_the_next_and_nothing_else() {
     let path = |name: &str| folder.path().join(name);
     let at_work = File::create(path(".decoupler-atwork.part")).unwrap();
     at_work.lock().unwrap();
-    for name in [".decoupler-abc123.part", ".decoupler-notes.txt", ".other-abc123.part", "decoupler-abc123.part"] {
+    for name in [
+        ".decoupler-abc123.part",
+        ".decoupler-notes.txt",
+        ".other-abc123.part",
+        "decoupler-abc123.part",
+    ] {
         fs::write(path(name), "half").unwrap();
     }
     let output = decoupler("simulate --array 2x2_2x6 --samples 2 --out new.csv", folder.path());
@@ -167,7 +188,13 @@ fn what_a_killed_program_left_is_removed_by_the_next_and_nothing_else() {
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    let expected = [".decoupler-atwork.part", ".decoupler-notes.txt", ".other-abc123.part", "decoupler-abc123.part", "new.csv"];
+    let expected = [
+        ".decoupler-atwork.part",
+        ".decoupler-notes.txt",
+        ".other-abc123.part",
+        "decoupler-abc123.part",
+        "new.csv",
+    ];
     assert_eq!(names, expected);
 }
 
@@ -190,7 +217,14 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
             (message, Some(decoded.unwrap()))
         };
         let flags = |decoded: &str| -> Vec<String> {
-            assert!(decoded.lines().next().unwrap().ends_with(",readings_outside,coordinates_outside"), "{decoded}");
+            assert!(
+                decoded
+                    .lines()
+                    .next()
+                    .unwrap()
+                    .ends_with(",readings_outside,coordinates_outside"),
+                "{decoded}"
+            );
             let lines = decoded.lines().skip(1);
             lines.map(|line| line.rsplit(',').nth(1).unwrap().to_owned()).collect()
         };
@@ -198,7 +232,11 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
         let (message, decoded) = decode("readings.csv");
         assert_eq!(message, "", "{scene}");
         assert!(flags(&decoded.unwrap()).iter().all(|flag| flag == "0"), "{scene}");
-        let lines: Vec<String> = fs::read_to_string(path("readings.csv")).unwrap().lines().map(str::to_owned).collect();
+        let lines: Vec<String> = fs::read_to_string(path("readings.csv"))
+            .unwrap()
+            .lines()
+            .map(str::to_owned)
+            .collect();
         let with = |line: usize, column: usize, value: &str| {
             let mut fields: Vec<&str> = lines[line].split(',').collect();
             fields[column] = value;
@@ -222,7 +260,11 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
             let mut changed = lines.clone();
             changed[3] = with(3, 2 + 4, value);
             fs::write(path("odd.csv"), changed.join("\n")).unwrap();
-            let message = failure("decode --network n.json --input odd.csv --output out2.csv", folder.path(), 1);
+            let message = failure(
+                "decode --network n.json --input odd.csv --output out2.csv",
+                folder.path(),
+                1,
+            );
             assert!(message.contains("line 4, column 7"), "{scene}, {value}: {message}");
         }
     }
@@ -240,7 +282,10 @@ fn a_file_without_checksum_is_read_with_a_warning() {
     );
     let message = text(&output.stderr);
     assert!(output.status.success(), "{message}");
-    assert!(message.starts_with("warning: ") && message.contains("version 1"), "{message}");
+    assert!(
+        message.starts_with("warning: ") && message.contains("version 1"),
+        "{message}"
+    );
     assert!(message.contains("checksum") && message.contains("range"), "{message}");
 }
 
@@ -252,7 +297,10 @@ fn noise_beyond_all_numbers_is_refused() {
         format!("train {SMALL} --noise-ohm 1e308 --decoder mean"),
     ] {
         let message = failure(&arguments, folder.path(), 2);
-        assert!(message.contains("additive noise") && message.contains("from 0 to 1e150"), "{message}");
+        assert!(
+            message.contains("additive noise") && message.contains("from 0 to 1e150"),
+            "{message}"
+        );
     }
     assert!(!folder.path().join("out.csv").exists());
 }
@@ -263,11 +311,17 @@ fn figures_that_single_precision_has_not_are_explained() {
     let arguments = format!("train {SMALL} --noise-ohm 1e39 --decoder network");
     let output = decoupler(&arguments, folder.path());
     let figures = text(&output.stdout);
-    assert!(figures.contains("network_f32: ") && figures.contains("single precision"), "{figures}");
+    assert!(
+        figures.contains("network_f32: ") && figures.contains("single precision"),
+        "{figures}"
+    );
     let output = decoupler(&format!("{arguments} --json"), folder.path());
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let single = &report["decoders"]["network_f32"];
     assert_eq!(single["z_percent"], Value::Null);
-    assert!(single["no_figures"].as_str().unwrap().contains("single precision"), "{single}");
+    assert!(
+        single["no_figures"].as_str().unwrap().contains("single precision"),
+        "{single}"
+    );
     assert_eq!(report["decoders"]["network"]["no_figures"], Value::Null);
 }

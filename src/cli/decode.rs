@@ -110,8 +110,12 @@ impl Decode {
                     let path = self.input.clone();
                     return Err(Failure::NoAnswer { path, line });
                 }
-                let readings_ohm = readings_ohm.to_slice().expect("a row of a standard array is contiguous");
-                let coordinates = coordinates_mm.to_slice().expect("a row of a standard array is contiguous");
+                let readings_ohm = readings_ohm
+                    .to_slice()
+                    .expect("a row of a standard array is contiguous");
+                let coordinates = coordinates_mm
+                    .to_slice()
+                    .expect("a row of a standard array is contiguous");
                 let of_line = outside.count(network.at(row_index), line, readings_ohm, coordinates);
                 write_decoded(coordinates_mm, of_line.readings, of_line.coordinates, &mut output).map_err(refused)?;
             }

@@ -35,10 +35,16 @@ impl OutsideTraining {
         let readings = range.map(|range| range.outside(inputs.quantity(), readings_ohm).collect::<Vec<_>>());
         let coordinates: Vec<usize> = outputs.far_outside(coordinates_mm).collect();
         self.lines += 1;
-        let first_reading = readings.iter().flatten().next().copied().zip(range).map(|(channel, range)| {
-            let limits = range.extremes(channel);
-            described(&format!("r_{}", channel + 1), readings_ohm[channel], "ohm", limits)
-        });
+        let first_reading = readings
+            .iter()
+            .flatten()
+            .next()
+            .copied()
+            .zip(range)
+            .map(|(channel, range)| {
+                let limits = range.extremes(channel);
+                described(&format!("r_{}", channel + 1), readings_ohm[channel], "ohm", limits)
+            });
         let first_coordinate = coordinates.first().map(|&channel| {
             let name = format!("{}_{}", ["x", "y", "z"][channel % 3], channel / 3 + 1);
             described(&name, coordinates_mm[channel], "mm", outputs.extremes(channel))

@@ -140,14 +140,17 @@ impl Reproduce {
                 results,
             })
             .collect();
-        if let Some(folder) = &self.out {
-            reproduced.iter().try_for_each(|table| write_files(folder, table))?;
-        }
+        // Whatever fails here, the figures are printed.
+        let written = match &self.out {
+            Some(folder) => reproduced.iter().try_for_each(|table| write_files(folder, table)),
+            None => Ok(()),
+        };
         if self.json {
             print_json(&reproduced, begun.elapsed())?;
         } else {
             print_text(&reproduced, begun.elapsed())?;
         }
+        written?;
         if done < trials {
             return Err(Failure::InterruptedTrials { done, trials });
         }

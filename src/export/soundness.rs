@@ -138,7 +138,9 @@ fn place_flaw(networks: &Networks, settings: &SimulatedSettings) -> Option<Strin
         }
         for channel in 0..outputs.channels() {
             let (node, axis) = (channel / 3, channel % 3);
-            let rest_mm = rows.iter().map(|&row| sensor.displaced_mm(row, node, DVec3::ZERO).to_array()[axis]);
+            let rest_mm = rows
+                .iter()
+                .map(|&row| sensor.displaced_mm(row, node, DVec3::ZERO).to_array()[axis]);
             let (low, high) = rest_mm.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rest_mm| {
                 (low.min(rest_mm), high.max(rest_mm))
             });

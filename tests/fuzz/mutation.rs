@@ -6,8 +6,36 @@ use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 /// Text that readers have stumbled over.
 const TOKENS: [&str; 30] = [
-    "0", "-1", "-", "1e308", "-1e308", "1e-308", "1e999", "5e-324", "NaN", "inf", "null", "18446744073709551616",
-    "99999999", "\"", "\\u0000", "{", "}", "[", "]", ",", ":", "\n", "\r", "\u{feff}", "×", "\0", "1.", ".5", "[[[[", "true",
+    "0",
+    "-1",
+    "-",
+    "1e308",
+    "-1e308",
+    "1e-308",
+    "1e999",
+    "5e-324",
+    "NaN",
+    "inf",
+    "null",
+    "18446744073709551616",
+    "99999999",
+    "\"",
+    "\\u0000",
+    "{",
+    "}",
+    "[",
+    "]",
+    ",",
+    ":",
+    "\n",
+    "\r",
+    "\u{feff}",
+    "×",
+    "\0",
+    "1.",
+    ".5",
+    "[[[[",
+    "true",
 ];
 
 /// Calls `check` with `default` seeded generators, or with `FUZZ_ROUNDS` times as many.
@@ -63,7 +91,9 @@ fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {
 
 /// Replaces a digit by another.
 fn other_digit(bytes: &mut [u8], rng: &mut impl Rng) {
-    let digits: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place].is_ascii_digit()).collect();
+    let digits: Vec<usize> = (0..bytes.len())
+        .filter(|&place| bytes[place].is_ascii_digit())
+        .collect();
     if let Some(&place) = digits.get(rng.random_range(0..digits.len().max(1))) {
         bytes[place] = b'0' + (bytes[place] - b'0' + rng.random_range(1..10)) % 10;
     }

@@ -38,7 +38,13 @@ fn array_scales() {
 #[test]
 fn scenes() {
     check::<Rows>(&["all", "known", "7"]);
-    check::<Loading>(&["random", "smooth:3.5", "indenter", "indenter:sphere", "indenter:flat-punch"]);
+    check::<Loading>(&[
+        "random",
+        "smooth:3.5",
+        "indenter",
+        "indenter:sphere",
+        "indenter:flat-punch",
+    ]);
     check::<Movement>(&["z", "xyz"]);
 }
 

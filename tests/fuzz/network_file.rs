@@ -50,7 +50,9 @@ fn what_is_accepted_answers_in_numbers_or_is_flagged() {
         NetworkFile::from_run(&run).unwrap().save(&path).unwrap();
         let valid = fs::read(&path).unwrap();
         for_each_seed(150, |rng| {
-            let Some(damaged) = resealed(&mutated(&valid, rng)) else { return };
+            let Some(damaged) = resealed(&mutated(&valid, rng)) else {
+                return;
+            };
             let Some(file) = loaded(&path, &damaged) else { return };
             accepted += 1;
             let height_mm = file.settings.source.sensor.geometry.height_mm;
@@ -75,6 +77,12 @@ fn check_answer(network: &DecouplingNetwork, readings_ohm: &[f64], height_mm: f6
     let answer = answer.as_slice().unwrap();
     let is_flagged = network.outputs().far_outside(answer).next().is_some();
     let is_refused = answer.iter().any(|coordinate| !coordinate.is_finite());
-    let is_near = || answer.iter().skip(2).step_by(3).all(|z_mm| z_mm.abs() <= 5.0 * height_mm);
+    let is_near = || {
+        answer
+            .iter()
+            .skip(2)
+            .step_by(3)
+            .all(|z_mm| z_mm.abs() <= 5.0 * height_mm)
+    };
     assert!(is_flagged || is_refused || is_near(), "{answer:?}");
 }

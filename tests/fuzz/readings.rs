@@ -9,7 +9,9 @@ const CHANNELS: usize = 3;
 
 /// Reads all of it in blocks of `most` rows.
 fn check(bytes: &[u8], most: usize) {
-    let Ok(reader) = ResistanceReader::new(bytes, CHANNELS) else { return };
+    let Ok(reader) = ResistanceReader::new(bytes, CHANNELS) else {
+        return;
+    };
     let mut reader = reader.with_row_wires(4);
     let mut last_line = 0;
     while let Ok(Some(block)) = reader.read(most) {
@@ -26,7 +28,10 @@ fn check(bytes: &[u8], most: usize) {
 #[test]
 fn only_resistances_come_out_of_any_file() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fuzz/corpus/readings");
-    let mut corpus: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut corpus: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     corpus.sort();
     assert!(corpus.len() > 3);
     for path in corpus {

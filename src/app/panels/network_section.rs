@@ -137,3 +137,27 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
     });
     ui.add_space(space(1));
 }
+
+#[cfg(test)]
+mod tests {
+    use eframe::egui::accesskit::Role;
+    use egui_kittest::{Harness, kittest::Queryable as _};
+
+    use super::*;
+
+    #[test]
+    fn a_large_training_tells_its_memory_and_time_before_it_begins() {
+        for (hidden, is_told) in [(12, false), (512, true)] {
+            let mut draft = SimulatedSettings {
+                hidden,
+                ..SimulatedSettings::default()
+            };
+            draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
+            let harness = Harness::new_ui(move |ui| network_section_ui(ui, &mut draft));
+            let told = harness.query_all_by_role(Role::Label);
+            let texts: Vec<String> = told.filter_map(|node| node.value()).collect();
+            let is_found = texts.iter().any(|text| text.contains("of memory"));
+            assert_eq!(is_found, is_told, "{texts:?}");
+        }
+    }
+}
