@@ -105,27 +105,27 @@ fn a_network_that_is_its_random_start_is_flagged_with_cause_and_cure() {
         (
             "--method scg --set lambda=1e300",
             "no better than its random start",
-            "lambda 5e-7 (now 1e300)",
+            "lambda to 5e-7 (now 1e300)",
         ),
         (
             "--method gd --set learning-rate=1e300",
             "diverged in epoch 1",
-            "learning rate 0.01 (now 1e300)",
+            "learning rate to 0.01 (now 1e300)",
         ),
         (
             "--method gdx --set learning-rate=1e300",
             "no better than its random start",
-            "learning rate 0.01 (now 1e300)",
+            "learning rate to 0.01 (now 1e300)",
         ),
         (
             "--method rp --set first-step-length=1e300 --set largest-step-length=1e300",
             "diverged in epoch 1",
-            "first step length 0.07 (now 1e300)",
+            "first step length to 0.07 (now 1e300)",
         ),
         (
             "--method br --set mu=1e300 --set largest-mu=1e300",
             "no better than its random start",
-            "mu 0.005 (now 1e300)",
+            "mu to 0.005 (now 1e300)",
         ),
         (
             "--method lm --goal 1e9",

@@ -1,9 +1,14 @@
 //! Trainings that come to nothing say why, and what to change.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod training_problems;
 
 use decoupler::training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainingFlaw, TrainingSettings};
 use training_problems::{problem, start};
+
+/// Names of settings, and the values they are given.
+type Values = &'static [(&'static str, f64)];
 
 /// The method of this short name with these settings.
 fn method(short_name: &str, values: &[(&str, f64)]) -> Method {
@@ -69,23 +74,27 @@ fn settings_that_cannot_work_are_refused_with_the_way_out() {
 /// The flaw names the method's own settings, never those of another.
 #[test]
 fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
-    let cases: [(&str, &[(&str, f64)], &str); 8] = [
-        ("scg", &[("lambda", 1e300)], "lambda 5e-7 (now 1e300)"),
-        ("gdx", &[("learning rate", 1e300)], "learning rate 0.01 (now 1e300)"),
-        ("gdx", &[("learning rate", 1e-300)], "learning rate 0.01 (now 1e-300)"),
-        ("gd", &[("learning rate", 1e300)], "learning rate 0.01 (now 1e300)"),
+    let cases: [(&str, Values, &str); 8] = [
+        ("scg", &[("lambda", 1e300)], "lambda to 5e-7 (now 1e300)"),
+        ("gdx", &[("learning rate", 1e300)], "learning rate to 0.01 (now 1e300)"),
+        (
+            "gdx",
+            &[("learning rate", 1e-300)],
+            "learning rate to 0.01 (now 1e-300)",
+        ),
+        ("gd", &[("learning rate", 1e300)], "learning rate to 0.01 (now 1e300)"),
         (
             "gdm",
             &[("learning rate", 1e6), ("momentum", 1.0)],
-            "learning rate 0.01 (now 1e6), momentum 0.9 (now 1)",
+            "learning rate to 0.01 (now 1e6), momentum to 0.9 (now 1)",
         ),
-        ("gdms", &[("learning rate", 1e-9)], "learning rate 0.01 (now 1e-9)"),
+        ("gdms", &[("learning rate", 1e-9)], "learning rate to 0.01 (now 1e-9)"),
         (
             "rp",
             &[("first step length", 1e300), ("largest step length", 1e300)],
-            "first step length 0.07 (now 1e300)",
+            "first step length to 0.07 (now 1e300)",
         ),
-        ("lm", &[("mu", 1e300), ("largest mu", 1e300)], "mu 0.001 (now 1e300)"),
+        ("lm", &[("mu", 1e300), ("largest mu", 1e300)], "mu to 0.001 (now 1e300)"),
     ];
     for (name, values, words) in cases {
         let trainer = trained(method(name, values), 30);

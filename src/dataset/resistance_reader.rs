@@ -49,7 +49,7 @@ pub struct Reading {
 #[non_exhaustive]
 pub enum ReadError {
     /// The file has no rows of resistances.
-    #[error("there are no rows of resistances in it")]
+    #[error("there are no rows of resistances in it; give one line for each row-wire")]
     Empty,
     /// A column is missing.
     #[error("there is no column r_{0}; name the columns r_1 to r_{1}, or give {1} columns without names")]

@@ -43,8 +43,8 @@ impl RunFlaw {
             });
         }
         let method = start.rows()[0].settings().method;
-        // True for an error that is no number.
-        (!(network.z_mm <= mean.z_mm)).then_some(Self::WorseThanMean { reason, method })
+        let is_worse = network.z_mm > mean.z_mm || network.z_mm.is_nan();
+        is_worse.then_some(Self::WorseThanMean { reason, method })
     }
 }
 

@@ -47,7 +47,7 @@ pub enum SceneError {
     #[error("the largest compression is {:?} %: it must be above 0 and below 100 % of the height", 100.0 * .0)]
     Compression(f64),
     /// The array has no such row-wire.
-    #[error("row {row} does not exist: the array has rows 1 to {rows}")]
+    #[error("row {row} does not exist: the array has rows 1 to {rows}; give one of them")]
     Row {
         /// Row asked for, from 1.
         row: usize,

@@ -33,7 +33,8 @@ pub enum SensorError {
     Resistivity(f64),
     /// A resistance came out as zero, infinite or NaN.
     #[error(
-        "row {}, column {}: the resistance is {resistance_ohm:?} ohm; a node touches a column-wire or a length is out of range",
+        "row {}, column {}: the resistance is {resistance_ohm:?} ohm; a node touches a column-wire, or a length is \
+         out of range; press less deep, or give lengths nearer to a millimetre",
         row + 1,
         column + 1
     )]

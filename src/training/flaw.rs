@@ -31,10 +31,11 @@ impl TrainingFlaw {
         let reason = trainer.stop_reason()?;
         let start = trainer.history().first()?;
         let start_mse = start.validation_mse.unwrap_or(start.training_mse);
+        let enough = (1.0 - Self::LEAST_GAIN) * start_mse;
         let flaw = Self {
             diverged_in: diverged_in(trainer.history(), reason),
             // False for a start without any error, which nothing can improve; true for one that is no number.
-            is_at_start: start_mse != 0.0 && !(trainer.best_mse() < (1.0 - Self::LEAST_GAIN) * start_mse),
+            is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
             best_epoch: trainer.best_epoch(),
             epochs: trainer.latest().epoch,
             reason,

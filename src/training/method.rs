@@ -229,17 +229,13 @@ impl Method {
                 let Setting {
                     name, default, value, ..
                 } = setting;
-                format!("{name} {} (now {})", short(default), short(*value))
+                format!("{name} to {} (now {})", short(default), short(*value))
             })
             .collect();
         if changed.is_empty() {
             return self.words().cure.to_owned();
         }
-        format!(
-            "set back to its default: {}; or {}",
-            changed.join(", "),
-            self.words().cure
-        )
+        format!("set back {}; or {}", changed.join(", "), self.words().cure)
     }
 
     /// Resumes the method where an interrupted training left it; `None` if `state` is that of another method.

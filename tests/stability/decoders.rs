@@ -14,8 +14,10 @@ use crate::{
 };
 
 const ROOM: &str = "decoder";
-/// What chance may add on the test set to an error that is the mean's.
-const BY_CHANCE: f64 = 1.2;
+/// Factor that chance may put on an error that is the mean's, on a test set of so many nodes.
+fn by_chance(nodes: usize) -> f64 {
+    1.1 + 2.0 / (nodes as f64).sqrt()
+}
 
 /// Mean |decoded z − z|, summed here.
 fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
@@ -95,7 +97,7 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
             report.errors.z_mm
         ));
     }
-    if found > BY_CHANCE * seen.mean_mm {
+    if found > by_chance(answers.len() / 3) * seen.mean_mm {
         let times = found / seen.mean_mm;
         return or_flagged(format!(
             "{kind}: {times:.1e} times the error of the mean, and nothing says so"
@@ -132,8 +134,7 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     if !limit_mm.is_finite() {
         return wrong(format!("the reference is {limit_mm}"));
     }
-    let by_chance = if nodes >= 100 { 1.1 } else { 2.0 };
-    if limit_mm > by_chance * seen.mean_mm {
+    if limit_mm > by_chance(nodes) * seen.mean_mm {
         return wrong(format!(
             "the reference is {:.2e} times the error of the mean",
             limit_mm / seen.mean_mm

@@ -38,7 +38,7 @@ type Damage = fn(&mut Vec<u8>, f64);
 
 const DAMAGES: [(&str, Damage); 5] = [
     ("cut off", |bytes, place| {
-        bytes.truncate((place * bytes.len() as f64) as usize)
+        bytes.truncate((place * bytes.len() as f64) as usize);
     }),
     ("a bit flipped", |bytes, place| {
         let at = (place * bytes.len() as f64) as usize;
@@ -121,7 +121,7 @@ fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
         let mut reader = ResistanceReader::new(text.as_bytes(), 3)?;
         let mut values = Vec::new();
         while let Some(reading) = reader.read(2)? {
-            values.extend(reading.resistances_ohm.into_iter());
+            values.extend(reading.resistances_ohm);
         }
         Ok::<_, decoupler::dataset::ReadError>(values)
     };
@@ -133,7 +133,10 @@ fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
     }
 }
 
-fn tables() -> Vec<(&'static str, String, Option<Vec<[f64; 3]>>)> {
+/// What is tried, the text, and the lines that it holds; none where it must be refused.
+type Text = (&'static str, String, Option<Vec<[f64; 3]>>);
+
+fn tables() -> Vec<Text> {
     let one = Some(vec![[1.0, 2.0, 3.0]]);
     let mut tables = vec![
         ("plain", "1,2,3\n".to_owned(), one.clone()),
@@ -160,7 +163,7 @@ fn tables() -> Vec<(&'static str, String, Option<Vec<[f64; 3]>>)> {
             Some(vec![[1e308, 1e-308, 5e-324]]),
         ),
         ("nothing", String::new(), None),
-        ("only names", "r_1,r_2,r_3\n".to_owned(), None),
+        ("only names", "r_1,r_2,r_3\n".to_owned(), Some(Vec::new())),
         ("a column missing", "r_1,r_2\n1,2\n".to_owned(), None),
         ("a column twice", "r_1,r_1,r_2,r_3\n1,1,2,3\n".to_owned(), None),
         ("a value missing", "1,2,3\n1,2\n".to_owned(), None),

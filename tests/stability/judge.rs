@@ -108,9 +108,10 @@ pub(crate) fn wrong(what: impl Into<String>) -> Verdict {
 
 /// What a message lacks: it names no cure, or is not for people.
 fn flaw_of(message: &str) -> Option<&'static str> {
-    const CURES: [&str; 25] = [
+    const CURES: &[&str] = &[
         "give", "must", "use ", "take", "lower", "raise", "set ", "draw", "train", "make", "check", "choose", "write",
         "copy", "fewer", "keep", "end rows", "name ", "need", "let ", "shift", "begin", "install", "resume", "change",
+        "scale ", "correct", "press ",
     ];
     let words = message.to_lowercase();
     if !CURES.iter().any(|cure| words.contains(cure)) {

@@ -4,7 +4,7 @@ use decoupler::{
     network::{Mlp, Shape},
     training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingFlaw, TrainingSettings},
 };
-use ndarray::Array2;
+use ndarray::{Array2, Axis, Slice};
 
 use crate::judge::{Job, Verdict, agree, flagged, refused, wrong};
 
@@ -71,7 +71,7 @@ impl Task {
         let cut = self.training_samples();
         let examples = |rows: std::ops::Range<usize>| {
             let (inputs, targets) = (&self.inputs, &self.targets);
-            let at = |set: &Array2<f64>| set.slice(ndarray::s![rows.clone(), ..]).to_owned();
+            let at = |set: &Array2<f64>| set.slice_axis(Axis(0), Slice::from(rows.clone())).to_owned();
             Examples::new(at(inputs).view(), at(targets).view())
         };
         let samples = self.inputs.nrows();
@@ -151,7 +151,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     }
     match flaw {
         Some(flaw) => flagged(&flaw),
-        None if start > 0.0 && !(best < 0.99 * start) => wrong(format!(
+        None if start > 0.0 && best >= 0.99 * start => wrong(format!(
             "the network is its random start, and nothing says so: {reason}"
         )),
         None => Verdict::Right,

@@ -36,9 +36,9 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
             let mut answer = vec![f64::NAN; decoder.outputs()];
             let verdict = match decoder.decode_row(0, &readings, &mut answer) {
                 Err(error) => refused(&error),
-                Ok(()) if !is_resistance => wrong(format!("{kind} answers readings that are no resistances")),
                 // It answers the same whatever it reads.
                 Ok(()) if kind == DecoderKind::Mean => Verdict::Right,
+                Ok(()) if !is_resistance => wrong(format!("{kind} answers readings that are no resistances")),
                 Ok(()) => match remark(&run, &readings) {
                     Some(remark) => flagged(&remark),
                     None => {

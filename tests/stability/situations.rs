@@ -132,6 +132,17 @@ fn sizes() -> Vec<Situation> {
             found.push(("array sizes and rows", format!("{scale}, rows {rows}"), settings));
         }
     }
+    if !cfg!(debug_assertions) {
+        for rows in [Rows::All, Rows::One(0)] {
+            let settings = changed(|settings| {
+                settings.source.sensor = SensorModel::new("32x32_16x96".parse().unwrap());
+                settings.source.scene.rows = rows;
+                settings.source.samples = 800;
+                settings.source.test_samples = 64;
+            });
+            found.push(("array sizes and rows", format!("32x32_16x96, rows {rows}"), settings));
+        }
+    }
     for (samples, validation, test) in [
         (1, 0, 1),
         (1, 0, 100),

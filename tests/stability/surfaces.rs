@@ -88,7 +88,7 @@ fn judge_gap(x_mm: &[f64], y_mm: &[f64], missing: f64) -> Verdict {
     let mut nodes = vec![5.0; x_mm.len() * y_mm.len()];
     nodes[0] = missing;
     let surface = map.evaluate(&nodes);
-    let is_sound = |value: &f64| value.is_nan() || (*value - 5.0).abs() < 1e-6;
+    let is_sound = |value: &f64| !value.is_finite() || (*value - 5.0).abs() < 1e-6;
     if surface.iter().all(is_sound) {
         Verdict::Right
     } else {
@@ -125,7 +125,10 @@ pub(crate) fn jobs() -> Vec<Job> {
                 }));
             }
             let plane = (x_mm.clone(), y_mm.clone());
-            let value = move |x: f64, y: f64| 5.0 + 0.3 * (x - origin) / unit - 0.1 * (y + origin) / unit;
+            // Across a single row or column nothing says how a plane slopes.
+            let slope_x = if rows > 1 { 0.3 / unit } else { 0.0 };
+            let slope_y = if nodes > 1 { -0.1 / unit } else { 0.0 };
+            let value = move |x: f64, y: f64| 5.0 + slope_x * (x - origin) + slope_y * (y + origin);
             let sentence = format!("{on}, a plane");
             // Coordinates themselves round at large origins.
             let share = 1e-9_f64.max(1e-14 * origin / unit);

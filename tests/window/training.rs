@@ -252,7 +252,7 @@ fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
     let verdict = driver.texts().into_iter().find(|text| {
         text.starts_with("Training diverged in epoch 1, and the network is no better than its random start")
     });
-    assert!(verdict.is_some_and(|text| text.contains("learning rate 0.01 (now 1e6)")));
+    assert!(verdict.is_some_and(|text| text.contains("learning rate to 0.01 (now 1e6)")));
     assert!(!driver.says("Train for more epochs"), "more of the same would not help");
     for tab in TABS {
         driver.click(tab);
