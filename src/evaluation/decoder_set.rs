@@ -102,7 +102,7 @@ impl DecoderSet {
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
         let Self { settings, training, .. } = self;
-        let (row_model, noise) = (settings.source.row_model(), unseen_noise(&settings.source)?);
+        let (row_model, unseen) = (settings.source.row_model(), unseen_noise(&settings.source)?);
         let mut rng = settings.seed.rng(Stream::Expectation);
         Ok(Some(match kind {
             DecoderKind::Mean => {
@@ -110,17 +110,17 @@ impl DecoderSet {
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::Ridge => {
-                let fit = |set: &Dataset| AffineMap::ridge(set, settings.inputs, noise);
+                let fit = |set: &Dataset| AffineMap::ridge(set, settings.inputs, unseen);
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::RadialBasis => {
                 let basis = RadialBasisSettings::default();
-                let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, noise, basis, &mut rng);
+                let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, unseen, basis, &mut rng);
                 Box::new(PerRow::fit(training, row_model, fit)?) as Box<dyn Decoder>
             }
             DecoderKind::Fuzzy => {
                 let quantity = settings.inputs.quantity;
-                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, noise, &mut rng);
+                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, unseen, &mut rng);
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::Network => return Ok(self.network(precision)),

@@ -12,6 +12,7 @@ use super::{DecodeError, Decoder};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
+    scene::NoiseSource,
 };
 
 /// A fuzzy system of Takagi and Sugeno (1985): rules "if the readings x are near centre i, then the coordinates are
@@ -46,14 +47,14 @@ pub struct TakagiSugeno {
 }
 
 impl TakagiSugeno {
-    /// Fits to a training set, on this quantity of the readings, whitened; `noise` as in [`Inputs::fit`]; `rng` chooses
+    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` as in [`Inputs::fit`]; `rng` chooses
     /// the folds of the cross-validation and where clusters begin.
     ///
     /// # Errors
     /// Values that cannot be scaled.
-    pub fn fit(training: &Dataset, quantity: Quantity, noise: f64, rng: &mut impl Rng) -> Result<Self, ScalingError> {
+    pub fn fit(training: &Dataset, quantity: Quantity, unseen: NoiseSource, rng: &mut impl Rng) -> Result<Self, ScalingError> {
         let scaling = ScalingChoice::Whitening;
-        let inputs = Inputs::fit(InputChoice { quantity, scaling }, training.readings(), noise)?;
+        let inputs = Inputs::fit(InputChoice { quantity, scaling }, training.readings(), unseen)?;
         let outputs = MinMax::fit(training.targets())?;
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
@@ -178,7 +179,7 @@ mod tests {
     }
 
     fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
-        TakagiSugeno::fit(set, quantity, 0.0, &mut Seed(0).rng(Stream::Expectation)).unwrap()
+        TakagiSugeno::fit(set, quantity, NoiseSource::default(), &mut Seed(0).rng(Stream::Expectation)).unwrap()
     }
 
     /// `set` with other readings and targets.
@@ -207,7 +208,7 @@ mod tests {
             };
             let settings = RadialBasisSettings::default();
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, 0.0, settings, &mut rng).unwrap();
+            let mut basis = RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
             assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
@@ -222,7 +223,7 @@ mod tests {
             quantity: Quantity::LogResistance,
             scaling,
         };
-        let inputs = Inputs::fit(choice, training.readings(), 1e-4).unwrap();
+        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default()).unwrap();
         let outputs = MinMax::fit(training.targets()).unwrap();
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
@@ -311,7 +312,7 @@ mod tests {
         targets[[3, 2]] = f64::NAN;
         let set = Dataset::new(set.readings().to_owned(), targets, None, set.groups().to_vec()).unwrap();
         let mut rng = Seed(0).rng(Stream::Expectation);
-        let error = TakagiSugeno::fit(&set, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        let error = TakagiSugeno::fit(&set, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert!(
             matches!(
                 error,
@@ -324,7 +325,7 @@ mod tests {
             "{error}"
         );
         let none = set.select(&[]);
-        let error = TakagiSugeno::fit(&none, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        let error = TakagiSugeno::fit(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert_eq!(error, ScalingError::Empty);
     }
 
