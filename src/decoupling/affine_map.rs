@@ -1,6 +1,6 @@
-use ndarray::{Array1, Array2, Axis, Slice};
+use ndarray::{Array2, Axis, Slice};
 
-use super::{DecodeError, Decoder, distinct::distinct, least_squares::fit_least_squares, ridge::Ridge};
+use super::{DecodeError, Decoder, distinct::distinct, least_squares::fit_least_squares, linear_fit::LinearFit};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
@@ -40,29 +40,16 @@ impl AffineMap {
     /// Fits the map to `training` by ridge regression, with the penalty of the least leave-one-out error; `unseen` is as
     /// in [`Inputs::fit`].
     ///
-    /// The penalty is on the changes of the inputs in their own unit, be they whitened or not: it leaves out weak components
-    /// first, in which noise is largest.
-    ///
     /// # Errors
     /// If values cannot be scaled.
     pub fn ridge(training: &Dataset, choice: InputChoice, unseen: NoiseSource) -> Result<Self, ScalingError> {
-        // Noise is weighed below, and hides nothing before.
-        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
+        let inputs = Inputs::fit_all(choice, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
-        let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
-        let (x, y) = distinct(x.view(), y.view());
-        let sizes = Array1::from(inputs.deviations());
-        let sizes = &sizes / sizes.iter().copied().fold(0.0, f64::max);
-        let noise = channel_noise(inputs.quantity(), training.readings(), unseen);
-        let noise = inputs.changes_of(&noise) * &sizes;
-        let ridge = Ridge::new((x * &sizes).view(), y.view(), noise.view())?;
-        let penalty = ridge.best_penalty();
-        let mut coefficients = ridge.coefficients(penalty);
-        for (mut gains, size) in coefficients.rows_mut().into_iter().zip(&sizes) {
-            gains *= *size;
-        }
-        Ok(Self::folded(&inputs, &coefficients, &outputs, penalty))
+        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
+        let fit = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
+        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs, fit.penalty()))
     }
 
     /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).

@@ -27,6 +27,7 @@ mod gauss_newton;
 mod kind;
 mod least_squares;
 mod line_search;
+mod linear_fit;
 mod newton;
 mod newton_report;
 mod posterior;

@@ -104,10 +104,31 @@ impl Inputs {
     /// Fits the scaling to training resistances in ohm (samples × M4).
     ///
     /// `unseen` is the noise of later readings that the training set lacks: none if the training set already contains it.
+    /// Whitening keeps at most half as many components as there are samples: of more, new samples are not the size of the
+    /// training set's, up to a multiple of it without bound where there are as many.
     ///
     /// # Errors
     /// If there are no samples, a value is not finite or not in the domain of the quantity, or a range overflows.
-    pub fn fit(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>, unseen: NoiseSource) -> Result<Self, ScalingError> {
+    pub fn fit(
+        choice: InputChoice,
+        resistances_ohm: ArrayView2<'_, f64>,
+        unseen: NoiseSource,
+    ) -> Result<Self, ScalingError> {
+        Self::fit_most(choice, resistances_ohm, unseen, resistances_ohm.nrows() / 2)
+    }
+
+    /// Fits the scaling with all components above the rounding of the readings, for a fit that itself penalises weak
+    /// components, and noise; see [`Self::fit`].
+    pub(crate) fn fit_all(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
+        Self::fit_most(choice, resistances_ohm, NoiseSource::default(), usize::MAX)
+    }
+
+    fn fit_most(
+        choice: InputChoice,
+        resistances_ohm: ArrayView2<'_, f64>,
+        unseen: NoiseSource,
+        most: usize,
+    ) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
         let foreign = resistances_ohm
             .indexed_iter()
@@ -119,9 +140,9 @@ impl Inputs {
         let scaling = match choice.scaling {
             ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),
             ScalingChoice::Whitening => {
-                let unseen = channel_noise(quantity, resistances_ohm, unseen);
                 let rounding = channel_rounding(quantity, resistances_ohm);
-                InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen)?)
+                let unseen = channel_noise(quantity, resistances_ohm, unseen);
+                InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, most)?)
             }
         };
         Ok(Self { quantity, scaling })

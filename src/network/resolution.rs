@@ -10,7 +10,7 @@ const LAST_PLACES: f64 = 4.0;
 pub(super) fn rounding(readings: ArrayView2<'_, f64>) -> Vec<f64> {
     let of_channel = |channel: ArrayView1<'_, f64>| {
         let digits = LAST_PLACES * f64::EPSILON * root_mean_square(channel.iter().map(|value| value.abs()));
-        digits.max(step(channel).unwrap_or(0.0) / 12.0_f64.sqrt())
+        digits.max(step(channel).unwrap_or(0.0) / (channel.len() as f64).max(12.0).sqrt())
     };
     readings.columns().into_iter().map(of_channel).collect()
 }

@@ -25,7 +25,7 @@ impl Whitening {
     /// Fits the components of `values` (samples × channels).
     ///
     /// `rounding` is the standard deviation of the error that rounding leaves in each channel of `values`, and `unseen`
-    /// the noise of later values that `values` lack.
+    /// the noise of later values that `values` lack. At most `most` components are kept, the strongest.
     ///
     /// # Errors
     /// If there are no samples, or a value is not finite.
@@ -36,6 +36,7 @@ impl Whitening {
         values: ArrayView2<'_, f64>,
         rounding: &[f64],
         unseen: &ChannelNoise,
+        most: usize,
     ) -> Result<Self, ScalingError> {
         let (samples, channels) = values.dim();
         assert_eq!([rounding.len(), unseen.own.len(), unseen.common.len()], [channels; 3]);
@@ -64,7 +65,7 @@ impl Whitening {
         let decomposition = f64::EPSILON * samples.min(channels) as f64 * singular.iter().copied().fold(0.0, f64::max);
         let mut kept = Vec::new();
         let mut deviations = Vec::new();
-        for (k, &value) in singular.iter().enumerate() {
+        for (k, &value) in singular.iter().enumerate().take(most) {
             let direction = || (0..channels).map(|c| svd.V()[(c, k)]);
             let of_rounding: f64 = direction().zip(rounding).map(|(v, error)| (v * error).powi(2)).sum();
             let (variance, of_noise) = ((value / root).powi(2), unseen.variance(direction()));
@@ -199,7 +200,7 @@ mod tests {
             own: vec![noise; channels],
             ..ChannelNoise::none(channels)
         };
-        Whitening::fit(values.view(), &rounding(values.view()), &unseen)
+        Whitening::fit(values.view(), &rounding(values.view()), &unseen, usize::MAX)
     }
 
     #[test]
@@ -253,7 +254,7 @@ mod tests {
             common: vec![1.0, 2.0, 1.0, 0.0],
             ..ChannelNoise::none(4)
         };
-        let whitening = Whitening::fit(values.view(), &rounding(values.view()), &unseen).unwrap();
+        let whitening = Whitening::fit(values.view(), &rounding(values.view()), &unseen, usize::MAX).unwrap();
         let deviations = whitening.deviations();
         assert_eq!(deviations.len(), 2, "the first component is this direction: {deviations:?}");
     }

@@ -7,11 +7,14 @@ mod selection;
 use ndarray::{Array2, Axis};
 use rand::Rng;
 
-use self::antecedents::{Antecedents, normalise};
-use super::{DecodeError, Decoder};
+use self::{
+    antecedents::{Antecedents, normalise},
+    consequents::InputNoise,
+};
+use super::{DecodeError, Decoder, distinct::distinct, linear_fit::LinearFit};
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, channel_noise},
     scene::NoiseSource,
 };
 
@@ -54,12 +57,18 @@ impl TakagiSugeno {
     /// Values that cannot be scaled.
     pub fn fit(training: &Dataset, quantity: Quantity, unseen: NoiseSource, rng: &mut impl Rng) -> Result<Self, ScalingError> {
         let scaling = ScalingChoice::Whitening;
-        let inputs = Inputs::fit(InputChoice { quantity, scaling }, training.readings(), unseen)?;
+        let inputs = Inputs::fit_all(InputChoice { quantity, scaling }, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
-        let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
-        let (antecedents, ridge) = selection::choose(x.view(), y.view(), rng);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), ridge);
+        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let changes = inputs.changes_of(&channel_noise(quantity, training.readings(), unseen));
+        let linear = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
+        let noises = [
+            InputNoise::new(changes.view(), &[]),
+            InputNoise::new(changes.view(), &linear.variances(x.nrows())),
+        ];
+        let selection::Choice { antecedents, ridge, noise } = selection::choose(x.view(), y.view(), &noises, rng);
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), ridge, &noises[noise]);
         Ok(Self::new(&inputs, &antecedents, &scaled, &outputs))
     }
 
@@ -178,6 +187,10 @@ mod tests {
         (draw(samples, Stream::Training), draw(100, Stream::Test))
     }
 
+    fn none(inputs: usize) -> InputNoise {
+        InputNoise::new(Array2::zeros((0, inputs)).view(), &[])
+    }
+
     fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
         TakagiSugeno::fit(set, quantity, NoiseSource::default(), &mut Seed(0).rng(Stream::Expectation)).unwrap()
     }
@@ -230,7 +243,7 @@ mod tests {
         let mut rng = Seed(0).rng(Stream::Expectation);
         let (centres, distance) = Antecedents::clusters(x.view(), 3, 8, &mut rng);
         let antecedents = Antecedents::new(centres, distance);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6);
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6, &none(x.ncols()));
         let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
         assert_eq!(folded.rules(), 8);
         // Rule by rule in the scaled inputs and targets.
@@ -301,7 +314,7 @@ mod tests {
         let (centres, distance) = Antecedents::clusters(x.view(), 10, 16, &mut rng);
         assert_eq!(centres.dim(), (5, 10));
         let antecedents = Antecedents::new(centres, distance);
-        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0);
+        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0, &none(12));
         assert!(consequents.iter().all(|value| value.is_finite()));
     }
 
