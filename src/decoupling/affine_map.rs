@@ -1,9 +1,10 @@
 use ndarray::{Array2, Axis, Slice};
 
-use super::{DecodeError, Decoder, least_squares::fit_least_squares, ridge::fit_ridge};
+use super::{DecodeError, Decoder, distinct::distinct, least_squares::fit_least_squares, linear_fit::LinearFit};
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError},
+    network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
+    scene::NoiseSource,
 };
 
 /// An affine map from readings to targets, with the scalings on both sides folded into its matrix.
@@ -36,18 +37,19 @@ impl AffineMap {
         Ok(Self::folded(&inputs, &coefficients, &outputs, 0.0))
     }
 
-    /// Fits the map to `training` by ridge regression, with the penalty chosen by generalised cross-validation. `noise`
-    /// is as in [`Inputs::fit`].
+    /// Fits the map to `training` by ridge regression, with the penalty of the least leave-one-out error; `unseen` is as
+    /// in [`Inputs::fit`].
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn ridge(training: &Dataset, choice: InputChoice, noise: f64) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit(choice, training.readings(), noise)?;
+    pub fn ridge(training: &Dataset, choice: InputChoice, unseen: NoiseSource) -> Result<Self, ScalingError> {
+        let inputs = Inputs::fit_all(choice, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
-        let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
-        let (coefficients, penalty) = fit_ridge(x.view(), y.view())?;
-        Ok(Self::folded(&inputs, &coefficients, &outputs, penalty))
+        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
+        let fit = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
+        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs, fit.penalty()))
     }
 
     /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).
@@ -74,7 +76,8 @@ impl AffineMap {
         }
     }
 
-    /// Ridge penalty, in units of squared singular values of the centred inputs; 0 for plain least squares.
+    /// Ridge penalty, in units of squared singular values of the centred inputs, the largest of which has deviation 1 if
+    /// they are whitened; 0 for plain least squares, and infinite where the mean is better than any map.
     pub fn penalty(&self) -> f64 {
         self.penalty
     }
@@ -156,7 +159,7 @@ mod tests {
         let other = draw("10x6_3x18", 10);
         for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
             let least_squares = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-            let ridge = AffineMap::ridge(&set, InputChoice::BEST, 0.0).unwrap();
+            let ridge = AffineMap::ridge(&set, InputChoice::BEST, NoiseSource::default()).unwrap();
             for mut map in [least_squares, ridge] {
                 let answer = decode_set(&mut map, &other).unwrap();
                 assert!(answer.iter().all(|value| value.is_finite()));
@@ -172,7 +175,7 @@ mod tests {
                 scaling,
                 ..InputChoice::BEST
             };
-            let answer = decode_set(&mut AffineMap::ridge(&set, choice, 0.0).unwrap(), &set).unwrap();
+            let answer = decode_set(&mut AffineMap::ridge(&set, choice, NoiseSource::default()).unwrap(), &set).unwrap();
             for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
                 assert_eq!(answer[0], truth[0], "what does not vary stays");
                 assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);

@@ -4,7 +4,7 @@
 //! | decoder | how it decodes |
 //! |---|---|
 //! | [`TrainingMean`] | always answers the mean of the training set: the baseline |
-//! | [`AffineMap`] | an affine map, by least squares or ridge regression with generalised cross-validation |
+//! | [`AffineMap`] | an affine map, by least squares or ridge regression with leave-one-out cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
@@ -21,10 +21,13 @@ mod box_posterior;
 mod clusters;
 mod compiled;
 mod decoder;
+mod distinct;
 mod equation_decoders;
 mod gauss_newton;
 mod kind;
 mod least_squares;
+mod line_search;
+mod linear_fit;
 mod newton;
 mod newton_report;
 mod posterior;

@@ -1,21 +1,20 @@
-use faer::{
-    Mat,
-    linalg::solvers::{Solve, SolveLstsq},
-};
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use rand::Rng;
 
 use super::{
     DecodeError, Decoder,
     clusters::{distance2, k_means},
+    distinct::distinct,
+    ridge::Ridge,
 };
 use crate::{
     dataset::Dataset,
     network::{InputChoice, Inputs, MinMax, ScalingError},
+    scene::NoiseSource,
 };
 
 /// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear output
-/// layer with a constant, solved as a ridge regression.
+/// layer with a constant, fitted by ridge regression with the penalty of the least leave-one-out error.
 #[derive(Clone, Debug)]
 pub struct RadialBasisNetwork {
     inputs: Inputs,
@@ -35,8 +34,6 @@ pub struct RadialBasisSettings {
     pub centres: Centres,
     /// Width of the Gaussians in proportion to the root mean square distance between inputs.
     pub relative_width: f64,
-    /// Penalty on squared output weights, in proportion to the number of samples.
-    pub ridge: f64,
 }
 
 /// Positions of the Gaussians.
@@ -53,24 +50,23 @@ impl Default for RadialBasisSettings {
         Self {
             centres: Centres::KMeans(100),
             relative_width: 2.0,
-            ridge: 1e-12,
         }
     }
 }
 
 impl RadialBasisNetwork {
-    /// Fits to a training set; `noise` as in [`Inputs::fit`]; `rng` chooses where clusters begin.
+    /// Fits to a training set; `unseen` as in [`Inputs::fit`]; `rng` chooses where clusters begin.
     ///
     /// # Errors
     /// Values that cannot be scaled.
     pub fn fit(
         training: &Dataset,
         choice: InputChoice,
-        noise: f64,
+        unseen: NoiseSource,
         settings: RadialBasisSettings,
         rng: &mut impl Rng,
     ) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit(choice, training.readings(), noise)?;
+        let inputs = Inputs::fit(choice, training.readings(), unseen)?;
         let outputs = MinMax::fit(training.targets())?;
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
@@ -82,36 +78,12 @@ impl RadialBasisNetwork {
         let spread2 = 2.0 * x.var_axis(Axis(0), 0.0).sum();
         let width2 = settings.relative_width.powi(2) * spread2;
         let sharpness = if width2 > 0.0 { 0.5 / width2 } else { 0.0 };
-        let (samples, count) = (x.nrows(), centres.nrows());
-        let root = (settings.ridge * samples as f64).sqrt();
-        let below = if root > 0.0 { count } else { 0 };
-        let basis = Mat::from_fn(samples + below, count + 1, |s, c| match (s < samples, c < count) {
-            (true, true) => gaussian(x.row(s), centres.row(c), sharpness),
-            (true, false) => 1.0,
-            (false, _) => {
-                if s - samples == c {
-                    root
-                } else {
-                    0.0
-                }
-            }
+        let (x, y) = distinct(x.view(), y.view());
+        let basis = Array2::from_shape_fn((x.nrows(), centres.nrows()), |(s, c)| {
+            gaussian(x.row(s), centres.row(c), sharpness)
         });
-        let right = Mat::from_fn(
-            samples + below,
-            y.ncols(),
-            |s, t| if s < samples { y[[s, t]] } else { 0.0 },
-        );
-        // One sample at every centre leaves one weight more than equations; the last constant is then left out.
-        let solution = if basis.nrows() > count {
-            basis.qr().solve_lstsq(&right)
-        } else {
-            let square = basis.submatrix(0, 0, samples, count).to_owned();
-            square.partial_piv_lu().solve(&right)
-        };
-        let coefficients = Array2::from_shape_fn((count + 1, y.ncols()), |(c, t)| {
-            let value = if c < solution.nrows() { solution[(c, t)] } else { 0.0 };
-            if value.is_finite() { value } else { 0.0 }
-        });
+        let ridge = Ridge::new(basis.view(), y.view(), Array2::zeros((0, centres.nrows())).view())?;
+        let coefficients = ridge.coefficients(ridge.best_penalty());
         Ok(Self {
             inputs,
             centres,
@@ -175,9 +147,8 @@ mod tests {
         let settings = RadialBasisSettings {
             centres: Centres::Samples,
             relative_width: 0.5,
-            ridge: 0.0,
         };
-        let mut network = RadialBasisNetwork::fit(&set, InputChoice::BEST, 1e-4, settings, &mut rng).unwrap();
+        let mut network = RadialBasisNetwork::fit(&set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng).unwrap();
         assert_eq!(network.centres(), 40);
         for sample in 0..40 {
             let mut coordinates = [0.0; 12];

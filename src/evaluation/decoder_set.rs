@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    Errors, RunError, RunSettings, SimulatedSettings, Source, TargetErrors, frame_time::frame_us, task::unseen_noise,
+    Errors, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors, frame_time::frame_us, task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},
@@ -13,11 +13,12 @@ use crate::{
         resistance_residual,
     },
     network::Networks,
+    scene::RowModel,
     sensor::SensorModel,
 };
 
 /// Errors and cost of a decoder on the nodes of a test set.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DecoderReport {
     /// Kind of decoder.
     pub kind: DecoderKind,
@@ -30,6 +31,8 @@ pub struct DecoderReport {
     pub residual: f64,
     /// Computing time.
     pub cost: DecoderCost,
+    /// What is wrong with the errors, why, and what would help.
+    pub remarks: Vec<Remark>,
 }
 
 /// Errors and cost of a decoder on targets of any meaning.
@@ -43,6 +46,8 @@ pub struct TargetReport {
     pub targets: Vec<TargetErrors>,
     /// Computing time.
     pub cost: DecoderCost,
+    /// What is wrong with the errors, why, and what would help.
+    pub remarks: Vec<Remark>,
 }
 
 /// Computing time of a decoder.
@@ -102,7 +107,7 @@ impl DecoderSet {
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
         let Self { settings, training, .. } = self;
-        let (row_model, noise) = (settings.source.row_model(), unseen_noise(&settings.source)?);
+        let (row_model, unseen) = (settings.source.row_model(), unseen_noise(&settings.source)?);
         let mut rng = settings.seed.rng(Stream::Expectation);
         Ok(Some(match kind {
             DecoderKind::Mean => {
@@ -110,17 +115,17 @@ impl DecoderSet {
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::Ridge => {
-                let fit = |set: &Dataset| AffineMap::ridge(set, settings.inputs, noise);
+                let fit = |set: &Dataset| AffineMap::ridge(set, settings.inputs, unseen);
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::RadialBasis => {
                 let basis = RadialBasisSettings::default();
-                let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, noise, basis, &mut rng);
+                let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, unseen, basis, &mut rng);
                 Box::new(PerRow::fit(training, row_model, fit)?) as Box<dyn Decoder>
             }
             DecoderKind::Fuzzy => {
                 let quantity = settings.inputs.quantity;
-                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, noise, &mut rng);
+                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, unseen, &mut rng);
                 Box::new(PerRow::fit(training, row_model, fit)?)
             }
             DecoderKind::Network => return Ok(self.network(precision)),
@@ -172,10 +177,13 @@ impl DecoderSet {
         let Some((answers, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
+        let measured = |answers: &Array2<f64>| Errors::measure(test, answers, simulation.stroke_mm());
+        let (errors, mean) = (measured(&answers), measured(&self.mean_answers(test)?));
         Ok(Some(DecoderReport {
             kind,
             precision,
-            errors: Errors::measure(test, &answers, simulation.stroke_mm()),
+            errors,
+            remarks: Remark::on_nodes(kind, (&errors, &mean), &self.settings, self.size_of_fits()),
             residual: rms_residual(&simulation.sensor, test, &answers),
             cost,
         }))
@@ -192,13 +200,34 @@ impl DecoderSet {
         precision: Precision,
         test: &Dataset,
     ) -> Result<Option<TargetReport>, RunError> {
-        let report = |(answers, cost): (Array2<f64>, _)| TargetReport {
+        let Some((answers, cost)) = self.answer(kind, precision, test)? else {
+            return Ok(None);
+        };
+        let targets = TargetErrors::measure(test.targets(), answers.view());
+        let mean = TargetErrors::measure(test.targets(), self.mean_answers(test)?.view());
+        Ok(Some(TargetReport {
             kind,
             precision,
-            targets: TargetErrors::measure(test.targets(), answers.view()),
+            remarks: Remark::on_targets(kind, (&targets, &mean), &self.settings, self.size_of_fits()),
+            targets,
             cost,
+        }))
+    }
+
+    /// Answers of the training mean to `test`.
+    fn mean_answers(&self, test: &Dataset) -> Result<Array2<f64>, RunError> {
+        let fit = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
+        let mut mean = PerRow::fit(&self.training, self.settings.source.row_model(), fit)?;
+        Ok(decode_set(&mut mean, test)?)
+    }
+
+    /// Training samples of each fit, and readings of each sample.
+    fn size_of_fits(&self) -> (usize, usize) {
+        let fits = match self.settings.source.row_model() {
+            RowModel::Shared => 1,
+            RowModel::Each => self.training.row_count().max(1),
         };
-        Ok(self.answer(kind, precision, test)?.map(report))
+        (self.training.samples() / fits, self.training.channels())
     }
 
     /// Fits a decoder and returns its answers to `test` with its computing time.

@@ -2,7 +2,7 @@ use super::{RunError, RunSettings, Simulation, Source};
 use crate::{
     dataset::{Dataset, PerRow, Split},
     network::{Inputs, MinMax, Shape},
-    scene::{NoisySets, RelativeNoise, RowModel},
+    scene::{NoiseSource, NoisySets, RowModel},
     training::{Examples, Problem},
 };
 
@@ -66,21 +66,14 @@ pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Re
     }
 }
 
-/// The noise level assumed by whitening: the relative noise that readings have and the training set lacks, from all
-/// sources of the scene, for nodes half way down. At most 1, where it is as large as the reading.
-///
-/// Whitening takes the error of each reading as independent: an error common to all of them hides less than this says.
-pub(super) fn unseen_noise(source: &Source) -> Result<f64, RunError> {
-    let Source::Simulated(simulation) = source else {
-        return Ok(0.0);
-    };
-    let Simulation { sensor, scene, .. } = simulation;
-    if scene.noise.sets != NoisySets::Test {
-        return Ok(0.0);
+/// The noise that readings have and the training set lacks.
+pub(super) fn unseen_noise(source: &Source) -> Result<NoiseSource, RunError> {
+    match source {
+        Source::Simulated(Simulation { sensor, scene, .. }) if scene.noise.sets == NoisySets::Test => {
+            Ok(scene.noise.source(sensor)?)
+        }
+        _ => Ok(NoiseSource::default()),
     }
-    let rows = scene.rows.read(sensor.scale.rows())?;
-    let noise = RelativeNoise::of(scene.noise, sensor, &rows, 0.5 * simulation.stroke_mm())?;
-    Ok(noise.total().min(1.0))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@ use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedS
 use crate::decoupling::{DecoderKind, Precision};
 
 /// One decoder on the trade-off between speed and accuracy.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TradePoint {
     /// Preset from which the settings were derived.
     pub preset: Preset,
@@ -72,8 +72,8 @@ pub fn measure_trade(
         on_point(TradePoint {
             preset,
             settings: *settings,
-            report,
             training_seconds: report.cost.fit_seconds,
+            report,
             reference,
         });
     }

@@ -1,10 +1,14 @@
 use std::{fmt, str::FromStr};
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{MinMax, Quantity, ReadingRange, ScalingError, Whitening};
+use super::{
+    ChannelNoise, MinMax, Quantity, ReadingRange, ScalingError, Whitening,
+    resolution::{root_mean_square, rounding},
+};
+use crate::scene::{NoiseSource, RelativeNoise};
 
 /// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -114,12 +118,32 @@ impl Inputs {
 
     /// Fits the scaling to training resistances in ohm (samples × M4).
     ///
-    /// `noise` is the relative error (standard deviation) of later readings that is missing from the training set: 0 if
-    /// the training set already contains it, or if there is none.
+    /// `unseen` is the noise of later readings that the training set lacks: none if the training set already contains it.
+    /// Whitening keeps at most half as many components as there are samples: of more, new samples are not the size of the
+    /// training set's, up to a multiple of it without bound where there are as many.
     ///
     /// # Errors
     /// If there are no samples, a value is not finite or not in the domain of the quantity, or a range overflows.
-    pub fn fit(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>, noise: f64) -> Result<Self, ScalingError> {
+    pub fn fit(
+        choice: InputChoice,
+        resistances_ohm: ArrayView2<'_, f64>,
+        unseen: NoiseSource,
+    ) -> Result<Self, ScalingError> {
+        Self::fit_most(choice, resistances_ohm, unseen, resistances_ohm.nrows() / 2)
+    }
+
+    /// Fits the scaling with all components above the rounding of the readings, for a fit that itself penalises weak
+    /// components, and noise; see [`Self::fit`].
+    pub(crate) fn fit_all(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
+        Self::fit_most(choice, resistances_ohm, NoiseSource::default(), usize::MAX)
+    }
+
+    fn fit_most(
+        choice: InputChoice,
+        resistances_ohm: ArrayView2<'_, f64>,
+        unseen: NoiseSource,
+        most: usize,
+    ) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
         let foreign = resistances_ohm
             .indexed_iter()
@@ -131,12 +155,9 @@ impl Inputs {
         let scaling = match choice.scaling {
             ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),
             ScalingChoice::Whitening => {
-                let per_relative = |column: ndarray::ArrayView1<'_, f64>| {
-                    let total: f64 = column.iter().map(|&ohm| quantity.per_relative_error(ohm)).sum();
-                    noise * total / column.len() as f64
-                };
-                let noise: Vec<f64> = resistances_ohm.columns().into_iter().map(per_relative).collect();
-                InputScaling::Whitening(Whitening::fit(values.view(), &noise)?)
+                let rounding = channel_rounding(quantity, resistances_ohm);
+                let unseen = channel_noise(quantity, resistances_ohm, unseen);
+                InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, most)?)
             }
         };
         Ok(Self::new(quantity, scaling).with_range(ReadingRange::of(resistances_ohm)))
@@ -182,6 +203,27 @@ impl Inputs {
         }
     }
 
+    /// Returns what each input is divided by to make it as large as any other: the deviations of whitened components; 1
+    /// for a channel scaled by its range.
+    pub(crate) fn deviations(&self) -> Vec<f64> {
+        match &self.scaling {
+            InputScaling::MinMax(_) => vec![1.0; self.count()],
+            InputScaling::Whitening(scaling) => scaling.deviations().to_vec(),
+        }
+    }
+
+    /// Returns the changes of the inputs (sources × inputs) by one standard deviation of each source of `noise`: the
+    /// error of each channel that has one, and the common one.
+    pub(crate) fn changes_of(&self, noise: &ChannelNoise) -> Array2<f64> {
+        let (_, matrix) = self.affine();
+        let own = noise.own.iter().enumerate().filter(|(_, deviation)| **deviation > 0.0);
+        let mut changes: Vec<Array1<f64>> = own.map(|(c, &deviation)| &matrix.column(c) * deviation).collect();
+        if noise.common.iter().any(|&deviation| deviation > 0.0) {
+            changes.push(matrix.dot(&Array1::from(noise.common.clone())));
+        }
+        Array2::from_shape_fn((changes.len(), self.count()), |(source, input)| changes[source][input])
+    }
+
     /// Returns the centre and matrix (inputs × M4) of the scaling: inputs = matrix · (values − centre).
     pub fn affine(&self) -> (Vec<f64>, Array2<f64>) {
         match &self.scaling {
@@ -203,6 +245,38 @@ impl Inputs {
     }
 }
 
+/// Returns the deviations of `quantity` that `noise` makes of `resistances_ohm` (samples × channels): root mean squares
+/// over the samples.
+pub(crate) fn channel_noise(
+    quantity: Quantity,
+    resistances_ohm: ArrayView2<'_, f64>,
+    noise: NoiseSource,
+) -> ChannelNoise {
+    if noise.is_none() {
+        return ChannelNoise::none(resistances_ohm.ncols());
+    }
+    let deviations = |part: fn(RelativeNoise) -> f64| {
+        let of_channel = |channel: ArrayView1<'_, f64>| {
+            let deviation = |&ohm: &f64| quantity.deviation(ohm, ohm * part(noise.relative_to(ohm)));
+            root_mean_square(channel.iter().map(deviation))
+        };
+        resistances_ohm.columns().into_iter().map(of_channel).collect()
+    };
+    ChannelNoise {
+        own: deviations(|noise| noise.own),
+        common: deviations(|noise| noise.common),
+    }
+}
+
+/// Returns the deviations of `quantity` that the rounding of `resistances_ohm` (samples × channels) leaves.
+fn channel_rounding(quantity: Quantity, resistances_ohm: ArrayView2<'_, f64>) -> Vec<f64> {
+    let channels = resistances_ohm.columns().into_iter().zip(rounding(resistances_ohm));
+    let deviation = |(channel, rounding_ohm): (ArrayView1<'_, f64>, f64)| {
+        root_mean_square(channel.iter().map(|&ohm| quantity.deviation(ohm, rounding_ohm)))
+    };
+    channels.map(deviation).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -219,7 +293,7 @@ mod tests {
         for quantity in Quantity::ALL {
             for scaling in [ScalingChoice::MinMax, ScalingChoice::Whitening] {
                 let choice = InputChoice { quantity, scaling };
-                let inputs = Inputs::fit(choice, resistances.view(), 1e-3).unwrap();
+                let inputs = Inputs::fit(choice, resistances.view(), NoiseSource::default()).unwrap();
                 assert_eq!((inputs.channels(), inputs.count()), (3, 2));
                 let (centre, matrix) = inputs.affine();
                 let ours = inputs.of(resistances.view());

@@ -3,19 +3,23 @@
 //! A [`DecouplingNetwork`] is an [`Mlp`] with the scaling on both sides ([`Inputs`], [`MinMax`]); [`Networks`] are one
 //! network shared by all row-wires or one per row-wire. Weights are initialised at random by [`nguyen_widrow`].
 
+mod channel_noise;
 mod decoupling_network;
 mod inputs;
 mod mlp;
 mod networks;
 mod quantity;
 mod reading_range;
+mod resolution;
 mod scaling;
 mod start;
 mod suggestions;
 mod tanh;
 mod whitening;
 
+pub use channel_noise::ChannelNoise;
 pub use decoupling_network::{DecouplingNetwork, NetworkError};
+pub(crate) use inputs::channel_noise;
 pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
 pub use mlp::{Mlp, Shape};
 pub use networks::Networks;

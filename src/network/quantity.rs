@@ -18,6 +18,9 @@ pub enum Quantity {
     Raw,
 }
 
+/// Largest relative error of a resistance towards 0: it is still above 0.
+const LARGEST_REACH: f64 = 1.0 - 1e-6;
+
 /// Error for a word that names no quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not an input: give resistance, conductance or log")]
@@ -55,13 +58,15 @@ impl Quantity {
         }
     }
 
-    /// Returns |d value / d ln R|: a relative error ε of a reading is an error of ε times this in the value.
-    pub(super) fn per_relative_error(self, resistance_ohm: f64) -> f64 {
+    /// Standard deviation of the value where the reading has `deviation_ohm`: a third of the change that three standard
+    /// deviations towards 0 make. For small errors it is |d value / d R| · deviation; a conductance whose resistance may
+    /// be read as next to nothing has no bound, and this is large.
+    pub fn deviation(self, resistance_ohm: f64, deviation_ohm: f64) -> f64 {
+        let three = (3.0 * deviation_ohm / resistance_ohm).min(LARGEST_REACH);
         match self {
-            Self::Resistance => resistance_ohm,
-            Self::Conductance => 1.0 / resistance_ohm,
-            Self::LogResistance => 1.0,
-            Self::Raw => resistance_ohm.abs(),
+            Self::Resistance | Self::Raw => deviation_ohm,
+            Self::Conductance => three / (1.0 - three) / (3.0 * resistance_ohm),
+            Self::LogResistance => -(-three).ln_1p() / 3.0,
         }
     }
 }
@@ -97,9 +102,13 @@ mod tests {
         for quantity in Quantity::ALL {
             for ohm in [1e-3, 21.7, 4.2e5] {
                 assert!((quantity.resistance_ohm(quantity.of(ohm)) / ohm - 1.0).abs() < 1e-14);
-                let step = 1e-6;
-                let change = (quantity.of(ohm * (1.0 + step)) - quantity.of(ohm * (1.0 - step))).abs() / (2.0 * step);
-                assert!((change / quantity.per_relative_error(ohm) - 1.0).abs() < 1e-6);
+                for relative in [1e-9, 1e-3, 0.1] {
+                    let change = quantity.of(ohm * (1.0 - 3.0 * relative)) - quantity.of(ohm);
+                    let ratio = quantity.deviation(ohm, relative * ohm) / (change.abs() / 3.0);
+                    assert!((ratio - 1.0).abs() < 1e-6, "{quantity} {relative}: {ratio}");
+                }
+                let hidden = quantity.deviation(ohm, 1e300);
+                assert!(hidden.is_finite() && hidden > quantity.deviation(ohm, 0.3 * ohm));
             }
             assert_eq!(quantity.to_string().parse(), Ok(quantity));
         }

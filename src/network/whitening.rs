@@ -2,13 +2,14 @@ use faer::Mat;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::ScalingError;
+use super::{ChannelNoise, ScalingError};
 
 /// Noise-aware whitening: principal components of the training values, each divided by √(σ² + noise²), where σ² is the
 /// component's variance and noise² the variance that noise adds to it.
 ///
-/// A weak component that is still above the noise counts as much as the strongest; components hidden by noise stay
-/// small.
+/// A weak component above the noise counts as much as the strongest. A component whose variance is no larger than that
+/// of the noise, or of the rounding of the values, is left out: a fit to noise-free values uses whatever it finds there,
+/// and answers noise as large as the signal, or, where it found only last digits, larger by many orders of magnitude.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Record", into = "Record")]
 pub struct Whitening {
@@ -20,29 +21,34 @@ pub struct Whitening {
     deviations: Vec<f64>,
 }
 
-/// Components weaker than this relative to the first are rounding errors of the readings, not signals.
-const ROUNDING: f64 = 1e-13;
-
 impl Whitening {
     /// Fits the components of `values` (samples × channels).
     ///
-    /// `noise` is the standard deviation of independent noise added to later values, one per channel; zero where
-    /// `values` already contain their noise.
+    /// `rounding` is the standard deviation of the error that rounding leaves in each channel of `values`, and `unseen`
+    /// the noise of later values that `values` lack. At most `most` components are kept, the strongest.
     ///
     /// # Errors
     /// If there are no samples, or a value is not finite.
     ///
     /// # Panics
-    /// If `noise` does not have one entry per channel.
-    pub fn fit(values: ArrayView2<'_, f64>, noise: &[f64]) -> Result<Self, ScalingError> {
+    /// If `rounding` or `unseen` do not have one entry per channel.
+    pub fn fit(
+        values: ArrayView2<'_, f64>,
+        rounding: &[f64],
+        unseen: &ChannelNoise,
+        most: usize,
+    ) -> Result<Self, ScalingError> {
         let (samples, channels) = values.dim();
-        assert_eq!(noise.len(), channels);
+        assert_eq!([rounding.len(), unseen.own.len(), unseen.common.len()], [channels; 3]);
         let Some(mean) = values.mean_axis(Axis(0)) else {
             return Err(ScalingError::Empty);
         };
         if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
             return Err(ScalingError::NotFinite { sample, channel, value });
         }
+        // The mean of many samples is rounded; that of their small differences from it hardly is.
+        let rest = (&values - &mean).mean_axis(Axis(0)).expect("there are samples");
+        let mean = mean + rest;
         // Uses the singular values of the centred samples instead of the eigenvalues of their covariance, because
         // squaring would lose components 1e-8 times weaker than the first. R of a QR decomposition has the same
         // singular values and is small.
@@ -53,19 +59,26 @@ impl Whitening {
             centred
         };
         let svd = triangle.thin_svd().map_err(|_| ScalingError::NotConverged)?;
-        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+        let singular = svd.S().column_vector();
         let root = (samples as f64).sqrt();
-        let largest = singular.first().copied().unwrap_or(0.0);
-        let kept = singular.iter().take_while(|&&value| value > ROUNDING * largest).count();
-        let directions = Array2::from_shape_fn((kept, channels), |(k, c)| svd.V()[(c, k)]);
-        let deviation = |k: usize| {
-            let added: f64 = (0..channels).map(|c| (directions[[k, c]] * noise[c]).powi(2)).sum();
-            ((singular[k] / root).powi(2) + added).sqrt()
-        };
+        // Errors of the decomposition itself (Golub and Van Loan, Matrix Computations, section 5.5.8).
+        let decomposition = f64::EPSILON * samples.min(channels) as f64 * singular.iter().copied().fold(0.0, f64::max);
+        let mut kept = Vec::new();
+        let mut deviations = Vec::new();
+        for (k, &value) in singular.iter().enumerate().take(most) {
+            let direction = || (0..channels).map(|c| svd.V()[(c, k)]);
+            let of_rounding: f64 = direction().zip(rounding).map(|(v, error)| (v * error).powi(2)).sum();
+            let (variance, of_noise) = ((value / root).powi(2), unseen.variance(direction()));
+            let deviation = (variance + of_noise).sqrt();
+            if value > decomposition && variance > of_rounding + of_noise && deviation.is_finite() {
+                kept.push(k);
+                deviations.push(deviation);
+            }
+        }
         Ok(Self {
             mean: mean.to_vec(),
-            deviations: (0..kept).map(deviation).collect(),
-            directions,
+            directions: Array2::from_shape_fn((kept.len(), channels), |(k, c)| svd.V()[(c, kept[k])]),
+            deviations,
         })
     }
 
@@ -82,6 +95,11 @@ impl Whitening {
     /// Mean of each channel.
     pub fn mean(&self) -> &[f64] {
         &self.mean
+    }
+
+    /// Returns √(σ² + noise²) of each component.
+    pub fn deviations(&self) -> &[f64] {
+        &self.deviations
     }
 
     /// Returns the matrix (components × channels) that whitens centred values.
@@ -160,6 +178,7 @@ impl TryFrom<Record> for Whitening {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::resolution::rounding;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     fn correlated(samples: usize) -> Array2<f64> {
@@ -175,10 +194,19 @@ mod tests {
         values
     }
 
+    fn fit(values: &Array2<f64>, noise: f64) -> Result<Whitening, ScalingError> {
+        let channels = values.ncols();
+        let unseen = ChannelNoise {
+            own: vec![noise; channels],
+            ..ChannelNoise::none(channels)
+        };
+        Whitening::fit(values.view(), &rounding(values.view()), &unseen, usize::MAX)
+    }
+
     #[test]
     fn components_are_uncorrelated_with_unit_variance() {
         let values = correlated(500);
-        let whitening = Whitening::fit(values.view(), &[0.0; 4]).unwrap();
+        let whitening = fit(&values, 0.0).unwrap();
         assert_eq!(whitening.components(), 3, "the constant channel adds none");
         let white = whitening.scale(values.view());
         for i in 0..3 {
@@ -193,7 +221,8 @@ mod tests {
     #[test]
     fn whitening_can_be_undone() {
         let values = correlated(60);
-        let whitening = Whitening::fit(values.view(), &[0.1; 4]).unwrap();
+        let whitening = fit(&values, 1e-8).unwrap();
+        assert_eq!(whitening.components(), 3);
         let back = whitening.restore(whitening.scale(values.view()).view());
         for (ours, truth) in back.iter().zip(&values) {
             assert!((ours - truth).abs() < 1e-11, "{ours} {truth}");
@@ -201,18 +230,63 @@ mod tests {
     }
 
     #[test]
-    fn what_noise_hides_stays_small() {
+    fn what_noise_hides_is_left_out_and_what_it_veils_is_smaller() {
         let values = correlated(500);
-        let white = Whitening::fit(values.view(), &[1e-4; 4]).unwrap().scale(values.view());
-        let deviation = |k: usize| (white.column(k).dot(&white.column(k)) / 500.0).sqrt();
-        assert!(deviation(0) > 0.99);
-        assert!(deviation(1) > 0.9);
-        assert!(deviation(2) < 0.02);
+        let spread = |noise: f64| -> Vec<f64> {
+            let white = fit(&values, noise).unwrap().scale(values.view());
+            let deviation = |column: ndarray::ArrayView1<'_, f64>| (column.dot(&column) / 500.0).sqrt();
+            white.columns().into_iter().map(deviation).collect()
+        };
+        // The components have deviations of about 1.4, 7e-4 and 4e-7.
+        let [first, second, third] = spread(3e-7)[..] else {
+            panic!("three are above the noise")
+        };
+        assert!(first > 0.999 && second > 0.999 && (0.6..0.9).contains(&third), "{third}");
+        assert_eq!(spread(1e-4).len(), 2);
+        assert_eq!(spread(1e-2).len(), 1);
+        assert_eq!(spread(10.0).len(), 0);
+    }
+
+    #[test]
+    fn a_drift_hides_only_the_direction_in_which_it_moves_the_readings() {
+        let values = correlated(500);
+        let unseen = ChannelNoise {
+            common: vec![1.0, 2.0, 1.0, 0.0],
+            ..ChannelNoise::none(4)
+        };
+        let whitening = Whitening::fit(values.view(), &rounding(values.view()), &unseen, usize::MAX).unwrap();
+        let deviations = whitening.deviations();
+        assert_eq!(deviations.len(), 2, "the first component is this direction: {deviations:?}");
+    }
+
+    /// Channels that are steps of a converter have exact dependencies in the training set, which a new sample need not
+    /// keep.
+    #[test]
+    fn new_readings_in_steps_stay_of_the_size_of_the_training_set() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut draw = |samples: usize| {
+            let mut values = Array2::zeros((samples, 12));
+            for mut row in values.rows_mut() {
+                let [a, b]: [f64; 2] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+                for (channel, value) in row.iter_mut().enumerate() {
+                    let place = channel as f64 / 12.0;
+                    let exact: f64 = 30.0 + a * (1.0 - place) + b * (0.3 + place * place);
+                    *value = (exact / 0.7).round() * 0.7;
+                }
+            }
+            values
+        };
+        for samples in [10, 40, 200] {
+            let whitening = fit(&draw(samples), 0.0).unwrap();
+            let white = whitening.scale(draw(2000).view());
+            let largest = white.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            assert!(largest < 30.0, "{samples}: {largest}");
+        }
     }
 
     #[test]
     fn files_come_back_and_damaged_ones_are_refused() {
-        let whitening = Whitening::fit(correlated(20).view(), &[0.0; 4]).unwrap();
+        let whitening = fit(&correlated(20), 0.0).unwrap();
         let text = serde_json::to_string(&whitening).unwrap();
         assert_eq!(serde_json::from_str::<Whitening>(&text).unwrap(), whitening);
         for damaged in [
@@ -225,10 +299,10 @@ mod tests {
 
     #[test]
     fn one_sample_or_none() {
-        let one = Whitening::fit(correlated(1).view(), &[0.0; 4]).unwrap();
+        let one = fit(&correlated(1), 0.0).unwrap();
         assert_eq!(one.components(), 0);
         assert_eq!(
-            Whitening::fit(Array2::zeros((0, 2)).view(), &[0.0; 2]),
+            fit(&Array2::zeros((0, 2)), 0.0),
             Err(ScalingError::Empty)
         );
     }

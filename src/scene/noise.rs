@@ -131,14 +131,19 @@ impl Noise {
     }
 }
 
-/// Noise of one sensor, ready to be drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Noise of one sensor, ready to be drawn; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NoiseSource {
     noise: Noise,
     converter: Option<Converter>,
 }
 
 impl NoiseSource {
+    /// True if no reading is changed.
+    pub fn is_none(&self) -> bool {
+        self.noise.is_none()
+    }
+
     /// Disturbs the readings of one snapshot in place. Readings stay above 0 and finite: what noise would turn around is
     /// drawn again.
     pub fn disturb(&self, resistances_ohm: &mut [f64], rng: &mut impl Rng) {

@@ -7,11 +7,15 @@ mod selection;
 use ndarray::{Array2, Axis};
 use rand::Rng;
 
-use self::antecedents::{Antecedents, normalise};
-use super::{DecodeError, Decoder};
+use self::{
+    antecedents::{Antecedents, normalise},
+    consequents::InputNoise,
+};
+use super::{DecodeError, Decoder, distinct::distinct, linear_fit::LinearFit};
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, channel_noise},
+    scene::NoiseSource,
 };
 
 /// A fuzzy system of Takagi and Sugeno (1985): rules "if the readings x are near centre i, then the coordinates are
@@ -46,19 +50,25 @@ pub struct TakagiSugeno {
 }
 
 impl TakagiSugeno {
-    /// Fits to a training set, on this quantity of the readings, whitened; `noise` as in [`Inputs::fit`]; `rng` chooses
+    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` as in [`Inputs::fit`]; `rng` chooses
     /// the folds of the cross-validation and where clusters begin.
     ///
     /// # Errors
     /// Values that cannot be scaled.
-    pub fn fit(training: &Dataset, quantity: Quantity, noise: f64, rng: &mut impl Rng) -> Result<Self, ScalingError> {
+    pub fn fit(training: &Dataset, quantity: Quantity, unseen: NoiseSource, rng: &mut impl Rng) -> Result<Self, ScalingError> {
         let scaling = ScalingChoice::Whitening;
-        let inputs = Inputs::fit(InputChoice { quantity, scaling }, training.readings(), noise)?;
+        let inputs = Inputs::fit_all(InputChoice { quantity, scaling }, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
-        let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
-        let (antecedents, ridge) = selection::choose(x.view(), y.view(), rng);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), ridge);
+        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let changes = inputs.changes_of(&channel_noise(quantity, training.readings(), unseen));
+        let linear = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
+        let noises = [
+            InputNoise::new(changes.view(), &[]),
+            InputNoise::new(changes.view(), &linear.variances(x.nrows())),
+        ];
+        let selection::Choice { antecedents, ridge, noise } = selection::choose(x.view(), y.view(), &noises, rng);
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), ridge, &noises[noise]);
         Ok(Self::new(&inputs, &antecedents, &scaled, &outputs))
     }
 
@@ -177,8 +187,12 @@ mod tests {
         (draw(samples, Stream::Training), draw(100, Stream::Test))
     }
 
+    fn none(inputs: usize) -> InputNoise {
+        InputNoise::new(Array2::zeros((0, inputs)).view(), &[])
+    }
+
     fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
-        TakagiSugeno::fit(set, quantity, 0.0, &mut Seed(0).rng(Stream::Expectation)).unwrap()
+        TakagiSugeno::fit(set, quantity, NoiseSource::default(), &mut Seed(0).rng(Stream::Expectation)).unwrap()
     }
 
     /// `set` with other readings and targets.
@@ -207,7 +221,7 @@ mod tests {
             };
             let settings = RadialBasisSettings::default();
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, 0.0, settings, &mut rng).unwrap();
+            let mut basis = RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
             assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
@@ -222,14 +236,14 @@ mod tests {
             quantity: Quantity::LogResistance,
             scaling,
         };
-        let inputs = Inputs::fit(choice, training.readings(), 1e-4).unwrap();
+        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default()).unwrap();
         let outputs = MinMax::fit(training.targets()).unwrap();
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
         let mut rng = Seed(0).rng(Stream::Expectation);
         let (centres, distance) = Antecedents::clusters(x.view(), 3, 8, &mut rng);
         let antecedents = Antecedents::new(centres, distance);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6);
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6, &none(x.ncols()));
         let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
         assert_eq!(folded.rules(), 8);
         // Rule by rule in the scaled inputs and targets.
@@ -300,7 +314,7 @@ mod tests {
         let (centres, distance) = Antecedents::clusters(x.view(), 10, 16, &mut rng);
         assert_eq!(centres.dim(), (5, 10));
         let antecedents = Antecedents::new(centres, distance);
-        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0);
+        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0, &none(12));
         assert!(consequents.iter().all(|value| value.is_finite()));
     }
 
@@ -311,7 +325,7 @@ mod tests {
         targets[[3, 2]] = f64::NAN;
         let set = Dataset::new(set.readings().to_owned(), targets, None, set.groups().to_vec()).unwrap();
         let mut rng = Seed(0).rng(Stream::Expectation);
-        let error = TakagiSugeno::fit(&set, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        let error = TakagiSugeno::fit(&set, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert!(
             matches!(
                 error,
@@ -324,7 +338,7 @@ mod tests {
             "{error}"
         );
         let none = set.select(&[]);
-        let error = TakagiSugeno::fit(&none, Quantity::Conductance, 0.0, &mut rng).unwrap_err();
+        let error = TakagiSugeno::fit(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert_eq!(error, ScalingError::Empty);
     }
 

@@ -1,10 +1,12 @@
+use std::ops::Range;
+
 use faer::Mat;
 use ndarray::{ArrayView2, Axis};
 use rand::{Rng, seq::SliceRandom};
 
 use super::{
     antecedents::Antecedents,
-    consequents::{NormalEquations, matrix, regressors},
+    consequents::{InputNoise, NormalEquations, matrix, regressors},
 };
 
 /// Numbers of rules that are tried.
@@ -27,16 +29,34 @@ const MOST_VALIDATED: usize = 1000;
 /// A system with more rules must reduce the mean squared error to this, so that it is not chosen by chance.
 const WORTHWHILE: f64 = 0.99;
 
-/// The antecedents and the penalty with the least held-out error of `y` (samples × outputs) on `x` (samples × inputs) in a
-/// k-fold cross-validation.
+/// What a cross-validation chooses.
+pub(super) struct Choice {
+    pub antecedents: Antecedents,
+    pub ridge: f64,
+    /// Index of the noise that the consequents reckon with.
+    pub noise: usize,
+}
+
+/// The antecedents, penalty and noise with the least held-out error of `y` (samples × outputs) on `x` (samples × inputs) in
+/// a k-fold cross-validation. The first of `all_noises` is that of later inputs, the last the largest.
 ///
 /// The centres are those of all samples; the consequents of each fold know nothing of its targets.
-pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, rng: &mut impl Rng) -> (Antecedents, f64) {
+pub(super) fn choose(
+    x: ArrayView2<'_, f64>,
+    y: ArrayView2<'_, f64>,
+    all_noises: &[InputNoise],
+    rng: &mut impl Rng,
+) -> Choice {
+    let largest = all_noises.len() - 1;
     let mut order: Vec<usize> = (0..x.nrows()).collect();
     order.shuffle(rng);
     order.truncate(MOST_VALIDATED);
     let (x, y) = (x.select(Axis(0), &order), y.select(Axis(0), &order));
-    let mut best = (Antecedents::everywhere(), RIDGES[0]);
+    let mut best = Choice {
+        antecedents: Antecedents::everywhere(),
+        ridge: RIDGES[0],
+        noise: largest,
+    };
     let Some(mean) = y.mean_axis(Axis(0)) else {
         return best;
     };
@@ -48,35 +68,47 @@ pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, rng: &mut i
     if inputs == 0 || targets.ncols() == 0 || affordable.len() < 2 {
         return best;
     }
-    let mut validated = |rules: usize, components: usize| {
+    let mut validated = |rules: usize, components: usize, noises: Range<usize>| {
         let candidate = if rules == 1 {
             Antecedents::everywhere()
         } else {
             let (centres, distance) = Antecedents::clusters(x.view(), components, rules, rng);
             Antecedents::new(centres, RELATIVE_WIDTH * distance)
         };
-        let (error, ridge) = held_out(&regressors(&candidate, x.view()), &targets);
-        (error, candidate, ridge)
+        let (error, ridge, noise) = held_out(&regressors(&candidate, x.view()), &targets, all_noises, noises);
+        let choice = Choice {
+            antecedents: candidate,
+            ridge,
+            noise,
+        };
+        (error, choice)
     };
     let pilot = affordable.iter().rfind(|&&rules| rules <= PILOT_RULES);
     let pilot = pilot.copied().unwrap_or(1);
-    let errors = COMPONENTS.map(|components| (validated(pilot, components).0, components));
-    let components = errors.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let components = components.map_or(COMPONENTS[0], |(_, components)| components);
+    let pilots = COMPONENTS.map(|components| (validated(pilot, components, 0..largest + 1), components));
+    let pilot = pilots.into_iter().min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+    let (components, noise) = pilot.map_or((COMPONENTS[0], 0), |((_, choice), components)| (components, choice.noise));
     let mut least = f64::INFINITY;
     for rules in affordable {
-        let (error, candidate, ridge) = validated(rules, components);
+        // A single rule is the linear map, whose penalty is the largest noise.
+        let noise = if rules == 1 { largest } else { noise };
+        let (error, choice) = validated(rules, components, noise..noise + 1);
         if error < WORTHWHILE * least {
             least = error;
-            best = (candidate, ridge);
+            best = choice;
         }
     }
     best
 }
 
-/// Sum of squared held-out errors in a cross-validation over folds of adjacent samples with the best penalty, and that
-/// penalty. Larger penalties are tried until the error rises.
-fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>) -> (f64, f64) {
+/// Sum of squared held-out errors in a cross-validation over folds of adjacent samples with the best penalty and noise, and
+/// these two. Larger penalties are tried until the error rises.
+fn held_out(
+    regressors: &Mat<f64>,
+    targets: &Mat<f64>,
+    all_noises: &[InputNoise],
+    noises: Range<usize>,
+) -> (f64, f64, usize) {
     let samples = regressors.nrows();
     let folds = FOLDS.min(samples);
     let bounds = |fold: usize| fold * samples / folds..(fold + 1) * samples / folds;
@@ -86,19 +118,27 @@ fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>) -> (f64, f64) {
     let empty = NormalEquations::zeros(regressors.ncols(), targets.ncols());
     let all = parts.iter().fold(empty, NormalEquations::plus);
     let others: Vec<_> = parts.iter().map(|part| all.clone().minus(part)).collect();
-    let mut best = (f64::INFINITY, RIDGES[0]);
-    for ridge in RIDGES {
-        let errors = others.iter().enumerate().map(|(fold, others)| {
-            let held_out = bounds(fold);
-            let a = regressors.subrows(held_out.start, held_out.len());
-            let t = targets.subrows(held_out.start, held_out.len());
-            (a * others.consequents(ridge) - t).squared_norm_l2()
-        });
-        let error: f64 = errors.sum();
-        if error > best.0 {
-            break;
+    let mut best = (f64::INFINITY, RIDGES[0], 0);
+    for index in noises {
+        let noise = &all_noises[index];
+        let mut least = f64::INFINITY;
+        for ridge in RIDGES {
+            let errors = others.iter().zip(&parts).enumerate().map(|(fold, (others, part))| {
+                let held_out = bounds(fold);
+                let a = regressors.subrows(held_out.start, held_out.len());
+                let t = targets.subrows(held_out.start, held_out.len());
+                let consequents = others.consequents(ridge, noise);
+                (a * &consequents - t).squared_norm_l2() + part.error_of_noise(&consequents, &all_noises[0])
+            });
+            let error: f64 = errors.sum();
+            if error > least {
+                break;
+            }
+            least = error;
+            if error < best.0 {
+                best = (error, ridge, index);
+            }
         }
-        best = (error, ridge);
     }
     best
 }
@@ -121,9 +161,9 @@ mod tests {
             let bend = if curved { (2.0 * x[[s, 1]]).sin() } else { 0.0 };
             affine + bend + 0.05 * standard_normal(&mut rng)
         });
-        choose(x.view(), y.view(), &mut Seed(seed).rng(Stream::Expectation))
-            .0
-            .rules()
+        let none = InputNoise::new(Array2::zeros((0, 3)).view(), &[]);
+        let mut rng = Seed(seed).rng(Stream::Expectation);
+        choose(x.view(), y.view(), &[none], &mut rng).antecedents.rules()
     }
 
     #[test]

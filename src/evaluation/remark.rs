@@ -1,0 +1,240 @@
+use std::fmt;
+
+use super::{Baselines, Errors, RunSettings, SimulatedSettings, TargetErrors};
+use crate::{
+    decoupling::DecoderKind,
+    scene::{Noise, NoisySets},
+};
+
+/// What is wrong with a decoder's result, why, and what would help. Printed beside its errors.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Remark {
+    /// Always answering the mean of the training set would be nearer to the truth.
+    WorseThanMean {
+        /// Name of the coordinate or target.
+        target: String,
+        /// Mean absolute error in proportion to that of the mean.
+        times: f64,
+        /// Most likely cause.
+        cause: Cause,
+    },
+}
+
+/// Most likely cause of a result that is worse than the mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// The readings have noise that the training set lacks.
+    UnseenNoise,
+    /// The training set is small.
+    FewSamples {
+        /// Training samples of each fit.
+        samples: usize,
+        /// Readings per sample.
+        readings: usize,
+    },
+    /// The network has not learned what other samples have in common with those of the training set.
+    Training,
+    /// The noise of the readings.
+    Noise,
+    /// Nothing known: the decoder does not suit these data.
+    Unknown,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::WorseThanMean { target, times, cause } => write!(
+                f,
+                "its error in {target} is {times:.3e} times that of always answering the mean: {cause}"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnseenNoise => {
+                f.write_str("the training set lacks the noise of these readings; add the noise to both, or reduce it")
+            }
+            Self::FewSamples { samples, readings } => {
+                let (samples, readings) = (counted(*samples, "training sample"), counted(*readings, "reading"));
+                write!(f, "{samples} for {readings} are too few; give more samples")
+            }
+            Self::Training => f.write_str(
+                "the network has learned too little, or its samples by heart; train it for more epochs, with other \
+                 hidden nodes, or on more samples",
+            ),
+            Self::Noise => f.write_str("the noise of the readings hides it; reduce the noise, or give more samples"),
+            Self::Unknown => f.write_str("this decoder does not suit these data; use another one, or give more samples"),
+        }
+    }
+}
+
+/// `1 sample`, `2 samples`.
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+impl Cause {
+    /// Finds the most likely cause for a decoder fitted with `settings` to `samples` training samples of `readings` each.
+    fn of(kind: DecoderKind, settings: &RunSettings, samples: usize, readings: usize) -> Self {
+        /// Samples per reading below which more samples would help most.
+        const FEW: usize = 4;
+        let noise = settings.source.simulation().map_or(Noise::default(), |simulation| simulation.scene.noise);
+        let is_noisy = !noise.in_test().is_none();
+        let is_fitted = kind != DecoderKind::Newton;
+        if is_fitted && is_noisy && noise.sets == NoisySets::Test {
+            Self::UnseenNoise
+        } else if is_fitted && samples < FEW * readings {
+            Self::FewSamples { samples, readings }
+        } else if kind.needs_network() {
+            Self::Training
+        } else if is_noisy {
+            Self::Noise
+        } else {
+            Self::Unknown
+        }
+    }
+}
+
+/// Errors of a decoder beside those of the mean, coordinate by coordinate or target by target.
+struct Pair {
+    target: String,
+    error: f64,
+    of_mean: f64,
+}
+
+impl Pair {
+    /// True unless the error is at most that of the mean, but for rounding.
+    fn is_worse(&self) -> bool {
+        let rounding = 1e-9 * (1.0 + self.of_mean);
+        !(self.error <= self.of_mean + rounding)
+    }
+}
+
+impl Remark {
+    /// Remarks on the errors of a decoder of this kind on the nodes, fitted with `settings` to `training`, beside those of
+    /// the mean.
+    pub(super) fn on_nodes(
+        kind: DecoderKind,
+        (errors, mean): (&Errors, &Errors),
+        settings: &RunSettings,
+        (samples, readings): (usize, usize),
+    ) -> Vec<Self> {
+        let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
+            Some(Pair {
+                target: target.to_owned(),
+                error: error?,
+                of_mean: of_mean?,
+            })
+        };
+        let z = Pair {
+            target: "z".to_owned(),
+            error: errors.z_mm,
+            of_mean: mean.z_mm,
+        };
+        let others = [
+            percent("x", errors.x_percent, mean.x_percent),
+            percent("y", errors.y_percent, mean.y_percent),
+        ];
+        let pairs = [z].into_iter().chain(others.into_iter().flatten());
+        Self::on(pairs, Cause::of(kind, settings, samples, readings))
+    }
+
+    /// Remarks on the errors on targets of any meaning; see [`Self::on_nodes`].
+    pub(super) fn on_targets(
+        kind: DecoderKind,
+        (errors, mean): (&[TargetErrors], &[TargetErrors]),
+        settings: &RunSettings,
+        (samples, readings): (usize, usize),
+    ) -> Vec<Self> {
+        let pairs = errors.iter().zip(mean).enumerate().map(|(index, (errors, mean))| Pair {
+            target: format!("target {}", index + 1),
+            error: errors.mae,
+            of_mean: mean.mae,
+        });
+        Self::on(pairs, Cause::of(kind, settings, samples, readings))
+    }
+
+    fn on(pairs: impl Iterator<Item = Pair>, cause: Cause) -> Vec<Self> {
+        let worse = pairs.filter(Pair::is_worse).map(|pair| Self::WorseThanMean {
+            times: pair.error / pair.of_mean,
+            target: pair.target,
+            cause,
+        });
+        worse.collect()
+    }
+}
+
+/// Remarks on the rows of an error table by their names: on the network, and on the linear map.
+pub fn error_remarks(settings: &SimulatedSettings, network: &Errors, baselines: &Baselines) -> Vec<(&'static str, Remark)> {
+    let simulation = &settings.source;
+    let readings = simulation.sensor.scale.columns();
+    let networks = simulation.model_size().map_or(1, |size| size.networks);
+    let settings = RunSettings::from(*settings);
+    let rows = [
+        ("linear map", DecoderKind::Ridge, &baselines.linear, simulation.samples),
+        ("network", DecoderKind::Network, network, simulation.samples / networks),
+    ];
+    let of_row = |(name, kind, errors, samples)| {
+        let remarks = Remark::on_nodes(kind, (errors, &baselines.mean), &settings, (samples, readings));
+        remarks.into_iter().map(move |remark| (name, remark))
+    };
+    rows.into_iter().flat_map(of_row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(z_mm: f64, x_percent: Option<f64>) -> Errors {
+        Errors {
+            z_percent: Some(z_mm),
+            x_percent,
+            y_percent: Some(0.0),
+            z_mm,
+            z_full_scale_percent: z_mm,
+            worst_mm: z_mm,
+            worst_node: Default::default(),
+        }
+    }
+
+    fn remarks(kind: DecoderKind, noise: Noise, samples: usize, ours: &Errors) -> Vec<String> {
+        let mut settings = SimulatedSettings::default();
+        settings.source.scene.noise = noise;
+        let mean = errors(0.2, Some(5.0));
+        let remarks = Remark::on_nodes(kind, (ours, &mean), &settings.into(), (samples, 30));
+        remarks.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn what_is_worse_than_the_mean_is_said_with_cause_and_cure_and_nothing_else() {
+        let none = Noise::default();
+        for good in [errors(0.2, Some(5.0)), errors(0.0, None), errors(0.2 * (1.0 + 1e-15), Some(5.0))] {
+            assert!(remarks(DecoderKind::Ridge, none, 500, &good).is_empty());
+        }
+        let bad = errors(0.3, Some(6.0));
+        let unseen = Noise {
+            sets: NoisySets::Test,
+            ..Noise::relative(1e-2)
+        };
+        let cases = [
+            (DecoderKind::Ridge, unseen, 500, "add the noise to both"),
+            (DecoderKind::Ridge, none, 62, "62 training samples for 30 readings are too few"),
+            (DecoderKind::Network, none, 500, "more epochs"),
+            (DecoderKind::RadialBasis, Noise::relative(1e-2), 500, "reduce the noise"),
+            (DecoderKind::RadialBasis, none, 500, "use another one"),
+        ];
+        for (kind, noise, samples, cure) in cases {
+            let remarks = remarks(kind, noise, samples, &bad);
+            assert_eq!(remarks.len(), 2, "z and x");
+            assert!(remarks[0].contains("in z is 1.500e0 times") && remarks[0].contains(cure), "{remarks:?}");
+            assert!(remarks[1].contains("in x is 1.200e0 times"), "{remarks:?}");
+        }
+        let none_at_all = errors(f64::NAN, None);
+        assert_eq!(remarks(DecoderKind::Ridge, none, 500, &none_at_all).len(), 1);
+    }
+}
