@@ -79,7 +79,7 @@ fn a_wide_network_is_resumed_with_the_same_bits() {
     assert_eq!(whole.present(), resumed.present());
 }
 
-/// Its equations would have 23 205 rows: 4 GB.
+/// Its equations would have 23 205 rows: 4 GB, and their inverse as much.
 #[test]
 fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
     let shape = Shape {
@@ -89,7 +89,7 @@ fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
     };
     let refused = begin("br", shape, 8).err();
     assert!(
-        matches!(refused, Some(TrainingError::TooWide { bytes }) if bytes > 4_000_000_000),
+        matches!(refused, Some(TrainingError::TooWide { bytes }) if bytes > 8_000_000_000),
         "{refused:?}"
     );
     let mut trainer = begin("lm", shape, 8).unwrap();

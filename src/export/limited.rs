@@ -37,8 +37,10 @@ pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 pub(super) fn too_large() -> io::Error {
-    let message = "it is larger than 1 GiB, the largest file of its kind; give another file";
-    io::Error::new(ErrorKind::FileTooLarge, message)
+    io::Error::new(
+        ErrorKind::FileTooLarge,
+        "it is larger than 1 GiB, which no file of its kind is",
+    )
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::{
     NetworkFile, WriteError, atomic_write,
     heading::{Heading, NoHeading},
-    limited::read_limited,
+    limited::{LARGEST_BYTES, read_limited, too_large},
     network_file::PROGRAM,
 };
 use crate::dataset::system_cause;
@@ -127,7 +127,15 @@ impl Workspace {
             runs: self.runs.iter().filter_map(|run| run.document().ok()).collect(),
             pinned: self.pinned,
         };
+        let bytes = document
+            .runs
+            .iter()
+            .map(|run| run.network.get().len() as u64)
+            .sum::<u64>();
         atomic_write(path, |writer| {
+            if bytes > LARGEST_BYTES {
+                return Err(too_large());
+            }
             serde_json::to_writer(&mut *writer, &document)?;
             writeln!(writer)
         })

@@ -140,7 +140,6 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
 
 #[cfg(test)]
 mod tests {
-    use eframe::egui::accesskit::Role;
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
@@ -153,11 +152,9 @@ mod tests {
                 ..SimulatedSettings::default()
             };
             draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
-            let harness = Harness::new_ui(move |ui| network_section_ui(ui, &mut draft));
-            let told = harness.query_all_by_role(Role::Label);
-            let texts: Vec<String> = told.filter_map(|node| node.value()).collect();
-            let is_found = texts.iter().any(|text| text.contains("of memory"));
-            assert_eq!(is_found, is_told, "{texts:?}");
+            let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
+            let found = harness.query_by_label_contains("of memory");
+            assert_eq!(found.is_some(), is_told, "{hidden} hidden nodes");
         }
     }
 }
