@@ -10,7 +10,7 @@ use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, SimulatedSettings, StartRecord, best_start,
-        error_rows,
+        error_remarks, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -48,6 +48,8 @@ struct Report<'a> {
     weights: usize,
     condition: Option<f64>,
     warnings: Vec<String>,
+    /// What is wrong with the errors above, why, and what would help.
+    remarks: Vec<String>,
     decoders: BTreeMap<String, Decoder>,
     reference: Option<Reference>,
 }
@@ -60,6 +62,8 @@ struct Decoder {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
+    /// What is wrong with the errors, why, and what would help.
+    remarks: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -128,6 +132,7 @@ pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
         weights: file.network.weights(),
         condition: condition(outlook.as_ref()),
         warnings: warnings(outlook.as_ref()),
+        remarks: remarks(file),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -148,7 +153,14 @@ fn decoder(report: &DecoderReport) -> Decoder {
         frame_us: report.cost.frame_us,
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
         fit_seconds: report.cost.fit_seconds,
+        remarks: report.remarks.iter().map(ToString::to_string).collect(),
     }
+}
+
+/// What is wrong with the rows of the error table.
+fn remarks(file: &NetworkFile) -> Vec<String> {
+    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
+    remarks.iter().map(|(row, remark)| format!("{row}: {remark}")).collect()
 }
 
 /// Condition number of the worst row; none if the Jacobian is singular.
@@ -208,6 +220,9 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
     }
     let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
+    for remark in remarks(file) {
+        writeln!(out, "Warning: {remark}")?;
+    }
     write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
     writeln!(
         out,
@@ -296,6 +311,11 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
             write!(out, "{:>12}", format_number(value))?;
         }
         writeln!(out)?;
+    }
+    for report in decoders {
+        for remark in &report.remarks {
+            writeln!(out, "Warning: {}: {remark}", report.name())?;
+        }
     }
     writeln!(
         out,

@@ -230,7 +230,7 @@ mod tests {
             assert!(error < 1e-12, "firing strengths: {error}");
             let ours = fit_consequents(&antecedents, x.view(), y.view(), case.ridge, None);
             let error = largest_difference(&ours, &array(&case.consequents));
-            assert!(error < 1e-8, "consequents with penalty {}: {error}", case.ridge, None);
+            assert!(error < 1e-8, "consequents with penalty {}: {error}", case.ridge);
         }
     }
 
