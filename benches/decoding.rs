@@ -18,7 +18,7 @@ use decoupler::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
         nguyen_widrow, tanh_in_place, tanh_in_place_single,
     },
-    scene::{Noise, RowModel, Rows, Scene},
+    scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
@@ -61,7 +61,7 @@ fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
 fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Networks {
     let mut rng = Seed(0).rng(Stream::Start);
     let network = |set: &Dataset| {
-        let inputs = Inputs::fit(choice, set.readings(), 0.0)?;
+        let inputs = Inputs::fit(choice, set.readings(), NoiseSource::default())?;
         let outputs = MinMax::fit(set.targets())?;
         let shape = Shape {
             inputs: inputs.count(),
@@ -130,7 +130,7 @@ fn print_scale(scale: ArrayScale) {
             "ridge".into(),
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
-                    AffineMap::ridge(set, InputChoice::BEST, 0.0)
+                    AffineMap::ridge(set, InputChoice::BEST, NoiseSource::default())
                 })
                 .unwrap(),
             ),
@@ -139,7 +139,7 @@ fn print_scale(scale: ArrayScale) {
             "fuzzy rules".into(),
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
-                    TakagiSugeno::fit(set, Quantity::Conductance, 0.0, &mut rng)
+                    TakagiSugeno::fit(set, Quantity::Conductance, NoiseSource::default(), &mut rng)
                 })
                 .unwrap(),
             ),
@@ -149,7 +149,7 @@ fn print_scale(scale: ArrayScale) {
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
                     let settings = RadialBasisSettings::default();
-                    RadialBasisNetwork::fit(set, InputChoice::BEST, 0.0, settings, &mut rng)
+                    RadialBasisNetwork::fit(set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng)
                 })
                 .unwrap(),
             ),

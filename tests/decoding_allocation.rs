@@ -8,7 +8,7 @@ use decoupler::{
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
     },
-    scene::{RowModel, Scene},
+    scene::{Noise, NoiseSource, RowModel, Scene},
     sensor::{Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
@@ -33,10 +33,11 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
     for quantity in Quantity::ALL {
         // Without noise, single precision has sums in double precision; with noise it has not.
         for noise in [0.0, 1e-2] {
+            let unseen = Noise::relative(noise).source(&model).unwrap();
             let scaling = ScalingChoice::Whitening;
             let network = |set: &Dataset| {
                 let choice = InputChoice { quantity, scaling };
-                let inputs = Inputs::fit(choice, set.readings(), noise)?;
+                let inputs = Inputs::fit(choice, set.readings(), unseen)?;
                 let outputs = MinMax::fit(set.targets())?;
                 let shape = Shape {
                     inputs: inputs.count(),
@@ -62,7 +63,7 @@ fn a_frame_is_decoded_by_fuzzy_rules_without_allocating() {
     let model = SensorModel::new("10x6_3x18".parse().unwrap());
     let mut rng = Seed(0).rng(Stream::Training);
     let set = Dataset::simulate(&model, &Scene::default(), 600, &mut rng).unwrap();
-    let fit = |set: &Dataset| TakagiSugeno::fit(set, Quantity::Conductance, 0.0, &mut rng);
+    let fit = |set: &Dataset| TakagiSugeno::fit(set, Quantity::Conductance, NoiseSource::default(), &mut rng);
     let mut decoder = PerRow::fit(&set, RowModel::Shared, fit).unwrap();
     assert!(decoder.at(0).rules() > 1);
     let frame = set.frames().unwrap().frame(0).to_vec();

@@ -10,7 +10,7 @@ use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, RunFlaw, SimulatedSettings, StartRecord,
-        best_start, error_rows,
+        best_start, error_remarks, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -48,6 +48,8 @@ struct Report<'a> {
     weights: usize,
     condition: Option<f64>,
     warnings: Vec<String>,
+    /// What is wrong with the errors above, why, and what would help.
+    remarks: Vec<String>,
     decoders: BTreeMap<String, Decoder>,
     reference: Option<Reference>,
 }
@@ -60,8 +62,8 @@ struct Decoder {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
-    /// Why figures are missing.
-    no_figures: Option<String>,
+    /// What is wrong with the errors, why, and what would help.
+    remarks: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -137,6 +139,7 @@ pub(super) fn print_json(
             .into_iter()
             .chain(flaw.map(ToString::to_string))
             .collect(),
+        remarks: remarks(file, flaw),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -157,8 +160,15 @@ fn decoder(report: &DecoderReport) -> Decoder {
         frame_us: report.cost.frame_us,
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
         fit_seconds: report.cost.fit_seconds,
-        no_figures: report.missing_figures().map(|reason| reason.to_string()),
+        remarks: report.remarks.iter().map(ToString::to_string).collect(),
     }
+}
+
+/// What is wrong with the rows of the error table, but for the network if its `flaw` is told.
+fn remarks(file: &NetworkFile, flaw: Option<&RunFlaw>) -> Vec<String> {
+    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
+    let told = remarks.iter().filter(|(row, _)| flaw.is_none() || *row != "network");
+    told.map(|(row, remark)| format!("{row}: {remark}")).collect()
 }
 
 /// Condition number of the worst row; none if the Jacobian is singular.
@@ -231,6 +241,9 @@ fn write_text(
     }
     let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
+    for remark in remarks(file, flaw) {
+        writeln!(out, "Warning: {remark}")?;
+    }
     write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
     writeln!(
         out,
@@ -321,8 +334,8 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
         writeln!(out)?;
     }
     for report in decoders {
-        if let Some(reason) = report.missing_figures() {
-            writeln!(out, "{}: {reason}.", report.name())?;
+        for remark in &report.remarks {
+            writeln!(out, "Warning: {}: {remark}", report.name())?;
         }
     }
     writeln!(

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{Dataset, LARGEST_SAMPLES};
 use crate::{
-    scene::{Noise, Scene, SceneError},
+    scene::{Noise, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel},
 };
 
@@ -83,10 +83,17 @@ impl Dataset {
     /// # Errors
     /// If the model has no resistances at rest.
     pub fn disturb(&mut self, model: &SensorModel, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
-        if noise.is_none() {
-            return Ok(());
+        if !noise.is_none() {
+            self.disturb_by(noise.source(model)?, rng);
         }
-        let source = noise.source(model)?;
+        Ok(())
+    }
+
+    /// Adds noise to the readings, snapshot by snapshot; see [`Self::disturb`].
+    pub(crate) fn disturb_by(&mut self, source: NoiseSource, rng: &mut impl Rng) {
+        if source.is_none() {
+            return;
+        }
         let channels = self.channels();
         let lengths: Vec<usize> = self.groups().chunk_by(|a, b| a == b).map(<[usize]>::len).collect();
         let mut rest = self.readings_mut();
@@ -95,7 +102,6 @@ impl Dataset {
             source.disturb(snapshot, rng);
             rest = others;
         }
-        Ok(())
     }
 }
 

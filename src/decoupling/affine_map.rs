@@ -175,7 +175,11 @@ mod tests {
                 scaling,
                 ..InputChoice::BEST
             };
-            let answer = decode_set(&mut AffineMap::ridge(&set, choice, NoiseSource::default()).unwrap(), &set).unwrap();
+            let answer = decode_set(
+                &mut AffineMap::ridge(&set, choice, NoiseSource::default()).unwrap(),
+                &set,
+            )
+            .unwrap();
             for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
                 assert_eq!(answer[0], truth[0], "what does not vary stays");
                 assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);

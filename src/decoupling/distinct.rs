@@ -1,6 +1,9 @@
-use std::collections::HashSet;
+use std::{borrow::Cow, collections::HashSet};
 
 use ndarray::{Array2, ArrayView2, Axis};
+use rand::Rng;
+
+use crate::{dataset::Dataset, scene::NoiseSource};
 
 /// Returns `x` and `y` (samples × anything) without samples that repeat an earlier one in both. A sample that is held out
 /// while its copy is not tells nothing about new samples.
@@ -12,6 +15,15 @@ pub(super) fn distinct(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>) -> (Array
     };
     let kept: Vec<usize> = (0..x.nrows()).filter(is_new).collect();
     (x.select(Axis(0), &kept), y.select(Axis(0), &kept))
+}
+
+/// Returns `training` with the noise that its readings lack: what a curved map makes of noise is learned from samples.
+pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &mut impl Rng) -> Cow<'a, Dataset> {
+    let mut training = Cow::Borrowed(training);
+    if !unseen.is_none() {
+        training.to_mut().disturb_by(unseen, rng);
+    }
+    training
 }
 
 #[cfg(test)]

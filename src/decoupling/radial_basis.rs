@@ -4,7 +4,7 @@ use rand::Rng;
 use super::{
     DecodeError, Decoder,
     clusters::{distance2, k_means},
-    distinct::distinct,
+    distinct::{distinct, with_noise},
     ridge::Ridge,
 };
 use crate::{
@@ -55,7 +55,7 @@ impl Default for RadialBasisSettings {
 }
 
 impl RadialBasisNetwork {
-    /// Fits to a training set; `unseen` as in [`Inputs::fit`]; `rng` chooses where clusters begin.
+    /// Fits to a training set; `unseen` as in [`Inputs::fit`]; `rng` draws it, and where clusters begin.
     ///
     /// # Errors
     /// Values that cannot be scaled.
@@ -66,7 +66,8 @@ impl RadialBasisNetwork {
         settings: RadialBasisSettings,
         rng: &mut impl Rng,
     ) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit(choice, training.readings(), unseen)?;
+        let training = with_noise(training, unseen, rng);
+        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
         let outputs = MinMax::fit(training.targets())?;
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
@@ -148,7 +149,8 @@ mod tests {
             centres: Centres::Samples,
             relative_width: 0.5,
         };
-        let mut network = RadialBasisNetwork::fit(&set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng).unwrap();
+        let mut network =
+            RadialBasisNetwork::fit(&set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng).unwrap();
         assert_eq!(network.centres(), 40);
         for sample in 0..40 {
             let mut coordinates = [0.0; 12];

@@ -56,9 +56,11 @@ impl Ridge {
         let (x_mean, y_mean) = (mean(&x)?, mean(&y)?);
         // The sum over all samples of the squared error that noise adds is that of these additional rows.
         let root = (samples as f64).sqrt();
-        let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| match row.checked_sub(samples) {
-            None => x[[row, i]] - x_mean[i],
-            Some(source) => root * unseen[[source, i]],
+        let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| {
+            match row.checked_sub(samples) {
+                None => x[[row, i]] - x_mean[i],
+                Some(source) => root * unseen[[source, i]],
+            }
         });
         let b = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - y_mean[t]);
         let svd = a.thin_svd().map_err(|_| ScalingError::NotConverged)?;
@@ -119,7 +121,13 @@ impl Ridge {
 
     /// Sum of the squared errors of the samples, each left out in turn, with what noise adds.
     fn leave_one_out(&self, penalty: f64) -> f64 {
-        let LeftOut { samples, noise, residual, free, .. } = &self.left_out;
+        let LeftOut {
+            samples,
+            noise,
+            residual,
+            free,
+            ..
+        } = &self.left_out;
         let taken: Vec<f64> = self.singular.iter().map(|s| penalty / (s * s + penalty)).collect();
         let (kept, outputs) = self.projected.shape();
         let residual = residual + samples * Mat::from_fn(kept, outputs, |k, t| taken[k] * self.projected[(k, t)]);
@@ -173,6 +181,11 @@ mod tests {
         (ridge.coefficients(penalty), penalty)
     }
 
+    /// Coefficients without the constant.
+    fn gains(map: &Array2<f64>) -> ArrayView2<'_, f64> {
+        map.slice_axis(Axis(0), ndarray::Slice::from(..map.nrows() - 1))
+    }
+
     #[test]
     fn an_affine_relation_is_found_and_noise_is_not_fitted() {
         let x = normal(60, 20, 1);
@@ -208,11 +221,11 @@ mod tests {
                         let weight = (samples as f64 / others.len() as f64).sqrt();
                         let fit = Ridge::new(x_others.view(), y_others.view(), (&unseen * weight).view()).unwrap();
                         let map = fit.coefficients(penalty);
-                        let answer = x.row(left_out).dot(&map.slice(ndarray::s![..inputs, ..])) + map.row(inputs);
+                        let answer = x.row(left_out).dot(&gains(&map)) + map.row(inputs);
                         expected += (&answer - &y.row(left_out)).mapv(|error| error * error).sum();
                     }
                     let map = ridge.coefficients(penalty);
-                    let added = unseen.dot(&map.slice(ndarray::s![..inputs, ..]));
+                    let added = unseen.dot(&gains(&map));
                     expected += samples as f64 * added.mapv(|change| change * change).sum();
                     let ratio = ridge.leave_one_out(penalty) / expected;
                     assert!((ratio - 1.0).abs() < 1e-6, "{samples}×{inputs}, {penalty}: {ratio}");

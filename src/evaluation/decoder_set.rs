@@ -3,7 +3,8 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    Errors, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors, frame_time::frame_us, task::unseen_noise,
+    Errors, MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors,
+    frame_time::frame_us, task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},
@@ -179,12 +180,16 @@ impl DecoderSet {
         };
         let measured = |answers: &Array2<f64>| Errors::measure(test, answers, simulation.stroke_mm());
         let (errors, mean) = (measured(&answers), measured(&self.mean_answers(test)?));
+        let residual = rms_residual(&simulation.sensor, test, &answers);
+        let missing = MissingFigures::of(precision, &errors, residual).map(Remark::Missing);
+        let mut remarks = Remark::on_nodes(kind, (&errors, &mean), &self.settings, self.size_of_fits());
+        remarks.extend(missing);
         Ok(Some(DecoderReport {
             kind,
             precision,
             errors,
-            remarks: Remark::on_nodes(kind, (&errors, &mean), &self.settings, self.size_of_fits()),
-            residual: rms_residual(&simulation.sensor, test, &answers),
+            remarks,
+            residual,
             cost,
         }))
     }

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use super::DecoderReport;
+use super::Errors;
 use crate::decoupling::Precision;
 
 /// Why a decoder has no figures, or no residual.
@@ -21,15 +21,15 @@ pub enum MissingFigures {
     NoResistance,
 }
 
-impl DecoderReport {
-    /// Tells why figures are missing, if any are.
-    pub fn missing_figures(&self) -> Option<MissingFigures> {
-        if !(self.errors.z_mm.is_finite() && self.errors.worst_mm.is_finite()) {
-            return Some(match self.precision {
-                Precision::Single => MissingFigures::SinglePrecision,
-                Precision::Double => MissingFigures::Overflow,
+impl MissingFigures {
+    /// Tells why figures are missing, given the errors of a decoder and the residual of its answers; `None` if none is.
+    pub(super) fn of(precision: Precision, errors: &Errors, residual: f64) -> Option<Self> {
+        if !(errors.z_mm.is_finite() && errors.worst_mm.is_finite()) {
+            return Some(match precision {
+                Precision::Single => Self::SinglePrecision,
+                Precision::Double => Self::Overflow,
             });
         }
-        (!self.residual.is_finite()).then_some(MissingFigures::NoResistance)
+        (!residual.is_finite()).then_some(Self::NoResistance)
     }
 }

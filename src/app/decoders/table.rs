@@ -92,14 +92,17 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     let rows: Vec<Row> = rows.chain(of_limit).collect();
     ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
-        let reason = match &result.report {
-            Some(Err(reason)) => Some(reason.clone()),
-            Some(Ok(report)) => report.missing_figures().map(|reason| reason.to_string()),
-            None => None,
-        };
-        if let Some(reason) = reason {
-            let name = result.kind.name(result.precision);
-            note_ui(ui, &format!("{name}: {reason}"));
+        let name = result.kind.name(result.precision);
+        match &result.report {
+            Some(Err(reason)) => {
+                note_ui(ui, &format!("{name}: {reason}"));
+            }
+            Some(Ok(report)) => {
+                for remark in &report.remarks {
+                    note_ui(ui, &format!("{name}: {remark}"));
+                }
+            }
+            None => {}
         }
     }
 }
@@ -124,6 +127,42 @@ mod tests {
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
+    use crate::{
+        decoupling::Precision,
+        evaluation::DecoderSet,
+        scene::{Noise, NoisySets},
+    };
+
+    #[test]
+    fn a_decoder_worse_than_the_mean_says_so_with_cause_and_cure() {
+        let mut settings = crate::evaluation::SimulatedSettings::default();
+        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+        settings.source.samples = 40;
+        settings.source.scene.noise = Noise {
+            sets: NoisySets::Test,
+            ..Noise::relative(0.5)
+        };
+        let test = settings.draw_test().unwrap();
+        let mut without_noise = settings;
+        without_noise.source.scene.noise = Noise::default();
+        // Fitted without the noise that the readings have.
+        let set = DecoderSet::new(&without_noise, None).unwrap();
+        let report = set
+            .measure(DecoderKind::Ridge, Precision::Double, &test)
+            .unwrap()
+            .unwrap();
+        let remark = report.remarks[0].to_string();
+        assert!(remark.contains("times that of always answering the mean"), "{remark}");
+        let mut state = State::new(true);
+        state.decoders.is_open = true;
+        state.decoders.measured = Some(DecoderResult::pending());
+        let place = DecoderResult::pending()
+            .iter()
+            .position(|result| result.kind == DecoderKind::Ridge);
+        state.decoders.take(place.unwrap(), Ok(report));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        harness.get_by_label(&format!("Ridge: {remark}"));
+    }
 
     #[test]
     fn a_decoder_that_fails_says_why_and_the_others_stand() {

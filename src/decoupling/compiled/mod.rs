@@ -181,7 +181,7 @@ mod tests {
         network::{
             DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
         },
-        scene::{RowModel, Scene},
+        scene::{Noise, RowModel, Scene},
         sensor::SensorModel,
     };
 
@@ -189,8 +189,9 @@ mod tests {
         let model = SensorModel::new(scale.parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 400, &mut Seed(0).rng(Stream::Training)).unwrap();
         let mut rng = Seed(0).rng(Stream::Start);
+        let unseen = Noise::relative(1e-3).source(&model).unwrap();
         let network = |set: &Dataset| {
-            let inputs = Inputs::fit(choice, set.readings(), 1e-3)?;
+            let inputs = Inputs::fit(choice, set.readings(), unseen)?;
             let outputs = MinMax::fit(set.targets())?;
             let shape = Shape {
                 inputs: inputs.count(),

@@ -7,14 +7,15 @@ mod selection;
 use ndarray::{Array2, Axis};
 use rand::Rng;
 
-use self::{
-    antecedents::{Antecedents, normalise},
-    consequents::InputNoise,
+use self::antecedents::{Antecedents, normalise};
+use super::{
+    DecodeError, Decoder,
+    distinct::{distinct, with_noise},
+    linear_fit::LinearFit,
 };
-use super::{DecodeError, Decoder, distinct::distinct, linear_fit::LinearFit};
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, channel_noise},
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
     scene::NoiseSource,
 };
 
@@ -50,26 +51,29 @@ pub struct TakagiSugeno {
 }
 
 impl TakagiSugeno {
-    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` as in [`Inputs::fit`]; `rng` chooses
+    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` as in [`Inputs::fit`]; `rng` draws it,
     /// the folds of the cross-validation and where clusters begin.
     ///
     /// # Errors
     /// Values that cannot be scaled.
-    pub fn fit(training: &Dataset, quantity: Quantity, unseen: NoiseSource, rng: &mut impl Rng) -> Result<Self, ScalingError> {
+    pub fn fit(
+        training: &Dataset,
+        quantity: Quantity,
+        unseen: NoiseSource,
+        rng: &mut impl Rng,
+    ) -> Result<Self, ScalingError> {
         let scaling = ScalingChoice::Whitening;
+        let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit_all(InputChoice { quantity, scaling }, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
         let y = outputs.scale(training.targets());
         let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
-        let changes = inputs.changes_of(&channel_noise(quantity, training.readings(), unseen));
-        let linear = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
-        let noises = [
-            InputNoise::new(changes.view(), &[]),
-            InputNoise::new(changes.view(), &linear.variances(x.nrows())),
-        ];
-        let selection::Choice { antecedents, ridge, noise } = selection::choose(x.view(), y.view(), &noises, rng);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), ridge, &noises[noise]);
-        Ok(Self::new(&inputs, &antecedents, &scaled, &outputs))
+        let none = Array2::zeros((0, inputs.count()));
+        let linear = LinearFit::new(&inputs, x.view(), y.view(), none.view())?.variances(x.nrows());
+        let choice = selection::choose(x.view(), y.view(), &linear, rng);
+        let noise = choice.is_noisy.then_some(&linear[..]);
+        let scaled = consequents::fit_consequents(&choice.antecedents, x.view(), y.view(), choice.ridge, noise);
+        Ok(Self::new(&inputs, &choice.antecedents, &scaled, &outputs))
     }
 
     /// Folds the scalings into the rules.
@@ -187,12 +191,14 @@ mod tests {
         (draw(samples, Stream::Training), draw(100, Stream::Test))
     }
 
-    fn none(inputs: usize) -> InputNoise {
-        InputNoise::new(Array2::zeros((0, inputs)).view(), &[])
-    }
-
     fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
-        TakagiSugeno::fit(set, quantity, NoiseSource::default(), &mut Seed(0).rng(Stream::Expectation)).unwrap()
+        TakagiSugeno::fit(
+            set,
+            quantity,
+            NoiseSource::default(),
+            &mut Seed(0).rng(Stream::Expectation),
+        )
+        .unwrap()
     }
 
     /// `set` with other readings and targets.
@@ -221,7 +227,8 @@ mod tests {
             };
             let settings = RadialBasisSettings::default();
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
+            let mut basis =
+                RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
             assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
@@ -243,7 +250,7 @@ mod tests {
         let mut rng = Seed(0).rng(Stream::Expectation);
         let (centres, distance) = Antecedents::clusters(x.view(), 3, 8, &mut rng);
         let antecedents = Antecedents::new(centres, distance);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6, &none(x.ncols()));
+        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6, None);
         let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
         assert_eq!(folded.rules(), 8);
         // Rule by rule in the scaled inputs and targets.
@@ -314,7 +321,7 @@ mod tests {
         let (centres, distance) = Antecedents::clusters(x.view(), 10, 16, &mut rng);
         assert_eq!(centres.dim(), (5, 10));
         let antecedents = Antecedents::new(centres, distance);
-        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0, &none(12));
+        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0, None);
         assert!(consequents.iter().all(|value| value.is_finite()));
     }
 

@@ -1,12 +1,10 @@
-use std::ops::Range;
-
 use faer::Mat;
 use ndarray::{ArrayView2, Axis};
 use rand::{Rng, seq::SliceRandom};
 
 use super::{
     antecedents::Antecedents,
-    consequents::{InputNoise, NormalEquations, matrix, regressors},
+    consequents::{NormalEquations, matrix, regressors},
 };
 
 /// Numbers of rules that are tried.
@@ -33,21 +31,15 @@ const WORTHWHILE: f64 = 0.99;
 pub(super) struct Choice {
     pub antecedents: Antecedents,
     pub ridge: f64,
-    /// Index of the noise that the consequents reckon with.
-    pub noise: usize,
+    /// Whether the consequents are those expected with noise of the inputs.
+    pub is_noisy: bool,
 }
 
-/// The antecedents, penalty and noise with the least held-out error of `y` (samples × outputs) on `x` (samples × inputs) in
-/// a k-fold cross-validation. The first of `all_noises` is that of later inputs, the last the largest.
+/// The antecedents and penalty, with `noise` of the inputs (variances) or without, of the least held-out error of `y` (samples × outputs) on `x` (samples × inputs) in
+/// a k-fold cross-validation.
 ///
 /// The centres are those of all samples; the consequents of each fold know nothing of its targets.
-pub(super) fn choose(
-    x: ArrayView2<'_, f64>,
-    y: ArrayView2<'_, f64>,
-    all_noises: &[InputNoise],
-    rng: &mut impl Rng,
-) -> Choice {
-    let largest = all_noises.len() - 1;
+pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f64], rng: &mut impl Rng) -> Choice {
     let mut order: Vec<usize> = (0..x.nrows()).collect();
     order.shuffle(rng);
     order.truncate(MOST_VALIDATED);
@@ -55,7 +47,7 @@ pub(super) fn choose(
     let mut best = Choice {
         antecedents: Antecedents::everywhere(),
         ridge: RIDGES[0],
-        noise: largest,
+        is_noisy: true,
     };
     let Some(mean) = y.mean_axis(Axis(0)) else {
         return best;
@@ -68,31 +60,32 @@ pub(super) fn choose(
     if inputs == 0 || targets.ncols() == 0 || affordable.len() < 2 {
         return best;
     }
-    let mut validated = |rules: usize, components: usize, noises: Range<usize>| {
+    let mut validated = |rules: usize, components: usize, noises: &[Option<&[f64]>]| {
         let candidate = if rules == 1 {
             Antecedents::everywhere()
         } else {
             let (centres, distance) = Antecedents::clusters(x.view(), components, rules, rng);
             Antecedents::new(centres, RELATIVE_WIDTH * distance)
         };
-        let (error, ridge, noise) = held_out(&regressors(&candidate, x.view()), &targets, all_noises, noises);
+        let (error, ridge, noise) = held_out(&regressors(&candidate, x.view()), &targets, noises);
         let choice = Choice {
             antecedents: candidate,
             ridge,
-            noise,
+            is_noisy: noise.is_some(),
         };
         (error, choice)
     };
     let pilot = affordable.iter().rfind(|&&rules| rules <= PILOT_RULES);
     let pilot = pilot.copied().unwrap_or(1);
-    let pilots = COMPONENTS.map(|components| (validated(pilot, components, 0..largest + 1), components));
+    let pilots = COMPONENTS.map(|components| (validated(pilot, components, &[None, Some(noise)]), components));
     let pilot = pilots.into_iter().min_by(|a, b| a.0.0.total_cmp(&b.0.0));
-    let (components, noise) = pilot.map_or((COMPONENTS[0], 0), |((_, choice), components)| (components, choice.noise));
+    let chosen = pilot.map(|((_, choice), components)| (components, choice.is_noisy));
+    let (components, is_noisy) = chosen.unwrap_or((COMPONENTS[0], true));
     let mut least = f64::INFINITY;
     for rules in affordable {
-        // A single rule is the linear map, whose penalty is the largest noise.
-        let noise = if rules == 1 { largest } else { noise };
-        let (error, choice) = validated(rules, components, noise..noise + 1);
+        // A single rule is the linear map, whose penalty is the noise.
+        let noise = (is_noisy || rules == 1).then_some(noise);
+        let (error, choice) = validated(rules, components, &[noise]);
         if error < WORTHWHILE * least {
             least = error;
             best = choice;
@@ -101,14 +94,13 @@ pub(super) fn choose(
     best
 }
 
-/// Sum of squared held-out errors in a cross-validation over folds of adjacent samples with the best penalty and noise, and
-/// these two. Larger penalties are tried until the error rises.
-fn held_out(
+/// Sum of squared held-out errors in a cross-validation over folds of adjacent samples with the best penalty and the best of
+/// `noises`, and these two. Larger penalties are tried until the error rises.
+fn held_out<'a>(
     regressors: &Mat<f64>,
     targets: &Mat<f64>,
-    all_noises: &[InputNoise],
-    noises: Range<usize>,
-) -> (f64, f64, usize) {
+    noises: &[Option<&'a [f64]>],
+) -> (f64, f64, Option<&'a [f64]>) {
     let samples = regressors.nrows();
     let folds = FOLDS.min(samples);
     let bounds = |fold: usize| fold * samples / folds..(fold + 1) * samples / folds;
@@ -118,17 +110,15 @@ fn held_out(
     let empty = NormalEquations::zeros(regressors.ncols(), targets.ncols());
     let all = parts.iter().fold(empty, NormalEquations::plus);
     let others: Vec<_> = parts.iter().map(|part| all.clone().minus(part)).collect();
-    let mut best = (f64::INFINITY, RIDGES[0], 0);
-    for index in noises {
-        let noise = &all_noises[index];
+    let mut best = (f64::INFINITY, RIDGES[0], None);
+    for &noise in noises {
         let mut least = f64::INFINITY;
         for ridge in RIDGES {
-            let errors = others.iter().zip(&parts).enumerate().map(|(fold, (others, part))| {
+            let errors = others.iter().enumerate().map(|(fold, others)| {
                 let held_out = bounds(fold);
                 let a = regressors.subrows(held_out.start, held_out.len());
                 let t = targets.subrows(held_out.start, held_out.len());
-                let consequents = others.consequents(ridge, noise);
-                (a * &consequents - t).squared_norm_l2() + part.error_of_noise(&consequents, &all_noises[0])
+                (a * others.consequents(ridge, noise) - t).squared_norm_l2()
             });
             let error: f64 = errors.sum();
             if error > least {
@@ -136,7 +126,7 @@ fn held_out(
             }
             least = error;
             if error < best.0 {
-                best = (error, ridge, index);
+                best = (error, ridge, noise);
             }
         }
     }
@@ -161,9 +151,8 @@ mod tests {
             let bend = if curved { (2.0 * x[[s, 1]]).sin() } else { 0.0 };
             affine + bend + 0.05 * standard_normal(&mut rng)
         });
-        let none = InputNoise::new(Array2::zeros((0, 3)).view(), &[]);
         let mut rng = Seed(seed).rng(Stream::Expectation);
-        choose(x.view(), y.view(), &[none], &mut rng).antecedents.rules()
+        choose(x.view(), y.view(), &[0.0; 3], &mut rng).antecedents.rules()
     }
 
     #[test]
