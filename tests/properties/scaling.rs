@@ -1,6 +1,6 @@
 //! Scalings of readings and targets, and their inverses.
 
-use decoupler::network::{MinMax, Whitening};
+use decoupler::network::{ChannelNoise, MinMax, Whitening};
 use ndarray::{Array2, Axis};
 use proptest::prelude::*;
 
@@ -80,7 +80,7 @@ proptest! {
         })
     ) {
         let channels = values.ncols();
-        let whitening = Whitening::fit(values.view(), &vec![0.0; channels]).unwrap();
+        let whitening = Whitening::fit(values.view(), &vec![0.0; channels], &ChannelNoise::none(channels), channels).unwrap();
         let whitened = whitening.scale(values.view());
         prop_assert_eq!(whitened.ncols(), channels);
         let covariance = whitened.t().dot(&whitened) / values.nrows() as f64;
