@@ -29,8 +29,8 @@ pub(super) type Place = (f64, f64);
 /// singular in the arithmetic.
 pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<f64>> {
     let local = LocalCoordinates::of(nodes_mm);
-    let nodes = local.scaled(nodes_mm);
-    let points = local.scaled(points_mm);
+    let nodes = local.places(nodes_mm);
+    let points = local.places(points_mm);
     let affine = AffineBasis::of(&nodes);
     let on_nodes = affine.at(&nodes);
     let (basis, at_points) = (on_nodes.as_ref(), affine.at(&points));
@@ -99,10 +99,10 @@ impl LocalCoordinates {
         }
     }
 
-    fn scaled(&self, places_mm: &[Place]) -> Vec<Place> {
+    fn places(&self, places_mm: &[Place]) -> Vec<Place> {
         let local = |place_mm: f64, middle_mm: f64| (place_mm - middle_mm) / self.half_extent_mm;
-        let places = places_mm.iter();
-        places
+        let places_mm = places_mm.iter();
+        places_mm
             .map(|&(x, y)| (local(x, self.middle_mm.0), local(y, self.middle_mm.1)))
             .collect()
     }

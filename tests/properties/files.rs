@@ -1,8 +1,12 @@
-//! Samples written to a file and read back.
+//! Files written and read back.
+
+use std::sync::LazyLock;
 
 use decoupler::{
     dataset::{Dataset, ResistanceReader},
-    export::{write_samples, write_samples_header},
+    evaluation::{Run, SimulatedSettings},
+    export::{NetworkFile, write_samples, write_samples_header},
+    network::{DecouplingNetwork, Mlp},
 };
 use ndarray::Array2;
 use proptest::prelude::*;
@@ -27,6 +31,18 @@ fn sets() -> impl Strategy<Value = Dataset> {
     })
 }
 
+/// The file of a network of the smallest array with 2 hidden nodes.
+static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
+    (settings.source.samples, settings.source.test_samples) = (20, 10);
+    settings.hidden = 2;
+    settings.training.stopping.epochs = 1;
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    NetworkFile::from_run(&run).unwrap()
+});
+
 proptest! {
     #![proptest_config(cases(64))]
 
@@ -46,5 +62,25 @@ proptest! {
             }
         }
         prop_assert_eq!(sample, set.samples());
+    }
+
+    #[test]
+    fn networks_are_read_with_the_bits_that_were_written(
+        weights in prop::collection::vec(
+            prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+            TRAINED.network.at(0).mlp().weights().len(),
+        )
+    ) {
+        let mut file = TRAINED.clone();
+        let network = TRAINED.network.at(0);
+        let mlp = Mlp::from_weights(network.mlp().shape(), weights.clone());
+        *file.network.at_mut(0) = DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("network.json");
+        file.save(&path).unwrap();
+        let read = NetworkFile::load(&path).unwrap();
+        prop_assert_eq!(&read, &file);
+        let bits = |weights: &[f64]| weights.iter().map(|weight| weight.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(read.network.at(0).mlp().weights()), bits(&weights));
     }
 }

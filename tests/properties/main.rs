@@ -6,6 +6,7 @@ mod folds;
 mod scaling;
 mod sensor;
 mod surfaces;
+mod training;
 
 use proptest::test_runner::{Config, RngSeed};
 
