@@ -56,9 +56,11 @@ impl Ridge {
         let (x_mean, y_mean) = (mean(&x)?, mean(&y)?);
         // The sum over all samples of the squared error that noise adds is that of these additional rows.
         let root = (samples as f64).sqrt();
-        let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| match row.checked_sub(samples) {
-            None => x[[row, i]] - x_mean[i],
-            Some(source) => root * unseen[[source, i]],
+        let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| {
+            match row.checked_sub(samples) {
+                None => x[[row, i]] - x_mean[i],
+                Some(source) => root * unseen[[source, i]],
+            }
         });
         let b = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - y_mean[t]);
         let svd = a.thin_svd().map_err(|_| ScalingError::NotConverged)?;
@@ -107,8 +109,8 @@ impl Ridge {
         let (Some(largest), Some(smallest)) = (self.singular.first(), self.singular.last()) else {
             return f64::INFINITY;
         };
-        // Further out, a penalty takes away nothing, or everything.
-        let decades = (2.0 * smallest.log10() - 4.0, 2.0 * largest.log10() + 4.0);
+        // Further out, a penalty takes away nothing in double precision, or nearly everything.
+        let decades = (2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0);
         let (decade, error) = least(decades, |decade| self.leave_one_out(10.0_f64.powf(decade)));
         if error < self.left_out.of_mean {
             10.0_f64.powf(decade)
@@ -119,7 +121,13 @@ impl Ridge {
 
     /// Sum of the squared errors of the samples, each left out in turn, with what noise adds.
     fn leave_one_out(&self, penalty: f64) -> f64 {
-        let LeftOut { samples, noise, residual, free, .. } = &self.left_out;
+        let LeftOut {
+            samples,
+            noise,
+            residual,
+            free,
+            ..
+        } = &self.left_out;
         let taken: Vec<f64> = self.singular.iter().map(|s| penalty / (s * s + penalty)).collect();
         let (kept, outputs) = self.projected.shape();
         let residual = residual + samples * Mat::from_fn(kept, outputs, |k, t| taken[k] * self.projected[(k, t)]);

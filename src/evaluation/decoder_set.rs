@@ -3,7 +3,8 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    Errors, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors, frame_time::frame_us, task::unseen_noise,
+    Errors, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors, frame_time::frame_us,
+    task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},

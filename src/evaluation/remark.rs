@@ -68,7 +68,9 @@ impl fmt::Display for Cause {
                  hidden nodes, or on more samples",
             ),
             Self::Noise => f.write_str("the noise of the readings hides it; reduce the noise, or give more samples"),
-            Self::Unknown => f.write_str("this decoder does not suit these data; use another one, or give more samples"),
+            Self::Unknown => {
+                f.write_str("this decoder does not suit these data; use another one, or give more samples")
+            }
         }
     }
 }
@@ -83,7 +85,10 @@ impl Cause {
     fn of(kind: DecoderKind, settings: &RunSettings, samples: usize, readings: usize) -> Self {
         /// Samples per reading below which more samples would help most.
         const FEW: usize = 4;
-        let noise = settings.source.simulation().map_or(Noise::default(), |simulation| simulation.scene.noise);
+        let noise = settings
+            .source
+            .simulation()
+            .map_or(Noise::default(), |simulation| simulation.scene.noise);
         let is_noisy = !noise.in_test().is_none();
         let is_fitted = kind != DecoderKind::Newton;
         if is_fitted && is_noisy && noise.sets == NoisySets::Test {
@@ -170,7 +175,11 @@ impl Remark {
 }
 
 /// Remarks on the rows of an error table by their names: on the network, and on the linear map.
-pub fn error_remarks(settings: &SimulatedSettings, network: &Errors, baselines: &Baselines) -> Vec<(&'static str, Remark)> {
+pub fn error_remarks(
+    settings: &SimulatedSettings,
+    network: &Errors,
+    baselines: &Baselines,
+) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;
     let readings = simulation.sensor.scale.columns();
     let networks = simulation.model_size().map_or(1, |size| size.networks);
@@ -213,7 +222,11 @@ mod tests {
     #[test]
     fn what_is_worse_than_the_mean_is_said_with_cause_and_cure_and_nothing_else() {
         let none = Noise::default();
-        for good in [errors(0.2, Some(5.0)), errors(0.0, None), errors(0.2 * (1.0 + 1e-15), Some(5.0))] {
+        for good in [
+            errors(0.2, Some(5.0)),
+            errors(0.0, None),
+            errors(0.2 * (1.0 + 1e-15), Some(5.0)),
+        ] {
             assert!(remarks(DecoderKind::Ridge, none, 500, &good).is_empty());
         }
         let bad = errors(0.3, Some(6.0));
@@ -223,7 +236,12 @@ mod tests {
         };
         let cases = [
             (DecoderKind::Ridge, unseen, 500, "add the noise to both"),
-            (DecoderKind::Ridge, none, 62, "62 training samples for 30 readings are too few"),
+            (
+                DecoderKind::Ridge,
+                none,
+                62,
+                "62 training samples for 30 readings are too few",
+            ),
             (DecoderKind::Network, none, 500, "more epochs"),
             (DecoderKind::RadialBasis, Noise::relative(1e-2), 500, "reduce the noise"),
             (DecoderKind::RadialBasis, none, 500, "use another one"),
@@ -231,7 +249,10 @@ mod tests {
         for (kind, noise, samples, cure) in cases {
             let remarks = remarks(kind, noise, samples, &bad);
             assert_eq!(remarks.len(), 2, "z and x");
-            assert!(remarks[0].contains("in z is 1.500e0 times") && remarks[0].contains(cure), "{remarks:?}");
+            assert!(
+                remarks[0].contains("in z is 1.500e0 times") && remarks[0].contains(cure),
+                "{remarks:?}"
+            );
             assert!(remarks[1].contains("in x is 1.200e0 times"), "{remarks:?}");
         }
         let none_at_all = errors(f64::NAN, None);

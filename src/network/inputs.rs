@@ -4,7 +4,10 @@ use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{ChannelNoise, MinMax, Quantity, ScalingError, Whitening, resolution::{root_mean_square, rounding}};
+use super::{
+    ChannelNoise, MinMax, Quantity, ScalingError, Whitening,
+    resolution::{root_mean_square, rounding},
+};
 use crate::scene::{NoiseSource, RelativeNoise};
 
 /// Choice of the input quantity and its scaling.

@@ -147,13 +147,18 @@ mod tests {
         without_noise.source.scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
         let set = DecoderSet::new(&without_noise, None).unwrap();
-        let report = set.measure(DecoderKind::Ridge, Precision::Double, &test).unwrap().unwrap();
+        let report = set
+            .measure(DecoderKind::Ridge, Precision::Double, &test)
+            .unwrap()
+            .unwrap();
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
         let mut state = State::new(true);
         state.decoders.is_open = true;
         state.decoders.measured = Some(DecoderResult::pending());
-        let place = DecoderResult::pending().iter().position(|result| result.kind == DecoderKind::Ridge);
+        let place = DecoderResult::pending()
+            .iter()
+            .position(|result| result.kind == DecoderKind::Ridge);
         state.decoders.take(place.unwrap(), Ok(report));
         let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
         harness.get_by_label(&format!("Ridge: {remark}"));

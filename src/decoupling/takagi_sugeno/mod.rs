@@ -8,7 +8,11 @@ use ndarray::{Array2, Axis};
 use rand::Rng;
 
 use self::antecedents::{Antecedents, normalise};
-use super::{DecodeError, Decoder, distinct::{distinct, with_noise}, linear_fit::LinearFit};
+use super::{
+    DecodeError, Decoder,
+    distinct::{distinct, with_noise},
+    linear_fit::LinearFit,
+};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
@@ -52,7 +56,12 @@ impl TakagiSugeno {
     ///
     /// # Errors
     /// Values that cannot be scaled.
-    pub fn fit(training: &Dataset, quantity: Quantity, unseen: NoiseSource, rng: &mut impl Rng) -> Result<Self, ScalingError> {
+    pub fn fit(
+        training: &Dataset,
+        quantity: Quantity,
+        unseen: NoiseSource,
+        rng: &mut impl Rng,
+    ) -> Result<Self, ScalingError> {
         let scaling = ScalingChoice::Whitening;
         let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit_all(InputChoice { quantity, scaling }, training.readings())?;
@@ -167,7 +176,7 @@ mod tests {
     use crate::{
         dataset::{Seed, Stream},
         decoupling::{RadialBasisNetwork, RadialBasisSettings, decode_set},
-        scene::{Rows, Scene},
+        scene::{Noise, Rows, Scene},
         sensor::SensorModel,
     };
 
@@ -183,7 +192,13 @@ mod tests {
     }
 
     fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
-        TakagiSugeno::fit(set, quantity, NoiseSource::default(), &mut Seed(0).rng(Stream::Expectation)).unwrap()
+        TakagiSugeno::fit(
+            set,
+            quantity,
+            NoiseSource::default(),
+            &mut Seed(0).rng(Stream::Expectation),
+        )
+        .unwrap()
     }
 
     /// `set` with other readings and targets.
@@ -212,7 +227,8 @@ mod tests {
             };
             let settings = RadialBasisSettings::default();
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
+            let mut basis =
+                RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
             assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
@@ -227,7 +243,10 @@ mod tests {
             quantity: Quantity::LogResistance,
             scaling,
         };
-        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default()).unwrap();
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        // Without noise, components of 1e-12 of the first would multiply rounding.
+        let noise = Noise::relative(1e-4).source(&model).unwrap();
+        let inputs = Inputs::fit(choice, training.readings(), noise).unwrap();
         let outputs = MinMax::fit(training.targets()).unwrap();
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());

@@ -39,12 +39,7 @@ pub(super) struct Choice {
 /// a k-fold cross-validation.
 ///
 /// The centres are those of all samples; the consequents of each fold know nothing of its targets.
-pub(super) fn choose(
-    x: ArrayView2<'_, f64>,
-    y: ArrayView2<'_, f64>,
-    noise: &[f64],
-    rng: &mut impl Rng,
-) -> Choice {
+pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f64], rng: &mut impl Rng) -> Choice {
     let mut order: Vec<usize> = (0..x.nrows()).collect();
     order.shuffle(rng);
     order.truncate(MOST_VALIDATED);
