@@ -90,8 +90,8 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     driver.enter("Fastest under", "5");
     driver.enter("Most accurate under", "1e9");
     let level = driver.state().trade.shown().unwrap();
-    let fastest = *fastest_under(&level.points, 5.0).unwrap();
-    let best = *most_accurate_under(&level.points, 1e9).unwrap();
+    let fastest = fastest_under(&level.points, 5.0).unwrap().clone();
+    let best = most_accurate_under(&level.points, 1e9).unwrap().clone();
     let is_best = format_percent(best.report.errors.z_percent);
     let answer = driver
         .texts()
