@@ -109,8 +109,8 @@ impl Ridge {
         let (Some(largest), Some(smallest)) = (self.singular.first(), self.singular.last()) else {
             return f64::INFINITY;
         };
-        // Further out, a penalty takes away nothing, or everything.
-        let decades = (2.0 * smallest.log10() - 4.0, 2.0 * largest.log10() + 4.0);
+        // Further out, a penalty takes away nothing in double precision, or nearly everything.
+        let decades = (2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0);
         let (decade, error) = least(decades, |decade| self.leave_one_out(10.0_f64.powf(decade)));
         if error < self.left_out.of_mean {
             10.0_f64.powf(decade)

@@ -210,10 +210,13 @@ impl DecoderSet {
         };
         let targets = TargetErrors::measure(test.targets(), answers.view());
         let mean = TargetErrors::measure(test.targets(), self.mean_answers(test)?.view());
+        let mut remarks = Remark::on_targets(kind, (&targets, &mean), &self.settings, self.size_of_fits());
+        let is_complete = targets.iter().all(|target| target.mae.is_finite());
+        remarks.extend((!is_complete).then(|| Remark::Missing(MissingFigures::overflow(precision))));
         Ok(Some(TargetReport {
             kind,
             precision,
-            remarks: Remark::on_targets(kind, (&targets, &mean), &self.settings, self.size_of_fits()),
+            remarks,
             targets,
             cost,
         }))

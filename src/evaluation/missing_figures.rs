@@ -25,11 +25,16 @@ impl MissingFigures {
     /// Tells why figures are missing, given the errors of a decoder and the residual of its answers; `None` if none is.
     pub(super) fn of(precision: Precision, errors: &Errors, residual: f64) -> Option<Self> {
         if !(errors.z_mm.is_finite() && errors.worst_mm.is_finite()) {
-            return Some(match precision {
-                Precision::Single => Self::SinglePrecision,
-                Precision::Double => Self::Overflow,
-            });
+            return Some(Self::overflow(precision));
         }
         (!residual.is_finite()).then_some(Self::NoResistance)
+    }
+
+    /// Reason why answers in this precision are no numbers.
+    pub(super) fn overflow(precision: Precision) -> Self {
+        match precision {
+            Precision::Single => Self::SinglePrecision,
+            Precision::Double => Self::Overflow,
+        }
     }
 }

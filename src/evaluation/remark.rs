@@ -47,10 +47,15 @@ pub enum Cause {
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::WorseThanMean { target, times, cause } => write!(
-                f,
-                "its error in {target} is {times:.3e} times that of always answering the mean: {cause}"
-            ),
+            Self::WorseThanMean { target, times, cause } => {
+                write!(f, "its error in {target} is ")?;
+                if *times < 1e4 {
+                    write!(f, "{times:.3}")?;
+                } else {
+                    write!(f, "{times:.1e}")?;
+                }
+                write!(f, " times that of always answering the mean: {cause}")
+            }
             Self::Missing(reason) => reason.fmt(f),
         }
     }
@@ -254,12 +259,16 @@ mod tests {
             let remarks = remarks(kind, noise, samples, &bad);
             assert_eq!(remarks.len(), 2, "z and x");
             assert!(
-                remarks[0].contains("in z is 1.500e0 times") && remarks[0].contains(cure),
+                remarks[0].contains("in z is 1.500 times") && remarks[0].contains(cure),
                 "{remarks:?}"
             );
-            assert!(remarks[1].contains("in x is 1.200e0 times"), "{remarks:?}");
+            assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
         }
         let none_at_all = errors(f64::NAN, None);
-        assert_eq!(remarks(DecoderKind::Ridge, none, 500, &none_at_all).len(), 1);
+        assert_eq!(
+            remarks(DecoderKind::Ridge, none, 500, &none_at_all).len(),
+            0,
+            "no figure is compared"
+        );
     }
 }

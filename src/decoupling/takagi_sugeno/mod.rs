@@ -176,7 +176,7 @@ mod tests {
     use crate::{
         dataset::{Seed, Stream},
         decoupling::{RadialBasisNetwork, RadialBasisSettings, decode_set},
-        scene::{Rows, Scene},
+        scene::{Noise, Rows, Scene},
         sensor::SensorModel,
     };
 
@@ -243,7 +243,10 @@ mod tests {
             quantity: Quantity::LogResistance,
             scaling,
         };
-        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default()).unwrap();
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        // Without noise, components of 1e-12 of the first would multiply rounding.
+        let noise = Noise::relative(1e-4).source(&model).unwrap();
+        let inputs = Inputs::fit(choice, training.readings(), noise).unwrap();
         let outputs = MinMax::fit(training.targets()).unwrap();
         let x = inputs.of(training.readings());
         let y = outputs.scale(training.targets());
