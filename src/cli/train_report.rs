@@ -60,6 +60,17 @@ struct Decoder {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
+    /// None for decoders that do not solve the equations of the sensor.
+    solved: Option<Solved>,
+}
+
+#[derive(Serialize)]
+struct Solved {
+    rows: usize,
+    unsolved: usize,
+    undetermined: usize,
+    /// None if all answers can be relied on.
+    warning: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -148,6 +159,12 @@ fn decoder(report: &DecoderReport) -> Decoder {
         frame_us: report.cost.frame_us,
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
         fit_seconds: report.cost.fit_seconds,
+        solved: (report.solved.rows > 0).then(|| Solved {
+            rows: report.solved.rows,
+            unsolved: report.solved.unsolved,
+            undetermined: report.solved.undetermined,
+            warning: (!report.solved.are_reliable()).then(|| report.solved.to_string()),
+        }),
     }
 }
 
@@ -296,6 +313,9 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
             write!(out, "{:>12}", format_number(value))?;
         }
         writeln!(out)?;
+    }
+    for report in decoders.iter().filter(|report| !report.solved.are_reliable()) {
+        writeln!(out, "Warning: {}: {}", report.name(), report.solved)?;
     }
     writeln!(
         out,

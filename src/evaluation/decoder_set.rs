@@ -9,8 +9,8 @@ use crate::{
     dataset::{Dataset, PerRow, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior,
-        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean, decode_set,
-        resistance_residual,
+        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, SolvedRows, TakagiSugeno, TrainingMean,
+        decode_set, resistance_residual,
     },
     network::Networks,
     sensor::SensorModel,
@@ -28,6 +28,8 @@ pub struct DecoderReport {
     /// Root mean square of m/R − 1 over the readings m of the test set, with R the resistances at the decoded
     /// coordinates; it needs no ground truth.
     pub residual: f64,
+    /// Standing of the answers of decoders that solve the equations of the sensor.
+    pub solved: SolvedRows,
     /// Computing time.
     pub cost: DecoderCost,
 }
@@ -169,7 +171,7 @@ impl DecoderSet {
         let Some(simulation) = self.settings.source.simulation() else {
             return Ok(None);
         };
-        let Some((answers, cost)) = self.answer(kind, precision, test)? else {
+        let Some((answers, solved, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
         Ok(Some(DecoderReport {
@@ -177,6 +179,7 @@ impl DecoderSet {
             precision,
             errors: Errors::measure(test, &answers, simulation.stroke_mm()),
             residual: rms_residual(&simulation.sensor, test, &answers),
+            solved,
             cost,
         }))
     }
@@ -192,7 +195,7 @@ impl DecoderSet {
         precision: Precision,
         test: &Dataset,
     ) -> Result<Option<TargetReport>, RunError> {
-        let report = |(answers, cost): (Array2<f64>, _)| TargetReport {
+        let report = |(answers, _, cost): (Array2<f64>, _, _)| TargetReport {
             kind,
             precision,
             targets: TargetErrors::measure(test.targets(), answers.view()),
@@ -201,21 +204,22 @@ impl DecoderSet {
         Ok(self.answer(kind, precision, test)?.map(report))
     }
 
-    /// Fits a decoder and returns its answers to `test` with its computing time.
+    /// Fits a decoder and returns its answers to `test`, their standing, and its computing time.
     fn answer(
         &self,
         kind: DecoderKind,
         precision: Precision,
         test: &Dataset,
-    ) -> Result<Option<(Array2<f64>, DecoderCost)>, RunError> {
+    ) -> Result<Option<(Array2<f64>, SolvedRows, DecoderCost)>, RunError> {
         let begun = Instant::now();
         let Some(mut decoder) = self.decoder(kind, precision)? else {
             return Ok(None);
         };
         let fit_seconds = begun.elapsed().as_secs_f64();
         let answers = decode_set(&mut *decoder, test)?;
+        let solved = decoder.take_solved_rows();
         let frame_us = frame_us(&mut *decoder, test)?;
-        Ok(Some((answers, DecoderCost { frame_us, fit_seconds })))
+        Ok(Some((answers, solved, DecoderCost { frame_us, fit_seconds })))
     }
 }
 

@@ -92,10 +92,13 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     let rows: Vec<Row> = rows.chain(of_limit).collect();
     ui.scope(|ui| table_ui(ui, &columns, &rows));
     for result in measured {
-        if let Some(Err(reason)) = &result.report {
-            let name = result.kind.name(result.precision);
-            note_ui(ui, &format!("{name}: {reason}"));
-        }
+        let name = result.kind.name(result.precision);
+        let note = match &result.report {
+            Some(Err(reason)) => reason.clone(),
+            Some(Ok(report)) if !report.solved.are_reliable() => report.solved.to_string(),
+            _ => continue,
+        };
+        note_ui(ui, &format!("{name}: {note}"));
     }
 }
 
@@ -119,6 +122,10 @@ mod tests {
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
+    use crate::{
+        decoupling::Precision,
+        evaluation::{DecoderSet, Preset},
+    };
 
     #[test]
     fn a_decoder_that_fails_says_why_and_the_others_stand() {
@@ -130,5 +137,30 @@ mod tests {
         harness.get_by_label("Training mean: no resistance at rest");
         harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
+    }
+
+    #[test]
+    fn rows_that_were_not_solved_are_counted_below_the_table() {
+        let mut state = State::new(true);
+        state.decoders.is_open = true;
+        state.decoders.measured = Some(DecoderResult::pending());
+        // Four electrodes are too few for six nodes.
+        let mut settings = Preset::Best.settings();
+        settings.source.sensor.scale = "10x6_3x4".parse().unwrap();
+        settings.source.samples = 100;
+        settings.source.test_samples = 10;
+        let set = DecoderSet::new(&settings, None).unwrap();
+        let test = settings.draw_test().unwrap();
+        let report = set
+            .measure(DecoderKind::Newton, Precision::Double, &test)
+            .unwrap()
+            .unwrap();
+        let place = DecoderResult::pending()
+            .iter()
+            .position(|result| result.kind == DecoderKind::Newton)
+            .unwrap();
+        state.decoders.take(place, Ok(report));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        harness.get_by_label_contains("Newton: 10 of 10 rows are not determined by their readings");
     }
 }
