@@ -1,6 +1,7 @@
 //! Rounding of the resistance model and of its derivatives, in units in the last place, against sums of 200 bits.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stdout, reason = "the table is shown with --nocapture")]
 
 use dashu_float::{FBig, round::mode::HalfEven};
 use decoupler::{

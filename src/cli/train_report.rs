@@ -64,6 +64,15 @@ struct Decoder {
     fit_seconds: f64,
     /// What is wrong with the errors, why, and what would help.
     remarks: Vec<String>,
+    /// None for decoders that do not solve the equations of the sensor.
+    solved: Option<Solved>,
+}
+
+#[derive(Serialize)]
+struct Solved {
+    rows: usize,
+    unsolved: usize,
+    undetermined: usize,
 }
 
 #[derive(Serialize)]
@@ -161,6 +170,11 @@ fn decoder(report: &DecoderReport) -> Decoder {
         residual: Some(report.residual).filter(|residual| residual.is_finite()),
         fit_seconds: report.cost.fit_seconds,
         remarks: report.remarks.iter().map(ToString::to_string).collect(),
+        solved: (report.solved.rows > 0).then_some(Solved {
+            rows: report.solved.rows,
+            unsolved: report.solved.unsolved,
+            undetermined: report.solved.undetermined,
+        }),
     }
 }
 

@@ -1,6 +1,7 @@
 use ndarray::Array2;
 use thiserror::Error;
 
+use super::SolvedRows;
 use crate::{
     dataset::{Dataset, PerRow},
     network::Quantity,
@@ -44,6 +45,12 @@ pub trait Decoder: Send {
                 .map_err(|error| DecodeError { row_index, ..error })?;
         }
         Ok(())
+    }
+
+    /// Returns the standing of the rows decoded since it was last asked, of decoders that solve equations; others count
+    /// no rows.
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        SolvedRows::default()
     }
 }
 

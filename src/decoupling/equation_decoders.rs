@@ -1,6 +1,11 @@
-use super::{DecodeError, Decoder, newton::Newton, newton_report::NewtonRules, posterior::Posterior};
+use super::{
+    DecodeError, Decoder, SolvedRows,
+    newton::Newton,
+    newton_report::{NewtonReport, NewtonRules, Solution},
+    posterior::Posterior,
+};
 use crate::{
-    scene::{RowModel, Scene},
+    scene::{NoiseSource, RowModel, Scene},
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
@@ -12,11 +17,17 @@ struct RowSearch {
     rows: Vec<usize>,
     /// Logarithms of the resistances of each of `rows` at rest; empty if rows are known.
     rest: Vec<Vec<f64>>,
+    /// x of those of `rows` that another one equals in all readings; empty if rows are known.
+    twins_x_mm: Vec<f64>,
     trial_mm: Vec<f64>,
 }
 
 /// Relative misfit (root mean square) below which a row-wire is accepted without trying the others.
 const EXPLAINED: f64 = 1e-10;
+/// Difference of the logarithms of resistances at rest below which row-wires mirror each other.
+const SAME_AT_REST: f64 = 1e-13;
+/// Ratio of the misfit to the noise above which noise does not explain it.
+const NOISES: f64 = 6.0;
 
 impl RowSearch {
     fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
@@ -29,12 +40,31 @@ impl RowSearch {
             RowModel::Each => &[],
             RowModel::Shared => rows,
         };
+        let rest = searched
+            .iter()
+            .map(rest)
+            .collect::<Result<Vec<Vec<f64>>, SensorError>>()?;
+        let is_same = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME_AT_REST);
+        let has_twin = |index: &usize| rest.iter().filter(|other| is_same(&rest[*index], other)).count() > 1;
+        let twins = (0..rest.len()).filter(has_twin);
         Ok(Self {
             scale: model.scale,
-            rest: searched.iter().map(rest).collect::<Result<_, SensorError>>()?,
+            twins_x_mm: twins.map(|index| model.geometry.row_x_mm(rows[index])).collect(),
+            rest,
             rows: rows.to_vec(),
             trial_mm: vec![0.0; model.scale.coordinates_per_row()],
         })
+    }
+
+    /// Returns `true` if rows are not known.
+    fn is_needed(&self) -> bool {
+        !self.rest.is_empty()
+    }
+
+    /// Returns `true` if another row-wire than the one of these coordinates may have the same readings: its mirror image,
+    /// or any at another height if all electrodes of a column-wire have the same x.
+    fn has_twin(&self, coordinates_mm: &[f64]) -> bool {
+        self.rest.len() > 1 && self.scale.nodes_per_column() == 1 || self.twins_x_mm.contains(&coordinates_mm[0])
     }
 
     /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit.
@@ -79,6 +109,10 @@ impl RowSearch {
 pub struct NewtonDecoder {
     newton: Newton,
     search: RowSearch,
+    /// Rules that give each row-wire one start.
+    brief: NewtonRules,
+    rules: NewtonRules,
+    solved: SolvedRows,
 }
 
 impl NewtonDecoder {
@@ -90,7 +124,35 @@ impl NewtonDecoder {
         Ok(Self {
             newton: Newton::new(model, scene, rules),
             search: RowSearch::new(model, scene, rows)?,
+            brief: NewtonRules { starts: 1, ..rules },
+            rules,
+            solved: SolvedRows::default(),
         })
+    }
+
+    /// Solves one row by `rules`; returns the standing of the answer for the row-wire that fits best.
+    fn solve(
+        &mut self,
+        rules: NewtonRules,
+        row_index: usize,
+        readings: &[f64],
+        targets: &mut [f64],
+    ) -> Result<Solution, DecodeError> {
+        let newton = &mut self.newton;
+        newton.set_rules(rules);
+        let mut best: Option<NewtonReport> = None;
+        self.search
+            .solve(row_index, readings, targets, |row, readings, coordinates| {
+                let report = newton.solve(row, readings, coordinates)?;
+                if best.is_none_or(|best| report.residual < best.residual) {
+                    best = Some(report);
+                }
+                Ok(match report.solution {
+                    Solution::None => report.residual.max(EXPLAINED),
+                    Solution::Unique | Solution::Undetermined => report.residual.min(0.5 * EXPLAINED),
+                })
+            })?;
+        Ok(best.map_or(Solution::None, |best| best.solution))
     }
 }
 
@@ -104,11 +166,23 @@ impl Decoder for NewtonDecoder {
     }
 
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let newton = &mut self.newton;
-        self.search
-            .solve(row_index, readings, targets, |row, readings, coordinates| {
-                Ok(newton.solve(row, readings, coordinates)?.residual)
-            })
+        let mut solution = Solution::None;
+        if self.search.is_needed() {
+            // Most row-wires tried are not the right one, and no start helps them.
+            solution = self.solve(self.brief, row_index, readings, targets)?;
+        }
+        if solution == Solution::None {
+            solution = self.solve(self.rules, row_index, readings, targets)?;
+        }
+        if solution == Solution::Unique && self.search.has_twin(targets) {
+            solution = Solution::Undetermined;
+        }
+        self.solved.count(solution);
+        Ok(())
+    }
+
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        std::mem::take(&mut self.solved)
     }
 }
 
@@ -155,10 +229,19 @@ impl Decoder for PosteriorDecoder {
 pub struct PolishedDecoder {
     first: Box<dyn Decoder>,
     model: SensorModel,
-    posterior: Posterior,
+    improvement: Improvement,
     rows: Vec<usize>,
     row_model: RowModel,
     steps: usize,
+    solved: SolvedRows,
+}
+
+/// Method of improving an answer.
+enum Improvement {
+    /// Without noise.
+    Newton(Box<Newton>),
+    /// With noise: the posterior, and the noise by which the misfit is judged.
+    Posterior(Box<Posterior>, Option<NoiseSource>),
 }
 
 impl PolishedDecoder {
@@ -172,13 +255,45 @@ impl PolishedDecoder {
         rows: &[usize],
         steps: usize,
     ) -> Self {
+        let noise = scene.noise.in_test();
+        let rules = NewtonRules {
+            steps,
+            ..NewtonRules::default()
+        };
         Self {
             first,
             model: *model,
-            posterior,
+            improvement: if noise.is_none() {
+                Improvement::Newton(Box::new(Newton::new(model, scene, rules)))
+            } else {
+                Improvement::Posterior(Box::new(posterior), noise.source(model).ok())
+            },
             rows: rows.to_vec(),
             row_model: scene.rows.model(),
             steps,
+            solved: SolvedRows::default(),
+        }
+    }
+
+    /// Improves the answer in `targets`; returns its standing.
+    fn improve(&mut self, row_wire: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
+        match &mut self.improvement {
+            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
+            Improvement::Posterior(posterior, noise) => {
+                let report = posterior.polish(row_wire, readings, targets, self.steps)?;
+                let variance = |&ohm: &f64| {
+                    noise
+                        .as_ref()
+                        .map_or(0.0, |noise| noise.relative_to(ohm).total().powi(2))
+                };
+                let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
+                // Readings that noise explains are all that a posterior can ask for.
+                Ok(if report.residual <= NOISES * variance.sqrt() {
+                    Solution::Unique
+                } else {
+                    Solution::None
+                })
+            }
         }
     }
 
@@ -210,7 +325,15 @@ impl Decoder for PolishedDecoder {
             RowModel::Each => self.rows[row_index],
             RowModel::Shared => self.nearest_row(targets),
         };
-        self.posterior.polish(row_wire, readings, targets, self.steps)?;
+        let solution = self.improve(row_wire, readings, targets)?;
+        self.solved.count(solution);
         Ok(())
     }
+
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        std::mem::take(&mut self.solved)
+    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,19 +3,23 @@ use std::fmt;
 /// Stopping rules of the Gauss-Newton method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonRules {
-    /// Largest number of steps. A step that is rejected and shortened counts as one.
+    /// Largest number of steps from one start. A step that is rejected and shortened counts as one.
     pub steps: usize,
-    /// Step length in millimetres below which the method has converged.
-    pub tolerance_mm: f64,
+    /// Step length, in proportion to the range of the unknown, below which the method has converged.
+    pub tolerance: f64,
+    /// Largest number of starts; another is tried where one does not lead to a solution.
+    pub starts: usize,
 }
 
 impl Default for NewtonRules {
-    /// Returns a limit of 50 steps and a tolerance of a tenth of a picometre, where rounding of the readings begins to
-    /// show in the least visible pattern of the paper's largest array (singular value 1e-5 per mm).
+    /// Returns limits of 50 steps and 16 starts, and a tolerance of a tenth of a picometre for a stroke of a millimetre,
+    /// where rounding of the readings begins to show in the least visible pattern of the paper's largest array (singular
+    /// value 1e-5 per mm).
     fn default() -> Self {
         Self {
             steps: 50,
-            tolerance_mm: 1e-10,
+            tolerance: 1e-10,
+            starts: 16,
         }
     }
 }
@@ -43,13 +47,31 @@ impl fmt::Display for NewtonStop {
     }
 }
 
+/// Standing of an answer to the equations of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solution {
+    /// The readings are explained, and leave no other answer within [`LARGEST_ERROR`] of the range.
+    Unique,
+    /// The readings are not explained: the answer is a minimum of the misfit, but no solution.
+    None,
+    /// The readings are explained to rounding, and so would others be: they do not determine the answer.
+    Undetermined,
+}
+
+/// Largest error of an unknown, in proportion to its range, of an answer that counts as the solution.
+pub const LARGEST_ERROR: f64 = 1e-6;
+
 /// Outcome of solving a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonReport {
     /// Reason for stopping.
     pub stop: NewtonStop,
-    /// Number of steps taken.
+    /// Number of steps taken, from all starts.
     pub steps: usize,
     /// Root mean square over readings of the relative misfit m/R − 1.
     pub residual: f64,
+    /// Standing of the answer.
+    pub solution: Solution,
+    /// Largest error of an unknown, in proportion to its range, that the misfit and rounding make to first order.
+    pub largest_error: f64,
 }

@@ -10,8 +10,8 @@ use crate::{
     dataset::{Dataset, PerRow, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior,
-        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean, decode_set,
-        resistance_residual,
+        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, SolvedRows, TakagiSugeno, TrainingMean,
+        decode_set, resistance_residual,
     },
     network::Networks,
     scene::RowModel,
@@ -30,6 +30,8 @@ pub struct DecoderReport {
     /// Root mean square of m/R − 1 over the readings m of the test set, with R the resistances at the decoded
     /// coordinates; it needs no ground truth.
     pub residual: f64,
+    /// Standing of the answers of decoders that solve the equations of the sensor.
+    pub solved: SolvedRows,
     /// Computing time.
     pub cost: DecoderCost,
     /// What is wrong with the errors, why, and what would help.
@@ -175,7 +177,7 @@ impl DecoderSet {
         let Some(simulation) = self.settings.source.simulation() else {
             return Ok(None);
         };
-        let Some((answers, cost)) = self.answer(kind, precision, test)? else {
+        let Some((answers, solved, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
         let measured = |answers: &Array2<f64>| Errors::measure(test, answers, simulation.stroke_mm());
@@ -184,12 +186,14 @@ impl DecoderSet {
         let missing = MissingFigures::of(precision, &errors, residual).map(Remark::Missing);
         let mut remarks = Remark::on_nodes(kind, (&errors, &mean), &self.settings, self.size_of_fits());
         remarks.extend(missing);
+        remarks.extend((!solved.are_reliable()).then_some(Remark::NotAllSolved(solved)));
         Ok(Some(DecoderReport {
             kind,
             precision,
             errors,
             remarks,
             residual,
+            solved,
             cost,
         }))
     }
@@ -205,7 +209,7 @@ impl DecoderSet {
         precision: Precision,
         test: &Dataset,
     ) -> Result<Option<TargetReport>, RunError> {
-        let Some((answers, cost)) = self.answer(kind, precision, test)? else {
+        let Some((answers, _, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
         let targets = TargetErrors::measure(test.targets(), answers.view());
@@ -238,21 +242,22 @@ impl DecoderSet {
         (self.training.samples() / fits, self.training.channels())
     }
 
-    /// Fits a decoder and returns its answers to `test` with its computing time.
+    /// Fits a decoder and returns its answers to `test`, their standing, and its computing time.
     fn answer(
         &self,
         kind: DecoderKind,
         precision: Precision,
         test: &Dataset,
-    ) -> Result<Option<(Array2<f64>, DecoderCost)>, RunError> {
+    ) -> Result<Option<(Array2<f64>, SolvedRows, DecoderCost)>, RunError> {
         let begun = Instant::now();
         let Some(mut decoder) = self.decoder(kind, precision)? else {
             return Ok(None);
         };
         let fit_seconds = begun.elapsed().as_secs_f64();
         let answers = decode_set(&mut *decoder, test)?;
+        let solved = decoder.take_solved_rows();
         let frame_us = frame_us(&mut *decoder, test)?;
-        Ok(Some((answers, DecoderCost { frame_us, fit_seconds })))
+        Ok(Some((answers, solved, DecoderCost { frame_us, fit_seconds })))
     }
 }
 

@@ -2,7 +2,7 @@ use std::fmt;
 
 use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors};
 use crate::{
-    decoupling::DecoderKind,
+    decoupling::{DecoderKind, SolvedRows},
     scene::{Noise, NoisySets},
 };
 
@@ -21,6 +21,8 @@ pub enum Remark {
     },
     /// Figures are missing.
     Missing(MissingFigures),
+    /// Rows were not solved, or the readings do not determine their answers.
+    NotAllSolved(SolvedRows),
 }
 
 /// Most likely cause of a result that is worse than the mean.
@@ -57,6 +59,7 @@ impl fmt::Display for Remark {
                 write!(f, " times that of always answering the mean: {cause}")
             }
             Self::Missing(reason) => reason.fmt(f),
+            Self::NotAllSolved(rows) => rows.fmt(f),
         }
     }
 }

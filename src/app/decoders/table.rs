@@ -129,7 +129,7 @@ mod tests {
     use super::*;
     use crate::{
         decoupling::Precision,
-        evaluation::DecoderSet,
+        evaluation::{DecoderSet, Preset},
         scene::{Noise, NoisySets},
     };
 
@@ -174,5 +174,30 @@ mod tests {
         harness.get_by_label("Training mean: no resistance at rest");
         harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
+    }
+
+    #[test]
+    fn rows_that_were_not_solved_are_counted_below_the_table() {
+        let mut state = State::new(true);
+        state.decoders.is_open = true;
+        state.decoders.measured = Some(DecoderResult::pending());
+        // Four electrodes are too few for six nodes.
+        let mut settings = Preset::Best.settings();
+        settings.source.sensor.scale = "10x6_3x4".parse().unwrap();
+        settings.source.samples = 100;
+        settings.source.test_samples = 10;
+        let set = DecoderSet::new(&settings, None).unwrap();
+        let test = settings.draw_test().unwrap();
+        let report = set
+            .measure(DecoderKind::Newton, Precision::Double, &test)
+            .unwrap()
+            .unwrap();
+        let place = DecoderResult::pending()
+            .iter()
+            .position(|result| result.kind == DecoderKind::Newton)
+            .unwrap();
+        state.decoders.take(place, Ok(report));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        harness.get_by_label_contains("Newton: 10 of 10 rows are not determined by their readings");
     }
 }
