@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
-        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, SimulatedSettings, StartRecord, best_start,
-        error_rows,
+        Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, SimulatedSettings, StartRecord,
+        best_start, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -91,6 +91,7 @@ pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
     let size = settings.source.model_size().map_err(RunError::from)?;
     let outlook = Outlook::of(&settings.source).ok();
     let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
+    let reference_note = ReferenceNote::of(&file.baselines).map(|note| note.to_string());
     let report = Report {
         array: settings.source.sensor.scale,
         hidden: settings.hidden,
@@ -127,7 +128,7 @@ pub(super) fn print_json(file: &NetworkFile, decoders: &[DecoderReport]) -> Resu
         networks: size.networks,
         weights: file.network.weights(),
         condition: condition(outlook.as_ref()),
-        warnings: warnings(outlook.as_ref()),
+        warnings: warnings(outlook.as_ref()).into_iter().chain(reference_note).collect(),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -208,6 +209,9 @@ fn write_text(file: &NetworkFile, decoders: &[DecoderReport], out: &mut impl Wri
     }
     let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
+    if let Some(note) = ReferenceNote::of(&file.baselines) {
+        writeln!(out, "Note: {note}")?;
+    }
     write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
     writeln!(
         out,

@@ -7,7 +7,6 @@
 //! | [`AffineMap`] | an affine map, by least squares or ridge regression with generalised cross-validation |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
-//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
 //! | [`NewtonDecoder`] | solves Eq. (2) by the Gauss-Newton method |
 //! | [`PolishedDecoder`] | another decoder's answer, improved by a few Gauss-Newton steps |
@@ -18,7 +17,6 @@
 //! how well an answer explains the readings, without ground truth.
 
 mod affine_map;
-mod box_posterior;
 mod clusters;
 mod compiled_network;
 mod decoder;
@@ -33,7 +31,6 @@ mod radial_basis;
 mod real;
 mod residual;
 mod ridge;
-mod row_prior;
 mod row_problem;
 mod takagi_sugeno;
 mod training_mean;
