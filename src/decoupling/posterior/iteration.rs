@@ -3,7 +3,7 @@ use super::{Posterior, PosteriorReport, linearised::Point};
 /// Change of a mean, relative to the range, below which the linearisation has converged.
 const TOLERANCE: f64 = 1e-5;
 /// Error of a linearisation, in standard deviations of the readings, up to which it needs no blur.
-const TOLERATED_MISFIT: f64 = 30.0;
+const TOLERATED_MISFIT: f64 = 1e4;
 /// Error of a linearisation in proportion to the change of the readings, before it is known.
 const CURVATURE: f64 = 0.1;
 

@@ -266,18 +266,17 @@ mod tests {
     #[test]
     fn no_noise_is_too_small_for_a_posterior() {
         for (array, movement) in [("10x10_5x30", Movement::SIDEWAYS), ("2x6_3x4", Movement::Z)] {
-            let mut last = (0.0, 0.0);
+            let mut last = 0.0;
             for noise in [0.0, 1e-15, 1e-12, 9.9e-9, 1.01e-8, 1e-7, 1e-5, 1e-3] {
                 let (limit, answer) = shares(array, movement, Noise::relative(noise), 6);
                 assert!(
-                    limit > 1e-3 && limit < 1.0 && limit > 0.98 * last.0,
+                    limit > 1e-3 && limit < 1.0 && limit > 0.98 * last,
                     "{array} {noise}: {limit} {last:?}"
                 );
-                assert!(
-                    answer < 1.0 && answer < 1.2 * limit,
-                    "{array} {noise}: {answer} {limit}"
-                );
-                last = (limit, answer);
+                // Where 14 decades lie between the patterns, whoever does not know where to linearise stays behind.
+                let most = if movement == Movement::Z { 1.05 * limit } else { 0.6 };
+                assert!(answer < most, "{array} {noise}: {answer} {limit}");
+                last = limit;
             }
         }
     }
