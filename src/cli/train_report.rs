@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::{failure::Failure, spread_plot::write_starts};
 use crate::{
     evaluation::{
-        Baselines, DecoderReport, ErrorRow, Errors, Outlook, RunError, RunFlaw, SimulatedSettings, StartRecord,
-        best_start, error_remarks, error_rows,
+        Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
+        StartRecord, best_start, error_remarks, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
@@ -182,7 +182,9 @@ fn decoder(report: &DecoderReport) -> Decoder {
 fn remarks(file: &NetworkFile, flaw: Option<&RunFlaw>) -> Vec<String> {
     let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
     let told = remarks.iter().filter(|(row, _)| flaw.is_none() || *row != "network");
-    told.map(|(row, remark)| format!("{row}: {remark}")).collect()
+    let told = told.map(|(row, remark)| format!("{row}: {remark}"));
+    told.chain(ReferenceNote::of(&file.baselines).map(|note| note.to_string()))
+        .collect()
 }
 
 /// Condition number of the worst row; none if the Jacobian is singular.

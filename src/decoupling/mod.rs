@@ -17,7 +17,6 @@
 //! how well an answer explains the readings, without ground truth.
 
 mod affine_map;
-mod box_posterior;
 mod clusters;
 mod compiled;
 mod decoder;
@@ -35,7 +34,6 @@ mod posterior;
 mod radial_basis;
 mod residual;
 mod ridge;
-mod row_prior;
 mod row_problem;
 mod solved_rows;
 mod takagi_sugeno;

@@ -146,14 +146,14 @@ impl RowProblem {
         self.model.resistivity_ohm_per_mm / self.conductance.sums()[reading]
     }
 
-    /// Σ_k ∂ ln s_k/∂u in 1/mm, which is −Σ_k ∂ ln R_k/∂u.
-    pub(crate) fn log_conductance_slope(&self, unknown: usize) -> f64 {
-        let pairs = self
-            .conductance
-            .derivatives(unknown)
-            .iter()
-            .zip(self.conductance.sums());
-        pairs.map(|(derivative, sum)| derivative / sum).sum()
+    /// ∂ ln s_k/∂u in 1/mm, which is −∂ ln R_k/∂u.
+    pub(crate) fn log_conductance_slope(&self, reading: usize, unknown: usize) -> f64 {
+        self.conductance.derivatives(unknown)[reading] / self.conductance.sums()[reading]
+    }
+
+    /// Reading m_k in ohm.
+    pub(crate) fn reading_ohm(&self, reading: usize) -> f64 {
+        self.readings_ohm[reading]
     }
 
     /// The unknowns behind absolute coordinates (3·M2) of nodes on the present row-wire.

@@ -144,10 +144,13 @@ impl DecoderSet {
                     };
                     let steps = DecoderKind::POLISH_STEPS;
                     Box::new(PolishedDecoder::new(first, posterior()?, sensor, scene, rows, steps))
-                } else if scene.noise.in_test().is_none() {
-                    Box::new(NewtonDecoder::new(sensor, scene, rows, NewtonRules::default())?)
                 } else {
-                    Box::new(PosteriorDecoder::new(posterior()?, sensor, scene, rows)?)
+                    let posterior = posterior()?;
+                    if posterior.is_decided_by_equations() {
+                        Box::new(NewtonDecoder::new(sensor, scene, rows, NewtonRules::default())?)
+                    } else {
+                        Box::new(PosteriorDecoder::new(posterior, sensor, scene, rows)?)
+                    }
                 }
             }
         }))

@@ -335,7 +335,7 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     }
 }
 
-/// The errors of the Bayesian reference on `test`; `None` where rounding hides it.
+/// The errors of the Bayesian reference on `test`; `None` where a posterior did not converge.
 pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);

@@ -12,7 +12,7 @@ pub struct TradePoint {
     pub report: DecoderReport,
     /// Training or fitting time in seconds, summed over all rows and restarts.
     pub training_seconds: f64,
-    /// Errors of the Bayesian reference in this scene; `None` where rounding hides it.
+    /// Errors of the Bayesian reference in this scene; `None` where a posterior did not converge.
     pub reference: Option<Errors>,
 }
 

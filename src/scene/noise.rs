@@ -179,6 +179,35 @@ impl NoiseSource {
         }
     }
 
+    /// Standard deviation in proportion to the resistance.
+    pub(crate) fn relative(&self) -> f64 {
+        self.noise.relative
+    }
+
+    /// Standard deviation in ohm, whatever the resistance.
+    pub(crate) fn additive_ohm(&self) -> f64 {
+        self.noise.additive_ohm
+    }
+
+    /// Gain error shared by all readings of a snapshot (standard deviation, relative).
+    pub(crate) fn drift(&self) -> f64 {
+        self.noise.drift
+    }
+
+    /// The lowest and the highest value that the converter gives as `reading_ohm`; `None` without a converter. The last
+    /// step is open, for the converter clips.
+    pub(crate) fn rounded_from_ohm(&self, reading_ohm: f64) -> Option<(f64, f64)> {
+        let Converter { step_ohm, steps } = self.converter?;
+        let step = (reading_ohm / step_ohm).round().clamp(1.0, steps);
+        let lowest_ohm = if step > 1.0 { (step - 0.5) * step_ohm } else { 0.0 };
+        let highest_ohm = if step < steps {
+            (step + 0.5) * step_ohm
+        } else {
+            f64::INFINITY
+        };
+        Some((lowest_ohm, highest_ohm))
+    }
+
     /// The noise of a reading of `resistance_ohm` relative to it, with own part
     /// √(relative² + (additive² + step²/12)/R²); step/√12 is the standard deviation of rounding to steps.
     pub fn relative_to(&self, resistance_ohm: f64) -> RelativeNoise {

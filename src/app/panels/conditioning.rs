@@ -7,19 +7,9 @@ use crate::{
         test_view::TestView,
         theme::{note_ui, space},
     },
-    evaluation::{Baselines, Outlook},
+    evaluation::Outlook,
     sensor::Identifiability,
 };
-
-/// The baselines without a reference where nothing is known of it: without noise it is 0 by definition, but in a scene
-/// so badly conditioned rounding decides.
-pub fn soundly(baselines: &Baselines, test: &TestView) -> Baselines {
-    let is_blurred = test.outlook.as_ref().is_some_and(is_badly_conditioned);
-    Baselines {
-        reference: baselines.reference.filter(|limit| limit.z_mm > 0.0 || !is_blurred),
-        ..*baselines
-    }
-}
 
 fn is_badly_conditioned(outlook: &Outlook) -> bool {
     outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION

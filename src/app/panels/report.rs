@@ -3,7 +3,7 @@ use std::time::Duration;
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
-    conditioning::{conditioning_ui, soundly},
+    conditioning::conditioning_ui,
     spread::spread_ui,
     table::{Column, Row, table_ui},
 };
@@ -17,7 +17,7 @@ use crate::{
         state::{Phase, RunResult, RunView, State},
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, error_rows},
+    evaluation::{ErrorRow, ReferenceNote, error_rows},
     export::{format_duration, format_number},
 };
 
@@ -28,10 +28,13 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         section_heading_ui(ui, "Errors on the test set");
         let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
         if let Some((run, result)) = shown {
-            let baselines = soundly(&run.baselines, &run.test);
-            error_table_ui(ui, &error_rows(&result.errors, &baselines, run.published.as_ref()));
+            let baselines = &run.baselines;
+            error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
             verdict_ui(ui, state, run, result);
             conditioning_ui(ui, &run.test);
+            if let Some(note) = ReferenceNote::of(baselines) {
+                note_ui(ui, &note.to_string());
+            }
             worst_node_ui(ui, result, &mut actions);
             decoders_ui(ui, state, baselines.reference.as_ref(), &mut actions);
             effective_parameters_ui(ui, run, result);
@@ -66,7 +69,6 @@ pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
 fn expectation_ui(ui: &mut Ui, state: &State) {
     let known = state.preview.as_ref();
     if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
-        let baselines = soundly(&baselines, &preview.test);
         let published = state.draft.published();
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {

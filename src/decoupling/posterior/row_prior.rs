@@ -1,19 +1,28 @@
-use faer::{Mat, Side, linalg::solvers::DenseSolveCore};
+use faer::{Mat, Par, Side, linalg::triangular_solve};
 use rand::Rng;
 
-use super::row_problem::{Range, ranges};
 use crate::{
+    decoupling::row_problem::{Range, ranges},
     scene::{Loading, Scene},
     sensor::SensorModel,
 };
 
 /// Prior distribution of a row-wire's unknowns in a scene.
 #[derive(Clone, Debug)]
-pub(crate) enum RowPrior {
+pub(super) enum RowPrior {
     /// Uniform within their ranges, independent of each other: random nodes.
     Uniform,
-    /// A Gaussian of the scene's mean and covariance, cut to the ranges: its inverse covariance, and that times its mean.
-    Gaussian { precision: Mat<f64>, linear: Vec<f64> },
+    /// A Gaussian of the scene's mean and covariance, cut to the ranges.
+    Gaussian(GaussianPrior),
+}
+
+/// Mean and covariance of unknowns measured in widths of their ranges, so that ranges of any length, and of unlike
+/// lengths, give a matrix that can be inverted.
+#[derive(Clone, Debug)]
+pub(super) struct GaussianPrior {
+    mean: Vec<f64>,
+    /// L⁻¹ of the covariance L Lᵀ.
+    inverse_root: Mat<f64>,
 }
 
 /// Draws that estimate a scene's mean and covariance.
@@ -42,12 +51,33 @@ impl RowPrior {
             }
         }
         let ranges = ranges(model, scene);
-        draws.iter().map(|values| Self::gaussian(values, &ranges)).collect()
+        let gaussian = |values: &Vec<f64>| Self::Gaussian(GaussianPrior::of(values, &ranges));
+        draws.iter().map(gaussian).collect()
     }
 
-    /// From draws × unknowns, row by row. Reckons in widths of the ranges, so that ranges of any length, and of unlike
-    /// lengths, give a matrix that can be inverted.
-    fn gaussian(values: &[f64], ranges: &[Range]) -> Self {
+    /// Appends the prior to equations `[A, b]` (row by row, `unknowns` + 1 columns) for
+    /// x = (displacement − `at_mm`) / width.
+    pub(super) fn append_to(&self, equations: &mut Vec<f64>, unknowns: usize, at_mm: &[f64], ranges: &[Range]) {
+        let Self::Gaussian(GaussianPrior { mean, inverse_root }) = self else {
+            return;
+        };
+        let n = at_mm.len();
+        for row in 0..n {
+            let value = |column| if column < n { inverse_root[(row, column)] } else { 0.0 };
+            equations.extend((0..unknowns).map(value));
+            let apart = |column: usize| mean[column] - at_mm[column] / ranges[column].width();
+            equations.push(
+                (0..=row)
+                    .map(|column| inverse_root[(row, column)] * apart(column))
+                    .sum(),
+            );
+        }
+    }
+}
+
+impl GaussianPrior {
+    /// From draws × unknowns, row by row.
+    fn of(values: &[f64], ranges: &[Range]) -> Self {
         let n = ranges.len();
         let draws = values.chunks_exact(n);
         let count = draws.len() as f64;
@@ -73,12 +103,9 @@ impl RowPrior {
         let factor = covariance.llt(Side::Lower);
         let factor =
             factor.expect("entries are at most 1 and the diagonal was raised by 1e-6, far above their rounding");
-        let inverse = factor.inverse();
-        let linear = (0..n)
-            .map(|i| (0..n).map(|j| inverse[(i, j)] * mean[j]).sum::<f64>() / ranges[i].width())
-            .collect();
-        let precision = Mat::from_fn(n, n, |i, j| inverse[(i, j)] / ranges[i].width() / ranges[j].width());
-        Self::Gaussian { precision, linear }
+        let mut inverse_root = Mat::identity(n, n);
+        triangular_solve::solve_lower_triangular_in_place(factor.L(), inverse_root.as_mut(), Par::Seq);
+        Self { mean, inverse_root }
     }
 }
 
@@ -90,32 +117,27 @@ mod tests {
         scene::Movement,
     };
 
-    fn prior(largest_shift_mm: f64) -> RowPrior {
+    fn prior(largest_shift_mm: f64) -> GaussianPrior {
         let model = SensorModel::new("3x4_2x12".parse().unwrap());
         let scene = Scene {
             loading: "smooth:4".parse().unwrap(),
             movement: Movement::Xyz { largest_shift_mm },
             ..Scene::default()
         };
-        RowPrior::of_rows(&model, &scene, &[1], &mut Seed(0).rng(Stream::Expectation)).remove(0)
+        let mut rng = Seed(0).rng(Stream::Expectation);
+        match RowPrior::of_rows(&model, &scene, &[1], &mut rng).remove(0) {
+            RowPrior::Gaussian(prior) => prior,
+            RowPrior::Uniform => panic!("a smooth field is not uniform"),
+        }
     }
 
     /// The prior of shifts is proportional to them, down to lengths whose squares underflow.
     #[test]
     fn no_length_is_too_short_for_a_prior_of_its_own() {
-        let RowPrior::Gaussian { precision, linear } = prior(0.25) else {
-            panic!("a smooth field is not uniform")
-        };
-        let RowPrior::Gaussian {
-            precision: short,
-            linear: short_linear,
-        } = prior(0.25 * 1e-170)
-        else {
-            panic!("the prior was given up")
-        };
-        // Unknowns 2 and 5 are z of two nodes, 0 is x: in proportion 1e-170.
-        assert!((short[(2, 5)] / precision[(2, 5)] - 1.0).abs() < 1e-9);
-        assert!((short[(0, 2)] / precision[(0, 2)] / 1e170 - 1.0).abs() < 1e-9);
-        assert!((short_linear[2] / linear[2] - 1.0).abs() < 1e-9);
+        let (long, short) = (prior(0.25), prior(0.25 * 1e-170));
+        assert!((&long.inverse_root - &short.inverse_root).norm_max() < 1e-9 * long.inverse_root.norm_max());
+        for (long, short) in long.mean.iter().zip(&short.mean) {
+            assert!((long - short).abs() < 1e-12);
+        }
     }
 }

@@ -1,0 +1,184 @@
+use super::{
+    expectation_propagation::{LinearModel, RoundedReading},
+    truncated::Marginal,
+};
+use crate::{
+    decoupling::row_problem::{Range, RowProblem},
+    scene::{NoiseSource, normal::normal_cdf},
+};
+
+/// The likelihood of the readings of one row-wire, linearised.
+///
+/// With R(u) the resistances and γ = 1 + drift · η the gain of the snapshot, a reading m before rounding is normal about
+/// P = γ R(u) with standard deviation σ = √((relative · P)² + additive²), truncated to m > 0:
+///
+/// `ln p(m|u,η) = −½ w² − ln σ(P) − ln Φ(P/σ(P)),   w = (m − P)/σ(P)`.
+///
+/// w is nearly linear in u: with relative noise it is conductance, up to constants. The two normalising terms, which are
+/// there because σ depends on u, are linearised as well. η is one more unknown, with a standard normal prior.
+///
+/// No noise is less than the rounding of the readings. Of a reading that a converter rounded, the interval is known in
+/// which it was before: w counts as the distance from the middle of the step, and the normalising term fades as the step
+/// grows beyond σ.
+#[derive(Clone, Debug)]
+pub(super) struct Likelihood {
+    noise: NoiseSource,
+}
+
+/// Rounding of a reading that comes from a few operations in double precision, as a standard deviation.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+impl Likelihood {
+    pub(super) fn new(noise: NoiseSource) -> Self {
+        Self { noise }
+    }
+
+    /// True if readings share an error, which is then the last unknown.
+    pub(super) fn has_drift(&self) -> bool {
+        self.noise.drift() > 0.0
+    }
+
+    /// Range of η: gains are above 0.
+    pub(super) fn drift_range(&self) -> Range {
+        Range {
+            lowest: -1.0 / self.noise.drift(),
+            highest: f64::INFINITY,
+        }
+    }
+
+    /// The most likely η of readings whose resistances the evaluated `problem` has.
+    pub(super) fn likeliest_drift(&self, problem: &RowProblem) -> f64 {
+        let drift = self.noise.drift();
+        let (mut precision, mut linear) = (1.0, 0.0);
+        for reading in 0..problem.equations() {
+            let ohm = problem.resistance_ohm(reading);
+            // Noise as at gain 1; all readings see the same gain.
+            let slope = drift * ohm / self.deviation_ohm(ohm);
+            precision += slope * slope;
+            linear += slope * (problem.reading_ohm(reading) - ohm) / self.deviation_ohm(ohm);
+        }
+        (linear / precision).max(-(1.0 - SMALLEST_GAIN) / drift)
+    }
+
+    fn deviation_ohm(&self, predicted_ohm: f64) -> f64 {
+        let relative = libm::hypot(self.noise.relative(), ROUNDING);
+        libm::hypot(relative * predicted_ohm, self.noise.additive_ohm())
+    }
+
+    /// w of every reading, with the residuals of the evaluated `problem`.
+    pub(super) fn misfits(&self, problem: &RowProblem, drift: f64) -> Vec<f64> {
+        let gain = self.gain(drift);
+        let misfit = |reading| {
+            let predicted_ohm = gain * problem.resistance_ohm(reading);
+            (problem.reading_ohm(reading) - predicted_ohm) / self.deviation_ohm(predicted_ohm)
+        };
+        (0..problem.equations()).map(misfit).collect()
+    }
+
+    fn gain(&self, drift: f64) -> f64 {
+        (1.0 + self.noise.drift() * drift).max(SMALLEST_GAIN)
+    }
+
+    /// The likelihood linearised where `problem` was evaluated, without priors, for unknowns
+    /// x = (displacement − present) / width, and η − `drift` if there is drift. Every σ is `blur` times what it is.
+    pub(super) fn linearised(&self, problem: &RowProblem, drift: f64, blur: f64, widths: &[f64]) -> LinearModel {
+        let (n, readings) = (widths.len(), problem.equations());
+        let unknowns = n + usize::from(self.has_drift());
+        let gain = self.gain(drift);
+        let mut model = LinearModel {
+            equations: Vec::with_capacity((readings + 2 * unknowns) * (unknowns + 1)),
+            linear: vec![0.0; unknowns],
+            ranges: Vec::new(),
+            rounded: Vec::new(),
+        };
+        let mut form = vec![0.0; unknowns];
+        for reading in 0..readings {
+            let (read_ohm, predicted_ohm) = (problem.reading_ohm(reading), gain * problem.resistance_ohm(reading));
+            let own_ohm = self.deviation_ohm(predicted_ohm);
+            let deviation_ohm = blur * own_ohm;
+            let interval_ohm = self.noise.rounded_from_ohm(read_ohm);
+            let weight = interval_ohm.map_or(1.0, |(lowest, highest)| narrowness(0.5 * (highest - lowest) / own_ohm));
+            // Shares of σ² that grow with the reading, and that do not.
+            let additive = (self.noise.additive_ohm() / own_ohm).powi(2);
+            let relative = weight * (1.0 - additive).max(0.0);
+            let scale = predicted_ohm / deviation_ohm;
+            // −∂w/∂ ln P, and ∂(−ln σ − ln Φ)/∂ ln P.
+            let slope = scale * (1.0 + relative * (read_ohm - predicted_ohm) / predicted_ohm);
+            let signals = predicted_ohm / own_ohm;
+            let truncation = if additive > 0.0 {
+                inverse_mills(signals) * additive * signals
+            } else {
+                0.0
+            };
+            let normalising = -relative - truncation;
+            // ∂ ln P/∂x: −∂ ln s/∂x for what moves.
+            for (unknown, (value, &width)) in form.iter_mut().zip(widths).enumerate() {
+                *value = -problem.log_conductance_slope(reading, unknown) * width;
+            }
+            if self.has_drift() {
+                form[n] = self.noise.drift() / gain;
+            }
+            for (linear, value) in model.linear.iter_mut().zip(&form) {
+                *linear += normalising * value;
+            }
+            let misfit = (read_ohm - predicted_ohm) / deviation_ohm;
+            form.iter_mut().for_each(|value| *value *= slope);
+            match interval_ohm {
+                None => {
+                    model.equations.extend_from_slice(&form);
+                    model.equations.push(misfit);
+                }
+                Some((lowest, highest)) => model.rounded.push(RoundedReading {
+                    form: form.clone(),
+                    misfit,
+                    range: Range {
+                        lowest: misfit + (lowest - read_ohm) / deviation_ohm,
+                        highest: misfit + (highest - read_ohm) / deviation_ohm,
+                    },
+                }),
+            }
+        }
+        if self.has_drift() {
+            model.equations.extend((0..n).map(|_| 0.0));
+            model.equations.extend([1.0, -drift]);
+        }
+        model
+    }
+}
+
+/// What [`Likelihood::misfits`] will be at `x`, according to a `model` linearised with `blur`.
+pub(super) fn expected_misfits(model: &LinearModel, readings: usize, x: &[Marginal], blur: f64) -> Vec<f64> {
+    let product = |form: &[f64]| -> f64 { form.iter().zip(x).map(|(value, x)| value * x.mean).sum() };
+    if model.rounded.is_empty() {
+        let rows = model.equations.chunks_exact(x.len() + 1).take(readings);
+        rows.map(|row| blur * (row[x.len()] - product(&row[..x.len()])))
+            .collect()
+    } else {
+        let rows = model.rounded.iter();
+        rows.map(|row| blur * (row.misfit - product(&row.form))).collect()
+    }
+}
+
+/// Gain below which none is sought.
+const SMALLEST_GAIN: f64 = 1e-6;
+
+/// `−∂ ln P/∂ ln σ` of the probability of an interval of `half_width` standard deviations either side of the mean: 1 for a
+/// narrow one, which is a density, and 0 for a wide one.
+fn narrowness(half_width: f64) -> f64 {
+    let probability = libm::erf(half_width * std::f64::consts::FRAC_1_SQRT_2);
+    let edges = 2.0 * half_width * density(half_width);
+    if half_width < 1e-6 {
+        1.0
+    } else {
+        (edges / probability).min(1.0)
+    }
+}
+
+/// φ(x)/Φ(x) for x of 0 or more.
+fn inverse_mills(x: f64) -> f64 {
+    density(x) / normal_cdf(x)
+}
+
+fn density(x: f64) -> f64 {
+    (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt()
+}

@@ -1,0 +1,330 @@
+//! The posterior of a row-wire's deformation given its readings, the noise and the prior of a scene.
+
+mod expectation_propagation;
+mod gaussian;
+mod iteration;
+mod likelihood;
+mod linearised;
+mod report;
+mod row_prior;
+mod truncated;
+
+pub use report::PosteriorReport;
+
+use rand::Rng;
+
+use super::{
+    DecodeError,
+    newton::Newton,
+    newton_report::NewtonRules,
+    row_problem::{Range, RowProblem, ranges},
+};
+use crate::{
+    scene::Scene,
+    sensor::{Identifiability, SensorError, SensorModel},
+};
+use likelihood::Likelihood;
+use linearised::Point;
+use row_prior::RowPrior;
+
+/// Newton's method with noise and prior: iterates the posterior of the linearised equations, cut to the range of every
+/// unknown, and answers with its median, the answer of the least expected distance.
+///
+/// With noise, the single best deformation is a poor answer: it lies in a corner of the possible ones. The posterior
+/// weighs all deformations that explain the readings. The same holds without noise where some deformation is seen so
+/// badly that rounding of the readings hides it; elsewhere the equations decide alone there, and Newton's method
+/// answers.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    problem: RowProblem,
+    ranges: Vec<Range>,
+    widths: Vec<f64>,
+    rows: Vec<usize>,
+    priors: Vec<RowPrior>,
+    likelihood: Likelihood,
+    /// Answers where the equations decide alone.
+    newton: Option<Newton>,
+}
+
+/// Largest number of linearisations: two or three nearly always do, for conductance is nearly linear.
+const STEPS: usize = 60;
+
+impl Posterior {
+    /// Prepares `rows` of `model`, with the noise and the prior of `scene`; `rng` draws the samples that estimate a prior
+    /// without closed form.
+    ///
+    /// # Errors
+    /// A sensor without resistances at rest.
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Result<Self, SensorError> {
+        let ranges = ranges(model, scene);
+        let noise = scene.noise.in_test();
+        let equations_decide = noise.is_none() && !is_blurred_by_rounding(model, scene, rows);
+        Ok(Self {
+            problem: RowProblem::new(model, scene.movement.axes()),
+            widths: ranges.iter().map(|range| range.width()).collect(),
+            ranges,
+            rows: rows.to_vec(),
+            priors: RowPrior::of_rows(model, scene, rows, rng),
+            likelihood: Likelihood::new(noise.source(model)?),
+            newton: equations_decide.then(|| Newton::new(model, scene, NewtonRules::default())),
+        })
+    }
+
+    /// True if the equations decide alone: without noise, and with every deformation seen well enough.
+    pub fn is_decided_by_equations(&self) -> bool {
+        self.newton.is_some()
+    }
+
+    /// Decodes one row-wire of those given, from its readings in ohm (M4); writes absolute coordinates (3·M2).
+    ///
+    /// # Errors
+    /// Readings that are no resistances.
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn solve(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<PosteriorReport, DecodeError> {
+        if let Some(newton) = &mut self.newton {
+            return Ok(PosteriorReport::of_equations(newton.solve(
+                row,
+                readings_ohm,
+                coordinates_mm,
+            )?));
+        }
+        DecodeError::check(readings_ohm)?;
+        let middle = self.ranges.iter().map(|range| range.middle()).collect();
+        Ok(self.iterate(row, readings_ohm, middle, STEPS, coordinates_mm))
+    }
+
+    /// As [`Self::solve`], by at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
+    /// replaced.
+    ///
+    /// # Errors
+    /// Readings that are no resistances.
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn polish(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        steps: usize,
+    ) -> Result<PosteriorReport, DecodeError> {
+        if let Some(newton) = &mut self.newton {
+            newton.set_rules(NewtonRules {
+                steps,
+                ..NewtonRules::default()
+            });
+            let report = newton.polish(row, readings_ohm, coordinates_mm);
+            newton.set_rules(NewtonRules::default());
+            return Ok(PosteriorReport::of_equations(report?));
+        }
+        DecodeError::check(readings_ohm)?;
+        let mut first = vec![0.0; self.ranges.len()];
+        self.problem.read(row, readings_ohm);
+        self.problem.unknowns_of(coordinates_mm, &mut first);
+        for (value, range) in first.iter_mut().zip(&self.ranges) {
+            *value = range.clamp(*value);
+        }
+        Ok(self.iterate(row, readings_ohm, first, steps, coordinates_mm))
+    }
+
+    /// Computes the medians of the posterior linearised at the true deformation of the row whose nodes are at `truth_mm`
+    /// (3·M2), given noisy readings of it: the answer of a decoder that knows where to linearise. Writes absolute
+    /// coordinates (3·M2) and returns true; or writes the truth and returns false if the posterior did not converge.
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) -> bool {
+        coordinates_mm.copy_from_slice(truth_mm);
+        if self.is_decided_by_equations() {
+            return true;
+        }
+        self.problem.read(row, readings_ohm);
+        let mut truth = Point {
+            displacements_mm: vec![0.0; self.ranges.len()],
+            drift: 0.0,
+        };
+        self.problem.unknowns_of(truth_mm, &mut truth.displacements_mm);
+        self.problem.evaluate(&truth.displacements_mm);
+        if self.likelihood.has_drift() {
+            truth.drift = self.likelihood.likeliest_drift(&self.problem);
+        }
+        match self.linearised(row, &truth, 1.0) {
+            Some(found) if found.marginals.converged => {
+                self.problem.coordinates_of(&found.medians_mm, coordinates_mm);
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
+/// True if some row sees some deformation so badly that rounding hides it.
+fn is_blurred_by_rounding(model: &SensorModel, scene: &Scene, rows: &[usize]) -> bool {
+    let half_way = glam::DVec3::Z * (0.5 * scene.stroke_mm(&model.geometry));
+    let displacements_mm = vec![half_way; model.scale.nodes_per_row()];
+    rows.iter().any(|&row| {
+        let seen = Identifiability::of_row(model, row, &displacements_mm, scene.movement.axes());
+        seen.is_ok_and(|seen| seen.condition() >= Identifiability::LARGEST_CONDITION)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Dataset, Seed, Stream},
+        scene::{Movement, Noise},
+    };
+
+    /// A case of `tests/fixtures/posterior.py`, which integrates or samples the exact posterior.
+    #[derive(serde::Deserialize)]
+    struct Case {
+        array: String,
+        relative: f64,
+        additive_ohm: f64,
+        drift: f64,
+        readings_ohm: Vec<f64>,
+        medians_mm: Vec<f64>,
+        deviations_mm: Vec<f64>,
+    }
+
+    #[test]
+    fn medians_are_those_of_the_exact_posterior() {
+        let cases: Vec<Case> = serde_json::from_str(include_str!("../../../tests/fixtures/posterior.json")).unwrap();
+        for case in cases {
+            let model = SensorModel::new(case.array.parse().unwrap());
+            let scene = Scene {
+                noise: Noise {
+                    relative: case.relative,
+                    additive_ohm: case.additive_ohm,
+                    drift: case.drift,
+                    ..Noise::default()
+                },
+                ..Scene::default()
+            };
+            let mut posterior = Posterior::new(&model, &scene, &[0], &mut Seed(1).rng(Stream::Expectation)).unwrap();
+            let mut coordinates = vec![0.0; model.scale.coordinates_per_row()];
+            let report = posterior.solve(0, &case.readings_ohm, &mut coordinates).unwrap();
+            let ours: Vec<f64> = coordinates
+                .chunks_exact(3)
+                .map(|node| model.geometry.height_mm - node[2])
+                .collect();
+            // Gains and noise in ohm are linearised as well.
+            let tolerance = if case.additive_ohm > 0.0 || case.drift > 0.0 {
+                0.03
+            } else {
+                0.015
+            };
+            for ((ours, exact), deviation) in ours.iter().zip(&case.medians_mm).zip(&case.deviations_mm) {
+                let apart = (ours - exact) / deviation;
+                assert!(apart.abs() < tolerance, "{} {}: {apart}", case.array, case.relative);
+            }
+            let squares = case.deviations_mm.iter().map(|deviation| deviation * deviation);
+            let spread_mm = (squares.sum::<f64>() / case.deviations_mm.len() as f64).sqrt();
+            assert!((report.spread_mm.unwrap() / spread_mm - 1.0).abs() < 0.02);
+        }
+    }
+
+    /// Mean errors of z of the limit and of the decoder, in proportion to those of the middle.
+    fn shares(array: &str, movement: Movement, noise: Noise, samples: usize) -> (f64, f64) {
+        let model = SensorModel::new(array.parse().unwrap());
+        let scene = Scene {
+            movement,
+            noise,
+            ..Scene::default()
+        };
+        let rows = model.scale.rows();
+        let mut set = Dataset::simulate(&model, &scene, samples * rows, &mut Seed(1).rng(Stream::Test)).unwrap();
+        set.disturb(&model, &scene.noise, &mut Seed(1).rng(Stream::TestNoise))
+            .unwrap();
+        let mut posterior = Posterior::new(&model, &scene, &[0], &mut Seed(1).rng(Stream::Expectation)).unwrap();
+        let (mut limits, mut answers, mut middles) = (0.0, 0.0, 0.0);
+        for sample in (0..set.samples()).step_by(rows) {
+            let (readings, truth) = (set.sample_readings(sample), set.sample_targets(sample));
+            let mut limit = truth.to_vec();
+            assert!(posterior.limit(0, readings, truth, &mut limit), "{array} {noise:?}");
+            let mut answer = truth.to_vec();
+            posterior.solve(0, readings, &mut answer).unwrap();
+            for z in (2..truth.len()).step_by(3) {
+                limits += (limit[z] - truth[z]).abs();
+                answers += (answer[z] - truth[z]).abs();
+                middles += (4.5 - truth[z]).abs();
+            }
+        }
+        (limits / middles, answers / middles)
+    }
+
+    /// 30 sideways unknowns with a condition number near 1e14, and 6 unknowns with 4 readings: the smallest noise leaves
+    /// something unknown, and more noise never leaves less.
+    #[test]
+    fn no_noise_is_too_small_for_a_posterior() {
+        for (array, movement) in [("10x10_5x30", Movement::SIDEWAYS), ("2x6_3x4", Movement::Z)] {
+            let mut last = 0.0;
+            for noise in [0.0, 1e-15, 1e-12, 9.9e-9, 1.01e-8, 1e-7, 1e-5, 1e-3] {
+                let (limit, answer) = shares(array, movement, Noise::relative(noise), 6);
+                assert!(
+                    limit > 1e-3 && limit < 1.0 && limit > 0.98 * last,
+                    "{array} {noise}: {limit} {last:?}"
+                );
+                // Where 14 decades lie between the patterns, whoever does not know where to linearise stays behind.
+                let most = (1.05 * limit).max(if movement == Movement::Z { 0.0 } else { 0.6 });
+                assert!(answer < most, "{array} {noise}: {answer} {limit}");
+                last = limit;
+            }
+        }
+    }
+
+    #[test]
+    fn noise_that_says_nothing_leaves_the_middle() {
+        let additive = |additive_ohm| Noise {
+            additive_ohm,
+            ..Noise::default()
+        };
+        for noise in [1e3, 1e4, 1e100, 1e155, 1e300].map(additive) {
+            let (limit, answer) = shares("2x2_2x6", Movement::Z, noise, 300);
+            assert!(
+                (limit - 1.0).abs() < 0.02 && (answer - 1.0).abs() < 0.02,
+                "{noise:?}: {limit} {answer}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_converter_leaves_more_than_the_middle() {
+        let mut last = 0.0;
+        for converter_bits in [32, 24, 16, 12, 8, 6, 4, 2, 1].map(Some) {
+            let noise = Noise {
+                converter_bits,
+                ..Noise::default()
+            };
+            let (limit, answer) = shares("2x2_2x6", Movement::Z, noise, 100);
+            assert!(
+                limit < 1.02 && limit > 0.98 * last,
+                "{converter_bits:?}: {limit} after {last}"
+            );
+            assert!(answer < 1.02, "{converter_bits:?}: {answer}");
+            last = limit;
+        }
+    }
+
+    #[test]
+    fn without_noise_it_is_newtons_answer() {
+        let model = SensorModel::new("2x4_2x12".parse().unwrap());
+        let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(1).rng(Stream::Test)).unwrap();
+        let mut rng = Seed(1).rng(Stream::Expectation);
+        let mut posterior = Posterior::new(&model, &Scene::default(), &[0, 1], &mut rng).unwrap();
+        let mut coordinates = vec![0.0; 12];
+        let report = posterior.solve(1, set.sample_readings(3), &mut coordinates).unwrap();
+        assert_eq!((report.spread_mm, report.converged), (None, true));
+        for (ours, truth) in coordinates.iter().zip(set.sample_targets(3)) {
+            assert!((ours - truth).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,70 @@
+use std::fmt;
+
+use super::Baselines;
+
+/// Why the Bayesian reference of an error table is no bound for decoders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ReferenceNote {
+    /// There is none: a posterior did not converge.
+    Missing,
+    /// Its error is above that of the training mean.
+    AboveMean,
+}
+
+impl ReferenceNote {
+    /// The note on the reference of these baselines; `None` if it is a bound.
+    pub fn of(baselines: &Baselines) -> Option<Self> {
+        match baselines.reference {
+            None => Some(Self::Missing),
+            Some(reference) if reference.z_mm > baselines.mean.z_mm => Some(Self::AboveMean),
+            Some(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for ReferenceNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Missing => {
+                "There is no Bayesian reference: the posterior of some row did not converge. Lower the compression, or let \
+                 nodes move along z only."
+            }
+            Self::AboveMean => {
+                "The Bayesian reference is no bound here, for it is above the training mean: the readings tell next to \
+                 nothing, or the mean and covariance of this loading say little of its shape. Lower the noise, or draw more \
+                 test samples."
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Dataset, Seed, Stream},
+        evaluation::Errors,
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    #[test]
+    fn a_reference_above_the_mean_is_no_bound() {
+        let model = SensorModel::new("2x2_2x6".parse().unwrap());
+        let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(0).rng(Stream::Test)).unwrap();
+        let off = |by_mm: f64| Errors::measure(&set, &set.targets().mapv(|value| value + by_mm), 1.0);
+        let baselines = |reference| Baselines {
+            mean: off(0.25),
+            linear: off(0.1),
+            reference,
+        };
+        assert_eq!(ReferenceNote::of(&baselines(Some(off(0.2)))), None);
+        assert_eq!(
+            ReferenceNote::of(&baselines(Some(off(0.26)))),
+            Some(ReferenceNote::AboveMean)
+        );
+        let missing = ReferenceNote::of(&baselines(None)).unwrap().to_string();
+        assert!(missing.contains("converge") && missing.contains("Lower"), "{missing}");
+    }
+}

@@ -1,0 +1,460 @@
+//! The posterior's medians against sequential Monte Carlo on Eq. (2) itself: no linearisation, no expectation
+//! propagation.
+//!
+//! `cargo test --release --test posterior_sampling -- --ignored --nocapture` prints the table over ten decades of noise.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![expect(clippy::print_stdout, reason = "the table is shown with --nocapture")]
+
+use decoupler::{
+    dataset::{Seed, Stream},
+    decoupling::Posterior,
+    glam::DVec3,
+    rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng},
+    scene::{Movement, Noise, Rows, Scene},
+    sensor::SensorModel,
+};
+
+const ROW: usize = 0;
+
+/// What a noise does to the readings of one row, written down anew.
+#[derive(Clone, Copy, Debug)]
+struct Truth {
+    relative: f64,
+    additive_ohm: f64,
+    drift: f64,
+    bits: Option<u8>,
+}
+
+impl Truth {
+    const NONE: Self = Self {
+        relative: 0.0,
+        additive_ohm: 0.0,
+        drift: 0.0,
+        bits: None,
+    };
+
+    fn scene(self, movement: Movement) -> Scene {
+        Scene {
+            rows: Rows::Known,
+            movement,
+            noise: Noise {
+                relative: self.relative,
+                additive_ohm: self.additive_ohm,
+                drift: self.drift,
+                converter_bits: self.bits,
+                ..Noise::default()
+            },
+            ..Scene::default()
+        }
+    }
+}
+
+struct Sampler {
+    model: SensorModel,
+    truth: Truth,
+    lowest: Vec<f64>,
+    highest: Vec<f64>,
+    step_ohm: f64,
+    steps: f64,
+}
+
+struct Particle {
+    /// Unknowns, and the gain's η.
+    x: Vec<f64>,
+    /// Logarithm of the likelihood, or minus half the squared distance from the converter's steps.
+    log_likelihood: f64,
+}
+
+fn normal(rng: &mut impl Rng) -> f64 {
+    let length = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    length * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+}
+
+fn normal_cdf(x: f64) -> f64 {
+    0.5 * libm::erfc(-x / 2.0_f64.sqrt())
+}
+
+impl Sampler {
+    fn new(array: &str, truth: Truth, movement: Movement) -> Self {
+        let model = SensorModel::new(array.parse().unwrap());
+        let stroke_mm = truth.scene(movement).stroke_mm(&model.geometry);
+        let shift_mm = movement.largest_shift_mm();
+        let nodes = model.scale.nodes_per_row();
+        let (lowest, highest) = match movement {
+            Movement::Z => (vec![0.0; nodes], vec![stroke_mm; nodes]),
+            Movement::Xyz { .. } => (
+                [-shift_mm, -shift_mm, 0.0].repeat(nodes),
+                [shift_mm, shift_mm, stroke_mm].repeat(nodes),
+            ),
+        };
+        let rest = vec![DVec3::ZERO; nodes];
+        let largest = (0..model.scale.rows()).flat_map(|row| model.row_resistances(row, &rest).unwrap());
+        let steps = 2.0_f64.powi(i32::from(truth.bits.unwrap_or(1)));
+        Self {
+            step_ohm: 2.0 * largest.fold(0.0, f64::max) / steps,
+            steps,
+            model,
+            truth,
+            lowest,
+            highest,
+        }
+    }
+
+    fn resistances(&self, x: &[f64]) -> Vec<f64> {
+        let axes = self.lowest.len() / self.model.scale.nodes_per_row();
+        let displacements: Vec<DVec3> = x[..self.lowest.len()]
+            .chunks_exact(axes)
+            .map(|node| match *node {
+                [z] => DVec3::new(0.0, 0.0, z),
+                _ => DVec3::from_slice(node),
+            })
+            .collect();
+        self.model.row_resistances(ROW, &displacements).unwrap()
+    }
+
+    fn draw(&self, rng: &mut impl Rng) -> Vec<f64> {
+        let ranges = self.lowest.iter().zip(&self.highest);
+        let mut x: Vec<f64> = ranges
+            .map(|(low, high)| low + (high - low) * rng.random::<f64>())
+            .collect();
+        if self.truth.drift > 0.0 {
+            x.push(
+                std::iter::repeat_with(|| normal(rng))
+                    .find(|eta| 1.0 + self.truth.drift * eta > 0.0)
+                    .unwrap(),
+            );
+        }
+        x
+    }
+
+    fn gain(&self, x: &[f64]) -> f64 {
+        x.get(self.lowest.len()).map_or(1.0, |eta| 1.0 + self.truth.drift * eta)
+    }
+
+    fn read(&self, x: &[f64], rng: &mut impl Rng) -> Vec<f64> {
+        let Truth {
+            relative,
+            additive_ohm,
+            bits,
+            ..
+        } = self.truth;
+        let gain = self.gain(x);
+        let ohms = self.resistances(x).into_iter().map(|ohm| {
+            let mut draws =
+                std::iter::repeat_with(|| gain * ohm * (1.0 + relative * normal(rng)) + additive_ohm * normal(rng));
+            let noisy = draws.find(|ohm| *ohm > 0.0).unwrap();
+            match bits {
+                Some(_) => (noisy / self.step_ohm).round().clamp(1.0, self.steps) * self.step_ohm,
+                None => noisy,
+            }
+        });
+        ohms.collect()
+    }
+
+    fn log_prior(&self, x: &[f64]) -> f64 {
+        let inside = x
+            .iter()
+            .zip(&self.lowest)
+            .zip(&self.highest)
+            .all(|((x, low), high)| (low..=high).contains(&x));
+        if !inside || self.gain(x) <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        x.get(self.lowest.len()).map_or(0.0, |eta| -0.5 * eta * eta)
+    }
+
+    fn log_likelihood(&self, x: &[f64], readings: &[f64]) -> f64 {
+        let gain = self.gain(x);
+        let pairs = self.resistances(x).into_iter().zip(readings);
+        let terms = pairs.map(|(ohm, &reading)| {
+            let ohm = gain * ohm;
+            let deviation = (self.truth.relative * ohm).hypot(self.truth.additive_ohm);
+            if self.truth.bits.is_some() {
+                let step = (reading / self.step_ohm).round();
+                let low = if step > 1.0 { (step - 0.5) * self.step_ohm } else { 0.0 };
+                let high = if step < self.steps {
+                    (step + 0.5) * self.step_ohm
+                } else {
+                    f64::INFINITY
+                };
+                if deviation == 0.0 {
+                    let outside = (low - ohm).max(ohm - high).max(0.0) / self.step_ohm;
+                    return -0.5 * outside * outside;
+                }
+                let (low, high) = ((low - ohm) / deviation, (high - ohm) / deviation);
+                // On the side of the tail, where differences keep their digits.
+                let mass = if low > 0.0 {
+                    normal_cdf(-low) - normal_cdf(-high)
+                } else {
+                    normal_cdf(high) - normal_cdf(low)
+                };
+                return mass.max(1e-300).ln() - normal_cdf(ohm / deviation).ln();
+            }
+            let deviation = deviation.max(1e-15 * ohm);
+            let apart = (reading - ohm) / deviation;
+            -0.5 * apart * apart - deviation.ln() - normal_cdf(ohm / deviation).ln()
+        });
+        terms.sum()
+    }
+
+    /// Medians of the posterior by sequential Monte Carlo from the prior, whose moves are differences of particles
+    /// (differential evolution; ter Braak 2006).
+    fn medians(&self, readings: &[f64], count: usize, rng: &mut impl Rng) -> Vec<f64> {
+        let is_hard = self.truth.bits.is_some() && self.truth.relative == 0.0 && self.truth.additive_ohm == 0.0;
+        let particle = |x: Vec<f64>| Particle {
+            log_likelihood: self.log_likelihood(&x, readings),
+            x,
+        };
+        let mut particles: Vec<Particle> = (0..count).map(|_| particle(self.draw(rng))).collect();
+        let mut power = 0.0;
+        loop {
+            let top = particles
+                .iter()
+                .map(|p| p.log_likelihood)
+                .fold(f64::NEG_INFINITY, f64::max);
+            let weights = |next: f64| -> Vec<f64> {
+                let weight = |p: &Particle| {
+                    if is_hard && next.is_infinite() {
+                        f64::from(u8::from(p.log_likelihood == 0.0))
+                    } else {
+                        ((next - power) * (p.log_likelihood - top)).exp()
+                    }
+                };
+                particles.iter().map(weight).collect()
+            };
+            let effective = |next: f64| {
+                let weights = weights(next);
+                let (sum, squares) = weights.iter().fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+                sum * sum / squares / count as f64
+            };
+            let last = if is_hard { f64::INFINITY } else { 1.0 };
+            let next = if effective(last) >= 0.5 {
+                last
+            } else {
+                let (mut low, mut high) = (power, if is_hard { power.max(1e-6) * 1e6 } else { 1.0 });
+                for _ in 0..80 {
+                    // Powers spread over many decades.
+                    let middle = if low > 0.0 { (low * high).sqrt() } else { high * 1e-3 };
+                    if effective(middle) > 0.5 {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                low.max(power * (1.0 + 1e-9))
+            };
+            let weights = weights(next);
+            let total: f64 = weights.iter().sum();
+            let mut chosen = Vec::with_capacity(count);
+            let (mut sum, mut mark) = (0.0, rng.random::<f64>() * total / count as f64);
+            for (weight, p) in weights.iter().zip(&particles) {
+                sum += weight;
+                while mark < sum && chosen.len() < count {
+                    chosen.push(Particle {
+                        x: p.x.clone(),
+                        log_likelihood: p.log_likelihood,
+                    });
+                    mark += total / count as f64;
+                }
+            }
+            while chosen.len() < count {
+                let p = &particles[count - 1];
+                chosen.push(Particle {
+                    x: p.x.clone(),
+                    log_likelihood: p.log_likelihood,
+                });
+            }
+            particles = chosen;
+            power = next;
+            let moves = if power == last { 60 } else { 12 };
+            for turn in 0..moves {
+                for i in 0..count {
+                    let (a, b) = (rng.random_range(0..count), rng.random_range(0..count));
+                    let unknowns = particles[i].x.len() as f64;
+                    let gamma = if turn % 6 == 5 {
+                        1.0
+                    } else {
+                        2.38 / (2.0 * unknowns).sqrt() * (0.4 + rng.random::<f64>())
+                    };
+                    let x: Vec<f64> = (0..particles[i].x.len())
+                        .map(|k| particles[i].x[k] + gamma * (particles[a].x[k] - particles[b].x[k]))
+                        .collect();
+                    let prior = self.log_prior(&x) - self.log_prior(&particles[i].x);
+                    if prior == f64::NEG_INFINITY {
+                        continue;
+                    }
+                    let next = particle(x);
+                    let gained = if is_hard && power.is_infinite() {
+                        if next.log_likelihood == 0.0 {
+                            0.0
+                        } else {
+                            f64::NEG_INFINITY
+                        }
+                    } else {
+                        power * (next.log_likelihood - particles[i].log_likelihood)
+                    };
+                    if rng.random::<f64>().ln() < prior + gained {
+                        particles[i] = next;
+                    }
+                }
+            }
+            if power == last {
+                break;
+            }
+        }
+        let median = |k: usize| {
+            let mut values: Vec<f64> = particles.iter().map(|p| p.x[k]).collect();
+            values.sort_by(f64::total_cmp);
+            0.5 * (values[(count - 1) / 2] + values[count / 2])
+        };
+        (0..self.lowest.len()).map(median).collect()
+    }
+}
+
+/// Mean errors of z in mm of the reference, of the decoder, of sampling, and of the middle of the stroke.
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    reference: f64,
+    decoder: f64,
+    sampled: f64,
+    middle: f64,
+}
+
+fn errors(array: &str, truth: Truth, movement: Movement, samples: usize, particles: usize) -> Errors {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let sampler = Sampler::new(array, truth, movement);
+    let model = &sampler.model;
+    let scene = truth.scene(movement);
+    let mut posterior = Posterior::new(model, &scene, &[ROW], &mut Seed(1).rng(Stream::Expectation)).unwrap();
+    let nodes = model.scale.nodes_per_row();
+    let per_node = sampler.lowest.len() / nodes;
+    let mut sums = [0.0; 4];
+    for _ in 0..samples {
+        let x = sampler.draw(&mut rng);
+        let readings = sampler.read(&x, &mut rng);
+        let mut coordinates = Vec::new();
+        for node in 0..nodes {
+            let displacement = match x[node * per_node..(node + 1) * per_node] {
+                [z] => DVec3::new(0.0, 0.0, z),
+                ref xyz => DVec3::from_slice(xyz),
+            };
+            coordinates.extend(model.displaced_mm(ROW, node, displacement).to_array());
+        }
+        let (mut limit, mut decoded) = (coordinates.clone(), coordinates.clone());
+        assert!(posterior.limit(ROW, &readings, &coordinates, &mut limit), "{truth:?}");
+        posterior.solve(ROW, &readings, &mut decoded).unwrap();
+        let sampled = sampler.medians(&readings, particles, &mut rng);
+        for node in 0..nodes {
+            let z = node * per_node + per_node - 1;
+            let at = model.displaced_mm(ROW, node, DVec3::ZERO).z;
+            sums[0] += (limit[3 * node + 2] - coordinates[3 * node + 2]).abs();
+            sums[1] += (decoded[3 * node + 2] - coordinates[3 * node + 2]).abs();
+            sums[2] += (at - sampled[z] - coordinates[3 * node + 2]).abs();
+            sums[3] += (x[z] - 0.5 * (sampler.lowest[z] + sampler.highest[z])).abs();
+        }
+    }
+    let [reference, decoder, sampled, middle] = sums.map(|sum: f64| sum / (samples * nodes) as f64);
+    Errors {
+        reference,
+        decoder,
+        sampled,
+        middle,
+    }
+}
+
+#[test]
+fn medians_err_as_much_as_those_of_sampling() {
+    let cases = [
+        Truth {
+            relative: 1e-2,
+            ..Truth::NONE
+        },
+        Truth {
+            relative: 1e-7,
+            ..Truth::NONE
+        },
+        Truth {
+            additive_ohm: 0.1,
+            ..Truth::NONE
+        },
+        Truth {
+            additive_ohm: 300.0,
+            ..Truth::NONE
+        },
+        Truth {
+            relative: 1e-3,
+            drift: 0.3,
+            ..Truth::NONE
+        },
+        Truth {
+            bits: Some(6),
+            ..Truth::NONE
+        },
+        Truth {
+            bits: Some(12),
+            relative: 1e-4,
+            ..Truth::NONE
+        },
+    ];
+    for truth in cases {
+        let found = errors("1x2_2x6", truth, Movement::Z, 10, 250);
+        for ours in [found.reference, found.decoder] {
+            assert!((0.9..1.1).contains(&(ours / found.sampled)), "{truth:?}: {found:?}");
+        }
+        assert!(found.reference < 1.1 * found.middle, "{truth:?}: {found:?}");
+    }
+}
+
+#[test]
+#[ignore = "prints the whole table in minutes"]
+fn table() {
+    let arrays = std::env::var("ARRAYS").unwrap_or("1x2_2x6 2x6_3x18 2x6_3x4".to_owned());
+    let (samples, particles) = (25, 500);
+    for array in arrays.split(' ') {
+        let decades = (0..=10).rev().map(|decade| 10.0_f64.powi(-decade));
+        let mut cases: Vec<(String, Truth)> = Vec::new();
+        for level in decades {
+            cases.push((
+                format!("relative {level:.0e}"),
+                Truth {
+                    relative: level,
+                    ..Truth::NONE
+                },
+            ));
+            let additive_ohm = 1e4 * level;
+            cases.push((
+                format!("additive {additive_ohm:.0e} ohm"),
+                Truth {
+                    additive_ohm,
+                    ..Truth::NONE
+                },
+            ));
+            let drift = Truth {
+                drift: level,
+                relative: 1e-3,
+                ..Truth::NONE
+            };
+            cases.push((format!("drift {level:.0e} with 1e-3"), drift));
+        }
+        for bits in [1, 2, 3, 4, 6, 8, 12, 16, 24, 32] {
+            let truth = Truth {
+                bits: Some(bits),
+                ..Truth::NONE
+            };
+            cases.push((format!("{bits} bits"), truth));
+            let relative = 1e-3;
+            cases.push((format!("{bits} bits with 1e-3"), Truth { relative, ..truth }));
+        }
+        for (name, truth) in cases {
+            let e = errors(array, truth, Movement::Z, samples, particles);
+            println!(
+                "{array:10} {name:22} sampled {:9.3e} reference {:6.3} decoder {:6.3} middle {:6.3}",
+                e.sampled,
+                e.reference / e.sampled,
+                e.decoder / e.sampled,
+                e.middle / e.sampled
+            );
+        }
+    }
+}
