@@ -2,7 +2,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::ArrayScale;
+use super::{ArrayScale, short};
 
 /// Positions of the electrode nodes of the undeformed sensor, in millimetres.
 ///
@@ -35,7 +35,7 @@ pub struct Geometry {
 #[non_exhaustive]
 pub enum GeometryError {
     /// A length is NaN or infinite.
-    #[error("{what} is {value:?}: give a finite length in millimetres")]
+    #[error("{what} is {}: give a finite length in millimetres", short(*.value))]
     NotFinite {
         /// Name of the length.
         what: &'static str,
@@ -43,7 +43,7 @@ pub enum GeometryError {
         value: f64,
     },
     /// A length that must be positive is not.
-    #[error("{what} is {value:?} mm: it must be above 0")]
+    #[error("{what} is {} mm: it must be above 0", short(*.value))]
     NotPositive {
         /// Name of the length.
         what: &'static str,
