@@ -173,6 +173,6 @@ fn what_is_wrong_is_named() {
         let message = failure(arguments, folder.path(), 2);
         assert!(message.contains(expected), "{arguments}: {message}");
     }
-    let message = failure("train --rows 11", folder.path(), 1);
+    let message = failure("train --rows 11", folder.path(), 2);
     assert!(message.contains("rows 1 to 10"), "{message}");
 }

@@ -204,10 +204,19 @@ fn extremes_end_with_a_reason_and_without_nan() {
         for method in Method::all() {
             for first in [None, Some(1e-300), Some(1e12), Some(1e300)] {
                 let mut method = method;
-                let setting = &mut method.settings()[0];
-                *setting.value = first.map_or(setting.default, |value| {
+                let mut settings = method.settings();
+                let setting = &mut settings[0];
+                let value = first.map_or(setting.default, |value| {
                     f64::clamp(value, *setting.range.start(), *setting.range.end())
                 });
+                *setting.value = value;
+                // A first value above its own limit is refused.
+                for limit in settings
+                    .iter_mut()
+                    .filter(|limit| ["largest mu", "largest step length"].contains(&limit.name))
+                {
+                    *limit.value = limit.value.max(value);
+                }
                 let weights = training_problems::start()
                     .weights()
                     .iter()

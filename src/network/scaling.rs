@@ -22,7 +22,7 @@ pub enum ScalingError {
     #[error("there are no samples to scale")]
     Empty,
     /// A value is NaN or infinite.
-    #[error("sample {}, channel {}: {value:?} is not a finite number", .sample + 1, .channel + 1)]
+    #[error("sample {}, channel {}: {value:?} is not a finite number; give finite readings and targets", .sample + 1, .channel + 1)]
     NotFinite {
         /// Index of the sample, from 0.
         sample: usize,

@@ -18,7 +18,7 @@ pub use rows::{RowModel, Rows};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::sensor::{ArrayScale, Geometry, SensorModel};
+use crate::sensor::{ArrayScale, Geometry, SensorModel, short};
 
 /// Rows read, movement, loading and noise of the readings. The default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,7 +44,7 @@ pub struct Scene {
 #[non_exhaustive]
 pub enum SceneError {
     /// The largest compression is out of range.
-    #[error("the largest compression is {:?} %: it must be above 0 and below 100 % of the height", 100.0 * .0)]
+    #[error("the largest compression is {} %: it must be above 0 and below 100 % of the height", short(100.0 * .0))]
     Compression(f64),
     /// The array has no such row-wire.
     #[error("row {row} does not exist: the array has rows 1 to {rows}; give one of them")]
@@ -68,23 +68,24 @@ pub enum SceneError {
     AxesText(String),
     /// The shift sideways is impossible.
     #[error(
-        "the largest shift sideways is {0:?} mm: it must be above 0 and finite; for none, let nodes move along z only"
+        "the largest shift sideways is {} mm: it must be above 0 and finite; for none, let nodes move along z only",
+        short(*.0)
     )]
     Shift(f64),
     /// The correlation length is impossible.
-    #[error("the correlation length is {0:?} mm: it must be above 0 and finite")]
+    #[error("the correlation length is {} mm: it must be above 0 and finite", short(*.0))]
     CorrelationLength(f64),
     /// The indenter's spread is impossible.
-    #[error("the decay length of the surface around the indenter is {0:?} mm: it must be above 0 and finite")]
+    #[error("the decay length of the surface around the indenter is {} mm: it must be above 0 and finite", short(*.0))]
     Spread(f64),
     /// The indenter's radius is impossible.
-    #[error("the indenter's radius is from {:?} to {:?} mm: give two lengths above 0 in order", .0.smallest, .0.largest)]
+    #[error("the indenter's radius is from {} to {} mm: give two lengths above 0 in order", short(.0.smallest), short(.0.largest))]
     Radius(Span),
     /// The indenter's tilt is impossible.
-    #[error("the indenter's largest tilt is {0:?} degrees: give from 0 to 45")]
+    #[error("the indenter's largest tilt is {} degrees: give from 0 to 45", short(*.0))]
     Tilt(f64),
     /// Noise out of range.
-    #[error("the {what} is {value:?}: give from 0 to {largest:?}")]
+    #[error("the {what} is {}: give from 0 to {}", short(*.value), short(*.largest))]
     Noise {
         /// Kind of noise.
         what: &'static str,

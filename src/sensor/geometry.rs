@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::{
     ArrayScale,
     fixed_point::{FixedPoint, Parts},
+    short,
 };
 
 /// Positions of the electrode nodes of the undeformed sensor, in millimetres.
@@ -38,7 +39,7 @@ pub struct Geometry {
 #[non_exhaustive]
 pub enum GeometryError {
     /// A length is NaN or infinite.
-    #[error("{what} is {value:?}: give a finite length in millimetres")]
+    #[error("{what} is {}: give a finite length in millimetres", short(*.value))]
     NotFinite {
         /// Name of the length.
         what: &'static str,
@@ -46,7 +47,7 @@ pub enum GeometryError {
         value: f64,
     },
     /// A length that must be positive is not.
-    #[error("{what} is {value:?} mm: it must be above 0")]
+    #[error("{what} is {} mm: it must be above 0", short(*.value))]
     NotPositive {
         /// Name of the length.
         what: &'static str,

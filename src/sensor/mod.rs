@@ -9,6 +9,7 @@ mod geometry;
 mod identifiability;
 mod reciprocal_distances;
 mod resistance;
+mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
@@ -17,3 +18,4 @@ pub use geometry::{Geometry, GeometryError};
 pub use glam::DVec3;
 pub use identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair};
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, SensorError, SensorModel};
+pub(crate) use short_number::short;

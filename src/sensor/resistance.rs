@@ -3,7 +3,7 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances};
+use super::{ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances, short};
 
 /// Default resistance per millimetre of rubber. The paper gives none: g scales every
 /// resistance alike, so no relative error depends on it.
@@ -29,14 +29,15 @@ pub enum SensorError {
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// g is not a positive number.
-    #[error("the resistance per millimetre is {0:?}: it must be above 0 and finite")]
+    #[error("the resistance per millimetre is {}: it must be above 0 and finite", short(*.0))]
     Resistivity(f64),
     /// A resistance came out as zero, infinite or NaN.
     #[error(
-        "row {}, column {}: the resistance is {resistance_ohm:?} ohm; a node touches a column-wire, or a length is \
+        "row {}, column {}: the resistance is {} ohm; a node touches a column-wire, or a length is \
          out of range; press less deep, or give lengths nearer to a millimetre",
         row + 1,
-        column + 1
+        column + 1,
+        short(*.resistance_ohm)
     )]
     Resistance {
         /// Row-wire, from 0.

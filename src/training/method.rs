@@ -18,11 +18,13 @@ use super::{
     momentum::Momentum,
     resilient::{Resilient, ResilientState},
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
-    setting::short,
     step_momentum::StepMomentum,
     variable_projection::{ProjectionState, VariableProjection},
 };
-use crate::network::{Mlp, Shape};
+use crate::{
+    network::{Mlp, Shape},
+    sensor::short,
+};
 
 /// Defines [`Method`], [`MethodState`] and [`Running`] from the list of methods: the name of each method's [`Algorithm`],
 /// its settings and, unless it has none, its state.

@@ -4,6 +4,8 @@ use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
+use crate::sensor::short;
+
 /// One number that can be set, as the window and the terminal offer it.
 #[derive(Debug)]
 pub struct Setting<'a> {
@@ -64,15 +66,6 @@ impl Setting<'_> {
             value: *self.value,
             range: self.range.clone(),
         })
-    }
-}
-
-/// A number of any size in a few characters: `0.5`, `1e300`.
-pub(super) fn short(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
-        format!("{value}")
-    } else {
-        format!("{value:e}")
     }
 }
 

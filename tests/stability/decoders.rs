@@ -29,10 +29,16 @@ fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
-/// The remark beside a decoder's figures, if the program makes one.
-fn remark(report: &DecoderReport, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
+/// Error, as a factor on the mean's, up to which a warning of the scene explains it: readings that tell little leave a
+/// decoder near the mean, not far beyond it.
+const EXPLAINED: f64 = 3.0;
+
+/// The remark beside a decoder's figures, if the program makes one that explains an error of so many times the mean's.
+fn remark(report: &DecoderReport, times: f64, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
     let of_network = flaw.filter(|_| matches!(report.kind, DecoderKind::Network | DecoderKind::Polish));
-    let of_scene = outlook.and_then(|outlook| outlook.warnings.first());
+    let of_scene = outlook
+        .and_then(|outlook| outlook.warnings.first())
+        .filter(|_| times <= EXPLAINED);
     of_network
         .map(ToString::to_string)
         .or_else(|| of_scene.map(ToString::to_string))
@@ -86,7 +92,8 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
         Err(error) => return refused(&error),
     };
     let found = z_mm(test, &answers);
-    let remark = remark(&report, seen.flaw.as_ref(), seen.outlook.as_ref());
+    let times = found / seen.mean_mm;
+    let remark = remark(&report, times, seen.flaw.as_ref(), seen.outlook.as_ref());
     let or_flagged = |what: String| remark.as_ref().map_or_else(|| wrong(what), flagged);
     if !found.is_finite() || !report.errors.z_mm.is_finite() {
         return or_flagged(format!("{kind}: the error is {found}, without a reason"));
@@ -98,7 +105,6 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
         ));
     }
     if found > by_chance(answers.len() / 3) * seen.mean_mm {
-        let times = found / seen.mean_mm;
         return or_flagged(format!(
             "{kind}: {times:.1e} times the error of the mean, and nothing says so"
         ));

@@ -161,8 +161,16 @@ pub(crate) fn jobs() -> Vec<Job> {
     }
     for origin_mm in [-1e12, -1e9, -1e3, 1e3, 1e6, 1e9, 1e12, 1e15] {
         let mut moved = model;
+        // Pitches that round at large coordinates, though their differences need not.
+        moved.geometry.row_pitch_mm = 0.7;
+        moved.geometry.node_pitch_mm = 1.3;
+        moved.geometry.column_pitch_mm = 1.1;
+        moved.geometry.column_node_pitch_mm = 4.9;
         moved.geometry.column_y0_mm = origin_mm;
         push("origins", format!("y from {origin_mm:e} mm"), moved, 0.2);
+        moved.geometry.row_x0_mm += origin_mm;
+        moved.geometry.column_node_x0_mm += origin_mm;
+        push("origins", format!("x and y from {origin_mm:e} mm"), moved, 0.2);
     }
     jobs
 }

@@ -65,7 +65,7 @@ pub enum TradeFormError {
         example: &'static str,
     },
     /// A number out of its range.
-    #[error("{what}: {value:?} is not possible, give from {least:?} to {most:?}")]
+    #[error("{what}: {value} is not possible, give from {least} to {most}")]
     Range {
         /// The list.
         what: &'static str,
