@@ -8,9 +8,10 @@ use crate::{
 /// Tells on standard error how much memory and time a large run will take.
 ///
 /// # Errors
-/// If the array lacks a row of the scene.
+/// If the array lacks a row of the scene, or the machine the memory.
 pub(super) fn announce(settings: &SimulatedSettings) -> Result<(), RunError> {
     let workload = Workload::of(settings)?;
+    workload.check_memory()?;
     if workload.is_large() {
         // Nobody is left to tell if this fails.
         let _ = writeln!(stderr(), "{}", describe_workload(&workload));

@@ -137,5 +137,6 @@ fn comes_of_arguments(error: &RunError) -> bool {
             | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
             | RunError::Training(_)
             | RunError::TooManyTrainings { .. }
+            | RunError::Memory { .. }
     )
 }

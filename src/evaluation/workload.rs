@@ -100,7 +100,7 @@ impl Workload {
     ///
     /// # Errors
     /// [`RunError::Memory`] if it has not.
-    pub(super) fn check_memory(&self) -> Result<(), RunError> {
+    pub fn check_memory(&self) -> Result<(), RunError> {
         if !self.is_large() {
             return Ok(());
         }

@@ -3,9 +3,9 @@
 use decoupler::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunFlaw, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunFlaw, SimulatedSettings},
     ndarray::Array2,
-    scene::{Loading, Rows},
+    scene::{Loading, Noise, Rows},
 };
 
 use crate::{
@@ -35,6 +35,9 @@ const EXPLAINED: f64 = 3.0;
 
 /// The remark beside a decoder's figures, if the program makes one that explains an error of so many times the mean's.
 fn remark(report: &DecoderReport, times: f64, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
+    if let Some(remark) = report.remarks.first() {
+        return Some(remark.to_string());
+    }
     let of_network = flaw.filter(|_| matches!(report.kind, DecoderKind::Network | DecoderKind::Polish));
     let of_scene = outlook
         .and_then(|outlook| outlook.warnings.first())
@@ -130,8 +133,8 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
         .as_ref()
         .is_some_and(|outlook| outlook.worst_row.condition().is_infinite());
     let Some(reference) = told else {
-        let warning = seen.outlook.as_ref().and_then(|outlook| outlook.warnings.first());
-        return warning.map_or_else(|| wrong("there is no reference, and no reason"), flagged);
+        let note = seen.run.baselines().and_then(ReferenceNote::of);
+        return note.map_or_else(|| wrong("there is no reference, and no reason"), |note| flagged(&note));
     };
     let (limit_mm, nodes) = (
         reference.z_mm,
@@ -141,17 +144,24 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
         return wrong(format!("the reference is {limit_mm}"));
     }
     if limit_mm > by_chance(nodes) * seen.mean_mm {
-        return wrong(format!(
-            "the reference is {:.2e} times the error of the mean",
-            limit_mm / seen.mean_mm
-        ));
+        let note = seen.run.baselines().and_then(ReferenceNote::of);
+        let times = limit_mm / seen.mean_mm;
+        return note.map_or_else(
+            || wrong(format!("the reference is {times:.2e} times the error of the mean")),
+            |note| flagged(&note),
+        );
     }
     let stroke_mm = settings.source.stroke_mm();
     let is_independent = scene.loading == Loading::RandomNodes;
     if unseen && is_independent && limit_mm < 1e-9 * stroke_mm {
         return wrong("the reference claims certainty about deformations that no reading tells");
     }
-    if !scene.noise.in_test().is_none() && limit_mm == 0.0 {
+    // A gain common to all readings is found from them.
+    let beside_drift = Noise {
+        drift: 0.0,
+        ..scene.noise
+    };
+    if !beside_drift.in_test().is_none() && limit_mm == 0.0 {
         return wrong("the reference claims certainty in spite of noise");
     }
     // Every node's depth is uniform, so all that is known before is a quarter of the stroke on average.

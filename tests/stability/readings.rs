@@ -14,8 +14,16 @@ use crate::{
 const ROOM: &str = "reading";
 
 /// The remark that the program makes on a row of readings, if it makes one.
-fn remark(_run: &Run, _readings_ohm: &[f64]) -> Option<String> {
-    None
+fn remark(run: &Run, readings_ohm: &[f64]) -> Option<String> {
+    let network = run.network();
+    let inputs = network.at(0).inputs();
+    let range = inputs.range()?;
+    let channel = range.outside(inputs.quantity(), readings_ohm).next()?;
+    let (low, high) = range.limits(inputs.quantity(), channel);
+    Some(format!(
+        "reading {} is outside those of the training, {low:e} to {high:e}: train with such readings, or check the sensor",
+        channel + 1
+    ))
 }
 
 fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(String, Verdict)> {

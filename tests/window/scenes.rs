@@ -279,9 +279,7 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
     driver.train();
     assert!(driver.says("This scene is badly conditioned (condition number"));
     let table = driver.table();
-    let reference = table.iter().filter(|cell| cell.starts_with("reference"));
-    assert_eq!(reference.count(), 0, "nothing is known of a limit here: {table:?}");
-    for row in ["training mean", "linear map", "network"] {
+    for row in ["training mean", "linear map", "network", "reference"] {
         let y = table.iter().find(|cell| cell.starts_with(&format!("{row}, Y %")));
         assert!(
             y.is_some_and(|cell| !cell.ends_with('–') && !cell.ends_with(" 0")),

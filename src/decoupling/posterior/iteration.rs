@@ -1,4 +1,5 @@
 use super::{Posterior, PosteriorReport, linearised::Point};
+use crate::decoupling::LARGEST_ERROR;
 
 /// Change of a mean, relative to the range, below which the linearisation has converged.
 const TOLERANCE: f64 = 1e-5;
@@ -22,7 +23,7 @@ impl Posterior {
     ) -> PosteriorReport {
         self.problem.read(row, readings_ohm);
         let mut answer = first.clone();
-        let mut variance = f64::NAN;
+        let (mut variance, mut determined) = (f64::NAN, false);
         let (mut converged, mut steps) = (false, 0);
         let mut at = Point {
             drift: 0.0,
@@ -59,6 +60,9 @@ impl Posterior {
                 .zip(&self.widths)
                 .map(|(marginal, width)| marginal.variance * width * width);
             variance = squares.sum::<f64>() / self.widths.len() as f64;
+            determined = marginals
+                .iter()
+                .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
             converged = found.marginals.converged && blur == 1.0;
             answer = found.medians_mm;
             if largest < TOLERANCE && blur == 1.0 {
@@ -79,6 +83,7 @@ impl Posterior {
             steps,
             residual,
             spread_mm: Some(variance.sqrt()),
+            determined,
             converged,
         }
     }

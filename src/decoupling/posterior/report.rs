@@ -1,4 +1,4 @@
-use crate::decoupling::newton_report::NewtonReport;
+use crate::decoupling::newton_report::{NewtonReport, Solution};
 
 /// Result of a row's posterior.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +9,9 @@ pub struct PosteriorReport {
     pub residual: f64,
     /// rms over unknowns of the posterior standard deviation; `None` if the equations decided alone, without noise.
     pub spread_mm: Option<f64>,
+    /// True if no unknown has a posterior standard deviation above
+    /// [`LARGEST_ERROR`](crate::decoupling::LARGEST_ERROR) of its range.
+    pub determined: bool,
     /// True if the answer can be relied on: expectation propagation converged in a last linearisation that was as good as
     /// the readings, or the equations decided alone.
     pub converged: bool,
@@ -21,7 +24,8 @@ impl PosteriorReport {
             steps: report.steps,
             residual: report.residual,
             spread_mm: None,
-            converged: true,
+            determined: report.solution != Solution::Undetermined,
+            converged: report.solution != Solution::None,
         }
     }
 }
