@@ -131,7 +131,7 @@ impl DecoderKind {
             Self::Newton => Entry {
                 word: "newton",
                 name: "Newton",
-                meaning: "Newton's method on Eq. (2) from the undeformed state; where the scene has noise, with noise and prior",
+                meaning: "Newton's method on Eq. (2) from mid-stroke, and other starts where that fails; with noise and prior where the scene has noise",
                 colour: ColourKey::Red,
                 needs: Needs::Sensor,
             },

@@ -41,7 +41,7 @@ impl fmt::Display for SolvedRows {
             write!(
                 f,
                 "{unsolved} of {rows} rows were not solved: their answers do not explain the readings. Check that readings \
-                 and geometry belong together, and give the noise of the readings"
+                 and geometry belong together, give the noise of the readings, or let nodes move along z only"
             )?;
         }
         if unsolved > 0 && undetermined > 0 {
