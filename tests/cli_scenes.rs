@@ -152,6 +152,26 @@ fn a_trade_is_told_in_text_and_json() {
     );
 }
 
+/// With noise that the training lacks, some points are worse than the mean, and each of them says so.
+#[test]
+fn a_point_of_a_trade_worse_than_the_mean_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --test-samples 20 --noise 3e-1 --noise-in test \
+                     --preset paper --decoder mean,ridge,network";
+    let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
+    let points = report["levels"][0]["points"].as_array().unwrap();
+    let error = |point: &Value| point["z_mm"].as_f64().unwrap();
+    let of_mean = error(points.iter().find(|point| point["decoder"] == "mean").unwrap());
+    let worse = Vec::from_iter(points.iter().filter(|point| error(point) > 1.001 * of_mean));
+    assert!(!worse.is_empty(), "{points:?}");
+    for point in worse {
+        let remark = point["remarks"][0].as_str().unwrap();
+        assert!(remark.contains("times that of always answering the mean"), "{remark}");
+    }
+    let text = success(arguments, folder.path());
+    assert!(text.contains("Warning: paper, "), "{text}");
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -95,6 +95,8 @@ struct PointReport {
     reference_z_percent: Option<f64>,
     reference_z_mm: Option<f64>,
     to_reference: Option<f64>,
+    /// What is wrong with the figures, why, and what would help.
+    remarks: Vec<String>,
     on_decoding_front: bool,
     on_training_front: bool,
     command: String,
@@ -144,6 +146,7 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
         reference_z_percent: point.reference.and_then(|errors| errors.z_percent),
         reference_z_mm: point.reference.map(|errors| errors.z_mm),
         to_reference: point.to_reference(),
+        remarks: point.report.remarks.iter().map(ToString::to_string).collect(),
         on_decoding_front,
         on_training_front,
         command: command(point),
@@ -215,6 +218,19 @@ fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::
             if on_decoding_front { "*" } else { " " },
             if on_training_front { "+" } else { "" },
         )?;
+    }
+    for point in &level.points {
+        let hidden = point
+            .hidden()
+            .map_or(String::new(), |hidden| format!(", {hidden} hidden"));
+        for remark in &point.report.remarks {
+            writeln!(
+                out,
+                "Warning: {}, {}{hidden}: {remark}",
+                point.preset,
+                point.report.name()
+            )?;
+        }
     }
     let [fastest, most_accurate] = choices(level, limits);
     let told = [

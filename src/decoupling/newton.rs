@@ -144,7 +144,7 @@ impl Newton {
         self.clamp(&mut unknowns);
         let first = unknowns.clone();
         let before = self.problem.evaluate(&first);
-        let (mut stop, mut steps) = self.wander(&mut unknowns);
+        let (mut stop, mut steps) = self.take_plain_steps(&mut unknowns);
         let tolerance = self.rules.tolerance;
         let outside = |(value, range): (&f64, &Range)| {
             let apart = (value - range.clamp(*value)).abs();
@@ -217,7 +217,7 @@ impl Newton {
     }
 
     /// Takes plain steps, each shortened to stay where the model is valid.
-    fn wander(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
+    fn take_plain_steps(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
         let most = self.rules.steps.min(MOST_PLAIN_STEPS);
         for steps in 1..=most {
             let Self {

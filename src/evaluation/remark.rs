@@ -124,11 +124,10 @@ struct Pair {
 }
 
 impl Pair {
-    /// True if the error exceeds that of the mean by more than rounding. An error that is no number is
+    /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is no number is
     /// [`Remark::Missing`]'s matter.
     fn is_worse(&self) -> bool {
-        let rounding = 1e-9 * (1.0 + self.of_mean);
-        self.error > self.of_mean + rounding
+        self.error > 1.0005 * self.of_mean + 1e-9
     }
 }
 

@@ -52,5 +52,6 @@ pub fn point_facts(point: &TradePoint) -> Vec<String> {
     }
     facts.push(format!("{} a frame", frame_time(point.report.cost.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));
+    facts.extend(point.report.remarks.iter().map(ToString::to_string));
     facts
 }
