@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use ndarray::{Array2, ArrayView1};
+use ndarray::Array2;
 
 use crate::{dataset::Dataset, sensor::ArrayScale};
 
@@ -56,6 +56,7 @@ pub fn write_samples(
 ///
 /// # Errors
 /// Any error of `writer`.
+#[cfg(feature = "cli")]
 pub(crate) fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     write_names("", nodes, writer)?;
     writeln!(writer, ",readings_outside,coordinates_outside")
@@ -66,8 +67,9 @@ pub(crate) fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::
 ///
 /// # Errors
 /// Any error of `writer`.
+#[cfg(feature = "cli")]
 pub(crate) fn write_decoded(
-    coordinates_mm: ArrayView1<'_, f64>,
+    coordinates_mm: ndarray::ArrayView1<'_, f64>,
     readings_outside: Option<usize>,
     coordinates_outside: usize,
     writer: &mut dyn Write,

@@ -6,6 +6,7 @@
 //! fresh bytes from a seed of the system, which seldom pass the first brace and never come back, and it does not change
 //! the files of its corpus.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod arguments;

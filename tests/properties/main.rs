@@ -1,6 +1,7 @@
 //! Properties that hold for arbitrary inputs, drawn from a fixed seed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[cfg(feature = "files")]
 mod files;
 mod folds;
 mod scaling;

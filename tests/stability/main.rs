@@ -5,6 +5,7 @@
 //! `cargo test --release --test stability -- --nocapture` prints the whole table; without `--release` every eleventh job
 //! is run.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(clippy::print_stdout, reason = "the table is what the test is for")]
 
