@@ -1,12 +1,13 @@
 //! Files written and read back.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use decoupler::{
     dataset::{Dataset, ResistanceReader},
     evaluation::{Run, SimulatedSettings},
-    export::{NetworkFile, write_samples, write_samples_header},
+    export::{CheckpointFile, KeptRun, NetworkFile, Workspace, write_samples, write_samples_header},
     network::{DecouplingNetwork, Mlp},
+    training::Method,
 };
 use ndarray::Array2;
 use proptest::prelude::*;
@@ -31,14 +32,19 @@ fn sets() -> impl Strategy<Value = Dataset> {
     })
 }
 
-/// The file of a network of the smallest array with 2 hidden nodes.
-static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
+/// Settings of the smallest array with 2 hidden nodes.
+fn small(epochs: usize) -> SimulatedSettings {
     let mut settings = SimulatedSettings::default();
     settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
     (settings.source.samples, settings.source.test_samples) = (20, 10);
     settings.hidden = 2;
-    settings.training.stopping.epochs = 1;
-    let mut run = Run::prepare(settings).unwrap();
+    settings.training.stopping.epochs = epochs;
+    settings
+}
+
+/// The file of a network of the smallest array with 2 hidden nodes.
+static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
+    let mut run = Run::prepare(small(1)).unwrap();
     while run.step().is_none() {}
     NetworkFile::from_run(&run).unwrap()
 });
@@ -82,5 +88,52 @@ proptest! {
         prop_assert_eq!(&read, &file);
         let bits = |weights: &[f64]| weights.iter().map(|weight| weight.to_bits()).collect::<Vec<_>>();
         prop_assert_eq!(bits(read.network.at(0).mlp().weights()), bits(&weights));
+    }
+
+    /// A training written at any epoch and read again goes on as one that was never interrupted.
+    #[test]
+    fn trainings_are_read_with_the_bits_that_were_written(
+        method in prop::sample::select(Method::all().to_vec()),
+        before in 0..6_usize,
+        after in 0..6_usize,
+        starts in 1..3_usize,
+    ) {
+        let mut settings = small(12);
+        (settings.training.method, settings.starts) = (method, starts);
+        let mut whole = Run::prepare(settings).unwrap();
+        for _ in 0..before {
+            whole.step();
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.checkpoint");
+        CheckpointFile::from_run(&whole).unwrap().save(&path).unwrap();
+        let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        prop_assert_eq!(read.states(), whole.states());
+        for _ in 0..after {
+            whole.step();
+            read.step();
+        }
+        let bits = |run: &Run| run.network().at(0).mlp().weights().iter().map(|weight| weight.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(&read), bits(&whole));
+    }
+
+    #[test]
+    fn run_lists_are_read_as_they_were_written(
+        named in prop::collection::btree_map(any::<u32>().prop_map(u64::from), "\\PC{0,20}", 0..4),
+        pinned in prop::sample::select(vec![None, Some(0_usize), Some(1)]),
+    ) {
+        let kept = |(&id, name): (&u64, &String)| KeptRun {
+            id,
+            name: name.clone(),
+            file: Arc::new(TRAINED.clone()),
+        };
+        let runs = Vec::from_iter(named.iter().map(kept));
+        let pinned = pinned.and_then(|index| runs.get(index)).map(|run| run.id);
+        let workspace = Workspace { runs, pinned: [pinned, None] };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("workspace.json");
+        workspace.save(&path).unwrap();
+        let found = Workspace::load(&path).unwrap();
+        prop_assert_eq!((found.workspace, found.warning), (workspace, None));
     }
 }
