@@ -1,5 +1,6 @@
 //! The paper's experiments and sweeps.
 
+#![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::{
@@ -13,6 +14,7 @@ use decoupler::{
         CrossValidation, Run, SimulatedSettings, Simulation,
         experiments::{Axis, Bottleneck, Experiment, ExperimentResults, Trial, run_experiments},
     },
+    export::describe_worse_than_mean,
     sensor::SensorModel,
     training::Method,
 };
@@ -222,6 +224,29 @@ fn a_cell_that_cannot_be_trained_says_why_and_the_others_go_on() {
     let message = results.cells[1].failures[0].to_string();
     assert!(message.contains("seed 0") && message.contains("too wide"), "{message}");
     assert_eq!(results.cells[1].summary().z_percent.median, None);
+}
+
+#[test]
+fn cells_with_networks_worse_than_the_mean_are_named() {
+    let mut experiment = small(Axis::Epochs(vec![1, 60]));
+    let by_name = |method: &Method| method.short_name() == "gd";
+    experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
+    let results = &run(&[experiment], 2)[0];
+    let worse = |cell: usize| {
+        let trials = results.cells[cell].trials.iter();
+        trials
+            .filter(|trial| trial.errors.z_mm > trial.baselines.mean.z_mm)
+            .count()
+    };
+    assert!(worse(0) > 0, "one epoch of gradient descent teaches little");
+    let told = describe_worse_than_mean(results);
+    assert_eq!(told.len(), (0..2).filter(|&cell| worse(cell) > 0).count());
+    let beginning = format!(
+        "At {}, {} of 3 are worse",
+        results.cell_labels(&results.cells[0]).join(", "),
+        worse(0)
+    );
+    assert!(told[0].starts_with(&beginning), "{told:?}");
 }
 
 /// Against the property itself: whatever is trained, and however well, the training error stays above.

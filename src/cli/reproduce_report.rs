@@ -11,7 +11,7 @@ use crate::{
         CrossValidation,
         experiments::{CellSummary, ExperimentResults, PaperTable, Verdict},
     },
-    export::{ExperimentTable, describe_conditions, describe_failures, format_duration},
+    export::{ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean, format_duration},
     sensor::Geometry,
 };
 
@@ -40,6 +40,8 @@ struct TableReport<'a> {
     is_complete: bool,
     cells: Vec<CellSummary>,
     failures: Vec<String>,
+    /// Cells with networks that are worse than the training mean.
+    remarks: Vec<String>,
     verdicts: &'a [Verdict],
 }
 
@@ -60,6 +62,7 @@ pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<()
             is_complete: results.is_complete(),
             cells: results.summaries(),
             failures: describe_failures(results),
+            remarks: describe_worse_than_mean(results),
             verdicts,
         }
     };
@@ -105,6 +108,9 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         }
         for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;
+        }
+        for remark in describe_worse_than_mean(results) {
+            writeln!(out, "Warning: {remark}")?;
         }
         writeln!(out)?;
     }

@@ -3,7 +3,7 @@
 use crate::{
     evaluation::{
         CrossValidation,
-        experiments::{Axis, Experiment, ExperimentResults},
+        experiments::{Axis, CellResults, Experiment, ExperimentResults, Trial},
     },
     network::HiddenSuggestions,
 };
@@ -60,4 +60,20 @@ pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
             .map(move |failure| format!("Failed at {label}, {failure}"))
     };
     results.cells.iter().flat_map(of_cell).collect()
+}
+
+/// Describes in a sentence every cell some of whose networks are worse than always answering the training mean.
+pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
+    let of_cell = |cell: &CellResults| {
+        let is_worse = |trial: &&Trial| trial.errors.z_mm > trial.baselines.mean.z_mm;
+        let (worse, trials) = (cell.trials.iter().filter(is_worse).count(), cell.trials.len());
+        (worse > 0).then(|| {
+            format!(
+                "At {}, {worse} of {trials} are worse than always answering the training mean: run more epochs, or take \
+                 more samples, other hidden nodes or another method",
+                results.cell_labels(cell).join(", ")
+            )
+        })
+    };
+    results.cells.iter().filter_map(of_cell).collect()
 }

@@ -34,7 +34,7 @@ pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
 #[cfg(feature = "figures")]
 pub use experiment_figure::draw_experiment;
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
-pub use experiment_words::{describe_conditions, describe_failures};
+pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
 #[cfg(feature = "cli")]

@@ -15,6 +15,9 @@ pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
     for failure in crate::export::describe_failures(&outcome.results) {
         ui.label(RichText::new(failure).size(type_size().note).color(palette.bad));
     }
+    for remark in crate::export::describe_worse_than_mean(&outcome.results) {
+        ui.label(RichText::new(remark).size(type_size().note).color(palette.warning));
+    }
 }
 
 fn verdict_ui(ui: &mut Ui, verdict: &Verdict) {
