@@ -49,8 +49,10 @@ fn arguments_that_contradict_each_other_end_with_status_2_and_the_numbers_given(
     for (arguments, words) in cases {
         let (text, status) = refused(arguments);
         assert_eq!(status, 2, "{arguments}: {text}");
-        assert!(text.contains(words), "{arguments}: {text}");
-        assert!(text.lines().count() == 1 && text.len() < 300, "{arguments}: {text}");
+        // A large run tells first what it takes, if the machine has the memory for it.
+        let message = text.lines().last().unwrap();
+        assert!(message.contains(words), "{arguments}: {text}");
+        assert!(text.lines().count() <= 2 && message.len() < 300, "{arguments}: {text}");
     }
 }
 
