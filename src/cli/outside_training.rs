@@ -13,7 +13,7 @@ pub(super) struct OutsideTraining {
     told: Vec<String>,
 }
 
-/// What of one line is outside.
+/// Readings and coordinates of one line that are outside.
 pub(super) struct LineOutside {
     /// Number of readings; `None` if their range in training is not known.
     pub(super) readings: Option<usize>,

@@ -95,7 +95,7 @@ struct PointReport {
     reference_z_percent: Option<f64>,
     reference_z_mm: Option<f64>,
     to_reference: Option<f64>,
-    /// What is wrong with the figures, why, and what would help.
+    /// Remarks on the figures, with cause and cure.
     remarks: Vec<String>,
     on_decoding_front: bool,
     on_training_front: bool,

@@ -48,7 +48,7 @@ struct Report<'a> {
     weights: usize,
     condition: Option<f64>,
     warnings: Vec<String>,
-    /// What is wrong with the errors above, why, and what would help.
+    /// Remarks on the errors above, with cause and cure.
     remarks: Vec<String>,
     decoders: BTreeMap<String, Decoder>,
     reference: Option<Reference>,
@@ -62,7 +62,7 @@ struct Decoder {
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
     fit_seconds: f64,
-    /// What is wrong with the errors, why, and what would help.
+    /// Remarks on the errors, with cause and cure.
     remarks: Vec<String>,
     /// None for decoders that do not solve the equations of the sensor.
     solved: Option<Solved>,
@@ -178,7 +178,7 @@ fn decoder(report: &DecoderReport) -> Decoder {
     }
 }
 
-/// What is wrong with the rows of the error table, but for the network if its `flaw` is told.
+/// Remarks on the rows of the error table, but for the network if its `flaw` is told.
 fn remarks(file: &NetworkFile, flaw: Option<&RunFlaw>) -> Vec<String> {
     let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
     let told = remarks.iter().filter(|(row, _)| flaw.is_none() || *row != "network");

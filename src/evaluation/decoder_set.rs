@@ -34,7 +34,7 @@ pub struct DecoderReport {
     pub solved: SolvedRows,
     /// Computing time.
     pub cost: DecoderCost,
-    /// What is wrong with the errors, why, and what would help.
+    /// Remarks on the errors, with cause and cure.
     pub remarks: Vec<Remark>,
 }
 
@@ -49,7 +49,7 @@ pub struct TargetReport {
     pub targets: Vec<TargetErrors>,
     /// Computing time.
     pub cost: DecoderCost,
-    /// What is wrong with the errors, why, and what would help.
+    /// Remarks on the errors, with cause and cure.
     pub remarks: Vec<Remark>,
 }
 

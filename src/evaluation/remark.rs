@@ -6,7 +6,7 @@ use crate::{
     scene::{Noise, NoisySets},
 };
 
-/// What is wrong with a decoder's result, why, and what would help. Printed beside its errors.
+/// Remark on a decoder's result that is not to be trusted, with cause and cure. Printed beside its errors.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Remark {

@@ -146,7 +146,7 @@ impl Likelihood {
     }
 }
 
-/// What [`Likelihood::misfits`] will be at `x`, according to a `model` linearised with `blur`.
+/// Misfits expected at `x`, as [`Likelihood::misfits`] gives them, by a `model` linearised with `blur`.
 pub(super) fn expected_misfits(model: &LinearModel, readings: usize, x: &[Marginal], blur: f64) -> Vec<f64> {
     let product = |form: &[f64]| -> f64 { form.iter().zip(x).map(|(value, x)| value * x.mean).sum() };
     if model.rounded.is_empty() {

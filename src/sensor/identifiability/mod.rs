@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::sensor::ArrayScale;
 
-    fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
+    pub(super) fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
         Identifiability::of_row(model, row, &rest, axes).unwrap()
     }

@@ -97,15 +97,8 @@ impl Identifiability {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
-    use crate::sensor::{ArrayScale, Axes, SensorModel};
-
-    fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
-        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
-        Identifiability::of_row(model, row, &rest, axes).unwrap()
-    }
+    use crate::sensor::{ArrayScale, Axes, SensorModel, identifiability::tests::at_rest};
 
     #[test]
     fn too_few_readings_leave_a_pattern_unseen() {
