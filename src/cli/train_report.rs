@@ -260,7 +260,14 @@ fn write_text(
     for remark in remarks(file, flaw) {
         writeln!(out, "Warning: {remark}")?;
     }
-    write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
+    let reference = file.baselines.reference.as_ref();
+    if reference.is_some_and(Errors::is_rounding) {
+        writeln!(
+            out,
+            "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is given."
+        )?;
+    }
+    write_decoders(decoders, reference, out)?;
     writeln!(
         out,
         "\nErrors in % are means of the coordinate, as in the paper; of the stroke where said so."
@@ -334,9 +341,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     writeln!(out)?;
     for report in decoders {
         write!(out, "{:<14}", report.name())?;
-        let ratio = reference
-            .filter(|limit| limit.z_mm > 0.0)
-            .map(|limit| report.errors.z_mm / limit.z_mm);
+        let ratio = reference.and_then(|reference| report.errors.times(reference));
         let values = [
             report.errors.z_percent,
             Some(report.errors.z_mm),

@@ -166,11 +166,10 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
         note_ui(ui, &fault);
     } else if result.errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
-        let limit = baselines.reference.filter(|limit| limit.z_mm > 0.0);
-        let text = match limit {
+        let to_limit = baselines.reference.and_then(|limit| result.errors.times(&limit));
+        let text = match to_limit.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
-            Some(limit) => {
-                let ratio = format_number(result.errors.z_mm / limit.z_mm);
+            Some(ratio) => {
                 format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
             }
         };
