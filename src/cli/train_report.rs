@@ -148,7 +148,7 @@ pub(super) fn print_json(
             .into_iter()
             .chain(flaw.map(ToString::to_string))
             .collect(),
-        remarks: remarks(file, flaw),
+        remarks: remarks(file),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -178,11 +178,11 @@ fn decoder(report: &DecoderReport) -> Decoder {
     }
 }
 
-/// Remarks on the rows of the error table, but for the network if its `flaw` is told.
-fn remarks(file: &NetworkFile, flaw: Option<&RunFlaw>) -> Vec<String> {
-    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
-    let told = remarks.iter().filter(|(row, _)| flaw.is_none() || *row != "network");
-    let told = told.map(|(row, remark)| format!("{row}: {remark}"));
+/// Remarks on the rows of the error table.
+fn remarks(file: &NetworkFile) -> Vec<String> {
+    let reason = file.training.stop_reason;
+    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines, reason);
+    let told = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
     told.chain(ReferenceNote::of(&file.baselines).map(|note| note.to_string()))
         .collect()
 }
@@ -257,7 +257,7 @@ fn write_text(
     }
     let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
-    for remark in remarks(file, flaw) {
+    for remark in remarks(file) {
         writeln!(out, "Warning: {remark}")?;
     }
     let reference = file.baselines.reference.as_ref();

@@ -17,7 +17,7 @@ use crate::{
         state::{Phase, RunResult, RunView, State},
         theme::{Theme, ghost_button, note_ui, scrolled_ui, section_heading_ui, space, type_size},
     },
-    evaluation::{ErrorRow, ReferenceNote, error_rows},
+    evaluation::{ErrorRow, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
 };
 
@@ -152,8 +152,12 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
     let baselines = &run.baselines;
+    let remarks = error_remarks(&run.settings, &result.errors, baselines, Some(reason));
+    let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(flaw) = &result.flaw {
         Some(sentence(&flaw.to_string()))
+    } else if let Some((row, remark)) = of_network {
+        Some(sentence(&format!("{row}: {remark}")))
     } else if result.errors.z_mm > baselines.linear.z_mm {
         let remedy = reason.remedy(&run.settings.training.method);
         Some(sentence(&format!(
