@@ -8,7 +8,7 @@ use serde_json::value::to_raw_value;
 use thiserror::Error;
 
 use super::{
-    WriteError, atomic_write,
+    AtomicFile, WriteError,
     heading::{Heading, NoHeading},
     limited::read_limited,
     network_file::PROGRAM,
@@ -151,12 +151,7 @@ impl CheckpointFile {
         // What was written must be readable: a weight that is not finite would be `null`.
         serde_json::from_str::<RunDocument>(run.get()).map_err(unsound)?;
         let sealed = Sealed::new(FORMAT, VERSION, &self.program, &run);
-        atomic_write(path, |writer| {
-            sealed.check_size()?;
-            serde_json::to_writer(&mut *writer, &sealed)?;
-            writeln!(writer)
-        })?;
-        Ok(())
+        Ok(sealed.save(path, AtomicFile::commit)?)
     }
 
     /// Reads the file at `path`.

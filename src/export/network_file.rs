@@ -3,15 +3,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::value::{RawValue, to_raw_value};
+use serde_json::value::to_raw_value;
 use thiserror::Error;
 
 use super::{
-    WriteError, atomic_write,
+    AtomicFile, WriteError,
     heading::{Heading, NoHeading},
     limited::read_limited,
     network_document::{RunDocument, UnsealedDocument},
-    sealed::Sealed,
+    sealed::{Commit, Sealed},
     soundness::flaw,
 };
 use crate::{
@@ -169,22 +169,20 @@ impl NetworkFile {
     /// # Errors
     /// The network has values that could not be read back, or the path cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), NetworkFileError> {
-        if let Some(flaw) = flaw(self) {
-            let path = path.to_owned();
-            return Err(NetworkFileError::Unsound { path, flaw });
-        }
+        self.save_by(path, AtomicFile::commit)
+    }
+
+    /// As [`Self::save`]; `commit` puts the file in its place.
+    pub(super) fn save_by(&self, path: &Path, commit: Commit) -> Result<(), NetworkFileError> {
         let unsound = |flaw: String| NetworkFileError::Unsound {
             path: path.to_owned(),
             flaw,
         };
-        let run = self.run_text().map_err(unsound)?;
-        let sealed = self.sealed(&run);
-        atomic_write(path, |writer| {
-            sealed.check_size()?;
-            serde_json::to_writer(&mut *writer, &sealed)?;
-            writeln!(writer)
-        })?;
-        Ok(())
+        if let Some(flaw) = flaw(self) {
+            return Err(unsound(flaw));
+        }
+        let run = to_raw_value(&RunDocument::of(self)).map_err(|error| unsound(error.to_string()))?;
+        Ok(Sealed::new(FORMAT, VERSION, &self.program, &run).save(path, commit)?)
     }
 
     /// Reads the file at `path`.
@@ -202,25 +200,6 @@ impl NetworkFile {
     /// Describes the first defect that would keep the file from being read back.
     pub fn flaw(&self) -> Option<String> {
         flaw(self)
-    }
-
-    /// The contents of the file, for a file that holds several; or what is wrong with it.
-    pub(super) fn to_raw(&self) -> Result<Box<RawValue>, String> {
-        match flaw(self) {
-            Some(flaw) => Err(flaw),
-            None => {
-                let run = self.run_text()?;
-                to_raw_value(&self.sealed(&run)).map_err(|error| error.to_string())
-            }
-        }
-    }
-
-    fn run_text(&self) -> Result<Box<RawValue>, String> {
-        to_raw_value(&RunDocument::of(self)).map_err(|error| error.to_string())
-    }
-
-    fn sealed<'a>(&self, run: &'a RawValue) -> Sealed<'a> {
-        Sealed::new(FORMAT, VERSION, &self.program, run)
     }
 
     /// Tells what cannot be noticed because an old version of the program wrote the file.

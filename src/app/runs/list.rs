@@ -19,7 +19,7 @@ pub fn run_list_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let runs = &state.runs;
     scrolled_ui(ui, "runs", |ui| {
         section_heading_ui(ui, "Runs");
-        if runs.workspace.runs.is_empty() {
+        if runs.list.runs.is_empty() {
             dim_ui(
                 ui,
                 "Every finished training is kept here, with its network. Train one to begin.",
@@ -27,10 +27,10 @@ pub fn run_list_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         } else {
             dim_ui(ui, "Choose one as A and one as B to see them side by side.");
         }
-        for run in runs.workspace.runs.iter().rev() {
+        for (position, run) in runs.list.runs.iter().enumerate().rev() {
             ui.add_space(space(2));
             ui.separator();
-            ui.push_id(run.id, |ui| run_ui(ui, state, run, &mut actions));
+            ui.push_id(run.id, |ui| run_ui(ui, state, position, run, &mut actions));
         }
         ui.add_space(space(2));
         match &runs.path {
@@ -46,9 +46,9 @@ fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsAction>) {
+fn run_ui(ui: &mut Ui, state: &State, position: usize, run: &KeptRun, actions: &mut Vec<RunsAction>) {
     let name = &run.name;
-    name_ui(ui, run, actions);
+    name_ui(ui, position, run, actions);
     dim_ui(ui, &conditions(&run.file.settings));
     let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
     let text = format!(
@@ -71,14 +71,14 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
     }
     ui.horizontal(|ui| {
         for (place, letter) in PLACES.into_iter().enumerate() {
-            let is_pinned = state.runs.workspace.pinned[place] == Some(run.id);
+            let is_pinned = state.runs.list.pinned[place] == Some(run.id);
             let button = Button::selectable(is_pinned, letter)
                 .frame_when_inactive(true)
                 .min_size([space(6), space(6)].into());
             let response = ui.add(button);
             response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_pinned, format!("{name} as {letter}")));
             let hint = if is_pinned {
-                "Show no longer"
+                "Hide"
             } else {
                 "Show on this side"
             };
@@ -101,12 +101,12 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
 }
 
 /// The name, to be changed in place; what is typed counts when the field is left.
-fn name_ui(ui: &mut Ui, run: &KeptRun, actions: &mut Vec<RunsAction>) {
+fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, actions: &mut Vec<RunsAction>) {
     let id = Id::unique(("run name", run.id));
     let mut name: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| run.name.clone());
     let edit = ui.add(TextEdit::singleline(&mut name).id(id).desired_width(f32::INFINITY));
     ui.ctx()
-        .accesskit_node_builder(edit.id, |node| node.set_label(format!("Name of run {}", run.id)));
+        .accesskit_node_builder(edit.id, |node| node.set_label(format!("Name of run {}", position + 1)));
     if edit.changed() {
         ui.data_mut(|data| data.insert_temp(id, name.clone()));
     }

@@ -1,6 +1,6 @@
 //! The run list and the Compare view: every finished training is kept, two are shown side by side, and all of it
-//! survives a restart. A thread of its own reads and writes the workspace file and the pictures, and prepares what is
-//! to be drawn.
+//! survives a restart. A thread of its own keeps the folder of the runs, writes the pictures, and prepares what is to be
+//! drawn.
 
 mod action;
 mod curves;

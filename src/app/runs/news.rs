@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{RunsAction, RunsRequest, RunsWorker, worker::RunsEvent};
 use crate::{
     app::state::{Notice, State},
-    export::{FoundWorkspace, NetworkFile, Workspace},
+    export::NetworkFile,
 };
 
 /// Takes what the thread has to tell.
@@ -25,20 +25,16 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
             }
         };
         match event {
-            RunsEvent::Loaded(path, Ok(FoundWorkspace { workspace, warning })) => {
-                state.runs.path = Some(path);
-                // What was damaged is replaced at once, lest it be found again.
-                take_up(state, workspace, warning.is_some(), worker);
-                if let Some(warning) = warning {
-                    state.notice = Some(Notice::Failed(warning));
+            RunsEvent::Listed(list, path, problems) => {
+                (state.runs.list, state.runs.path) = (list, path);
+                show_pinned(state, worker);
+                if !problems.is_empty() {
+                    state.notice = Some(Notice::Failed(problems.join(". ")));
                 }
-            }
-            RunsEvent::Loaded(_, Err(reason)) | RunsEvent::NotSaved(reason) => {
-                state.notice = Some(Notice::Failed(reason));
             }
             RunsEvent::Prepared(place, Ok(mut compared)) => {
                 // The user may have moved on meanwhile.
-                if state.runs.workspace.pinned[place] == Some(compared.id) {
+                if state.runs.list.pinned[place] == Some(compared.id) {
                     if state.runs.snapshot > 0 {
                         compared.show(state.runs.snapshot);
                     }
@@ -46,9 +42,7 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
                 }
             }
             RunsEvent::Prepared(place, Err(reason)) => {
-                if state.runs.compared[place].is_none() {
-                    state.runs.workspace.pinned[place] = None;
-                }
+                apply(RunsAction::Pin(place, None), state, worker);
                 state.notice = Some(Notice::Failed(reason));
             }
             RunsEvent::Written(Ok(path)) => {
@@ -60,81 +54,59 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
     }
 }
 
-/// Puts the runs of the file before those that were finished while it was read.
-fn take_up(state: &mut State, mut workspace: Workspace, is_repaired: bool, worker: &RunsWorker) {
-    let runs = &mut state.runs;
-    std::mem::swap(&mut runs.workspace, &mut workspace);
-    let newer = workspace.runs;
-    let has_newer = !newer.is_empty();
-    for run in newer {
-        let run = runs.new_run(run.file);
-        runs.workspace.runs.push(run);
-    }
-    if has_newer || is_repaired {
-        worker.ask(RunsRequest::Save(runs.workspace.clone()));
-    }
-    for place in 0..2 {
-        prepare(state, place, worker);
-    }
-}
-
 /// Keeps a finished training in the list.
-pub fn keep(state: &mut State, file: NetworkFile, worker: &RunsWorker) {
-    let run = state.runs.new_run(Arc::new(file));
-    state.runs.workspace.runs.push(run);
-    worker.ask(RunsRequest::Save(state.runs.workspace.clone()));
+pub fn keep(file: NetworkFile, worker: &RunsWorker) {
+    worker.ask(RunsRequest::Keep(Arc::new(file)));
 }
 
-/// Does what the user meant.
+/// Does what the user meant: at once in what is shown, and in the folder as soon as the thread can.
 pub fn apply(action: RunsAction, state: &mut State, worker: &RunsWorker) {
     let runs = &mut state.runs;
     match action {
         RunsAction::Rename(id, name) => {
-            let name = name.trim().to_owned();
-            match runs.workspace.runs.iter_mut().find(|run| run.id == id) {
-                Some(run) if !name.is_empty() => run.name = name,
-                _ => return,
+            let name = name.trim();
+            if let Some(run) = runs.list.runs.iter_mut().find(|run| run.id == id)
+                && !name.is_empty()
+            {
+                name.clone_into(&mut run.name);
+                worker.ask(RunsRequest::Rename(id, name.to_owned()));
             }
         }
         RunsAction::Pin(place, id) => {
-            runs.workspace.pinned[place] = id;
-            prepare(state, place, worker);
+            worker.ask(RunsRequest::Pin(place, id));
+            runs.list.pinned[place] = id;
+            show_pinned(state, worker);
         }
         RunsAction::Remove(id) => {
-            runs.workspace.runs.retain(|run| run.id != id);
+            worker.ask(RunsRequest::Remove(id));
+            runs.list.runs.retain(|run| run.id != id);
             runs.removing = None;
-            for place in 0..2 {
-                if runs.workspace.pinned[place] == Some(id) {
-                    runs.workspace.pinned[place] = None;
-                    runs.compared[place] = None;
-                }
-            }
+            show_pinned(state, worker);
         }
-        RunsAction::AskToRemove(id) => {
-            runs.removing = id;
-            return;
-        }
+        RunsAction::AskToRemove(id) => runs.removing = id,
         RunsAction::ShowSnapshot(snapshot) => {
             runs.snapshot = snapshot;
             for compared in runs.compared.iter_mut().flatten() {
                 compared.show(snapshot);
             }
-            return;
         }
-        RunsAction::ShowCard(card) => {
-            runs.card = card;
-            return;
-        }
+        RunsAction::ShowCard(card) => runs.card = card,
         // The window does it, for it concerns the next training.
-        RunsAction::TakeSettings(_) => return,
+        RunsAction::TakeSettings(_) => {}
     }
-    worker.ask(RunsRequest::Save(state.runs.workspace.clone()));
 }
 
-/// Asks for what is to be drawn in one of the two places.
-fn prepare(state: &mut State, place: usize, worker: &RunsWorker) {
-    state.runs.compared[place] = None;
-    if let Some(run) = state.runs.pinned(place) {
-        worker.ask(RunsRequest::Prepare(place, run.id, Arc::clone(&run.file)));
+/// Asks for what is to be drawn in the two places, where another run is pinned than before.
+fn show_pinned(state: &mut State, worker: &RunsWorker) {
+    let runs = &mut state.runs;
+    for place in 0..2 {
+        let pinned = runs.pinned(place).map(|run| (run.id, Arc::clone(&run.file)));
+        let id = pinned.as_ref().map(|(id, _)| *id);
+        if std::mem::replace(&mut runs.asked[place], id) != id {
+            runs.compared[place] = None;
+            if let Some((id, file)) = pinned {
+                worker.ask(RunsRequest::Prepare(place, id, file));
+            }
+        }
     }
 }

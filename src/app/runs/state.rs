@@ -7,8 +7,7 @@ use crate::{
         state::{RightCard, error_frame},
         test_view::{Frame, TestView},
     },
-    evaluation::SimulatedSettings,
-    export::{KeptRun, NetworkFile, Workspace},
+    export::{KeptRun, RunList},
 };
 
 /// The names of the two places.
@@ -18,7 +17,9 @@ pub const PLACES: [&str; 2] = ["A", "B"];
 #[derive(Debug, Default)]
 pub struct RunsState {
     /// The runs, and which two are compared.
-    pub workspace: Workspace,
+    pub list: RunList,
+    /// The runs that were last asked to be prepared for the two places.
+    pub asked: [Option<u64>; 2],
     /// What is drawn of the two, once it is prepared.
     pub compared: [Option<Compared>; 2],
     /// Snapshot of both test sets.
@@ -60,32 +61,12 @@ impl Compared {
 impl RunsState {
     /// The run with this number.
     pub fn run(&self, id: u64) -> Option<&KeptRun> {
-        self.workspace.runs.iter().find(|run| run.id == id)
+        self.list.runs.iter().find(|run| run.id == id)
     }
 
     /// The run in one of the two places.
     pub fn pinned(&self, place: usize) -> Option<&KeptRun> {
-        self.run(self.workspace.pinned[place]?)
-    }
-
-    /// A run of these contents, not yet in the list.
-    pub fn new_run(&self, file: Arc<NetworkFile>) -> KeptRun {
-        let largest = self.workspace.runs.iter().map(|run| run.id).max();
-        KeptRun {
-            id: largest.unwrap_or(0) + 1,
-            name: self.new_name(&file.settings),
-            file,
-        }
-    }
-
-    /// Array, hidden nodes and method; numbered if there is such a name.
-    fn new_name(&self, settings: &SimulatedSettings) -> String {
-        let method = settings.training.method.short_name();
-        let name = format!("{} h{} {method}", settings.source.sensor.scale, settings.hidden);
-        let is_taken = |name: &str| self.workspace.runs.iter().any(|run| run.name == name);
-        let numbered = (2..).map(|number| format!("{name} ({number})"));
-        let mut names = std::iter::once(name.clone()).chain(numbered);
-        names.find(|name| !is_taken(name)).unwrap_or(name)
+        self.run(self.list.pinned[place]?)
     }
 
     /// How many snapshots the larger of the two test sets has.

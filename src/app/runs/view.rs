@@ -114,7 +114,7 @@ fn side_ui(ui: &mut Ui, state: &State, place: usize, range_mm: &RangeInclusive<f
     });
     match &runs.compared[place] {
         Some(compared) => surface_ui(ui, state, place, compared, range_mm, actions),
-        None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
+        None if runs.list.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
         None => {
             let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
             placeholder_ui(ui, &text);

@@ -1,10 +1,8 @@
-//! The thread that reads and writes files of the window's own and prepares what is compared. Requests go in, events
-//! come out, and each event wakes the window. When the window closes it waits for what is still to be written.
+//! The thread that keeps the run list and prepares what is compared. Requests go in, events come out, and each event
+//! wakes the window. When the window closes it waits for what is still to be written.
 
 use std::{
-    collections::VecDeque,
     fmt,
-    fs::{self, File},
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -21,17 +19,25 @@ use crate::{
         threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
     },
     export::{
-        FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError,
+        NetworkFile, RunFolder, RunList,
         figures::{PictureError, PictureFormat},
     },
 };
 
 /// What the window asks of the thread.
 pub enum RunsRequest {
-    /// Take up the workspace in this file.
-    Load(PathBuf),
-    /// Write the workspace. Only the newest one counts.
-    Save(Workspace),
+    /// Keep the runs in this folder.
+    Open(PathBuf),
+    /// See what other windows have changed.
+    Look,
+    /// Add a finished training.
+    Keep(Arc<NetworkFile>),
+    /// Give a run another name.
+    Rename(u64, String),
+    /// Show this run in one of the two places, or nothing.
+    Pin(usize, Option<u64>),
+    /// Remove a run for good.
+    Remove(u64),
     /// Prepare this run to be drawn in one of the two places.
     Prepare(usize, u64, Arc<NetworkFile>),
     /// Draw and write a picture.
@@ -40,10 +46,8 @@ pub enum RunsRequest {
 
 /// What the thread tells the window.
 pub enum RunsEvent {
-    /// The workspace, or why runs are not kept.
-    Loaded(PathBuf, Result<FoundWorkspace, String>),
-    /// The workspace could not be written.
-    NotSaved(String),
+    /// The run list as it is now, where it is kept, and what cannot be read or written.
+    Listed(RunList, Option<PathBuf>, Vec<String>),
     /// A run can be drawn, or why not.
     Prepared(usize, Result<Box<Compared>, String>),
     /// A picture was written, or why not.
@@ -68,14 +72,12 @@ impl RunsWorker {
         let report = Report::new(outgoing, wake);
         let work = move || {
             yield_to_window();
-            let mut labour = Labour::default();
-            while let Some(request) = labour.next(&incoming) {
-                if let Some(event) = labour.answer(request) {
-                    report.send(event);
-                }
+            let mut folder = RunFolder::default();
+            for request in incoming {
+                report.send(answer(request, &mut folder));
             }
         };
-        let thread = thread::Builder::new().name("workspace".to_owned()).spawn(work)?;
+        let thread = thread::Builder::new().name("runs".to_owned()).spawn(work)?;
         Ok(Self {
             requests: Some(requests),
             events,
@@ -116,81 +118,42 @@ impl fmt::Debug for RunsWorker {
     }
 }
 
-/// The thread's own state.
-#[derive(Default)]
-struct Labour {
-    queue: VecDeque<RunsRequest>,
-    /// Where the workspace is written, and the lock that keeps other windows from it.
-    place: Option<(PathBuf, File)>,
+fn answer(request: RunsRequest, folder: &mut RunFolder) -> RunsEvent {
+    // Changes are made to what is there now.
+    let mut problems = folder.look();
+    let failed: Option<String> = match request {
+        RunsRequest::Prepare(place, id, file) => {
+            return RunsEvent::Prepared(place, prepare(id, &file).map(Box::new));
+        }
+        RunsRequest::Write(picture, path) => {
+            let written = write(&picture, &path).map(|()| path);
+            return RunsEvent::Written(written.map_err(|error| error.to_string()));
+        }
+        RunsRequest::Open(path) => match RunFolder::open(&path) {
+            Ok((opened, found)) => {
+                *folder = opened;
+                problems.extend(found);
+                None
+            }
+            Err(error) => Some(format!("{error}; runs of this session are not kept")),
+        },
+        RunsRequest::Look => None,
+        RunsRequest::Keep(file) => failure(folder.keep(file)),
+        RunsRequest::Rename(id, name) => failure(folder.rename(id, &name)),
+        RunsRequest::Pin(place, id) => {
+            let mut pinned = folder.list().pinned;
+            pinned[place] = id;
+            failure(folder.pin(pinned))
+        }
+        RunsRequest::Remove(id) => failure(folder.remove(id)),
+    };
+    problems.extend(failed);
+    let path = folder.path().map(PathBuf::from);
+    RunsEvent::Listed(folder.list().clone(), path, problems)
 }
 
-impl Labour {
-    /// The next request; waits for one. `None` once the window is closed and everything is done.
-    fn next(&mut self, incoming: &Receiver<RunsRequest>) -> Option<RunsRequest> {
-        if self.queue.is_empty() {
-            self.enqueue(incoming.recv().ok()?);
-        }
-        while let Ok(request) = incoming.try_recv() {
-            self.enqueue(request);
-        }
-        self.queue.pop_front()
-    }
-
-    fn enqueue(&mut self, request: RunsRequest) {
-        if let RunsRequest::Save(_) = request {
-            self.queue.retain(|older| !matches!(older, RunsRequest::Save(_)));
-        }
-        self.queue.push_back(request);
-    }
-
-    fn answer(&mut self, request: RunsRequest) -> Option<RunsEvent> {
-        match request {
-            RunsRequest::Load(path) => {
-                let found = self.load(&path);
-                Some(RunsEvent::Loaded(path, found))
-            }
-            RunsRequest::Save(workspace) => {
-                let (path, _) = self.place.as_ref()?;
-                let saved = workspace.save(path);
-                saved.err().map(|error| RunsEvent::NotSaved(error.to_string()))
-            }
-            RunsRequest::Prepare(place, id, file) => {
-                let prepared = prepare(id, &file).map(Box::new);
-                Some(RunsEvent::Prepared(place, prepared))
-            }
-            RunsRequest::Write(picture, path) => {
-                let written = write(&picture, &path).map(|()| path);
-                Some(RunsEvent::Written(written.map_err(|error| error.to_string())))
-            }
-        }
-    }
-
-    fn load(&mut self, path: &Path) -> Result<FoundWorkspace, String> {
-        let lock = lock(path)?;
-        let found = Workspace::load(path).map_err(|error: WorkspaceError| error.to_string())?;
-        self.place = Some((path.to_owned(), lock));
-        Ok(found)
-    }
-}
-
-/// Keeps other windows from writing the same workspace, until the file returned is closed.
-fn lock(path: &Path) -> Result<File, String> {
-    let refused = |error: WriteError| format!("{error}; runs of this session are not kept");
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|source| refused(WriteError::io(folder, source)))?;
-    }
-    let place = path.with_extension("lock");
-    let file = File::options().create(true).append(true).open(&place);
-    let file = file.map_err(|source| refused(WriteError::io(&place, source)))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(fs::TryLockError::WouldBlock) => Err(format!(
-            "Another window keeps the run list '{}': runs of this one are not kept.",
-            path.display()
-        )),
-        // Some network folders know no locks; one window at a time is then the user's care.
-        Err(fs::TryLockError::Error(_)) => Ok(file),
-    }
+fn failure<E: fmt::Display>(written: Result<(), E>) -> Option<String> {
+    written.err().map(|error| format!("{error}; the change is not kept"))
 }
 
 fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {

@@ -104,6 +104,9 @@ impl DecouplerWindow {
             }
             Action::ShowView(view) => {
                 state.view = view;
+                if view == View::Compare {
+                    self.runs.ask(RunsRequest::Look);
+                }
                 if view == View::Identifiability {
                     identifiability::enter(state, &mut self.identifiability);
                 }

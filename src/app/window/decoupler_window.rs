@@ -55,11 +55,11 @@ impl DecouplerWindow {
         Ok(window)
     }
 
-    /// Takes up the run list in `path`, and keeps finished trainings there from now on. Without it they are gone when the
-    /// window closes.
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.ask(RunsRequest::Load(path));
+        self.runs.ask(RunsRequest::Open(path));
         self
     }
 
@@ -70,6 +70,10 @@ impl DecouplerWindow {
 
     /// Lays out the window and applies what the user did.
     pub fn show_ui(&mut self, ui: &mut Ui) {
+        // Another window may have been at work.
+        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+            self.runs.ask(RunsRequest::Look);
+        }
         let state = &self.state;
         let is_training_view = state.view == View::Train;
         let mut actions = match state.view {

@@ -139,7 +139,7 @@ impl DecouplerWindow {
             },
             // The network is another one by now.
             Event::Networks(..) => {}
-            Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
+            Event::Finished(Ok(file)) => runs::keep(*file, &self.runs),
             Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
             Event::Exported(Ok(path)) => {
                 state.typed = None;
