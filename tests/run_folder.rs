@@ -51,7 +51,12 @@ fn two(path: &Path) -> RunFolder {
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     entries
-        .map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()))
+        .map(|entry| {
+            (
+                entry.file_name().into_string().unwrap(),
+                fs::read(entry.path()).unwrap(),
+            )
+        })
         .collect()
 }
 
@@ -117,12 +122,18 @@ fn two_programs_see_what_the_other_does() {
     second.rename(b, "two").unwrap();
     second.pin([Some(b), Some(a)]).unwrap();
     agree(&mut first, &mut second);
-    assert_eq!((names(first.list()), first.list().pinned), (vec!["one", "two"], [Some(b), Some(a)]));
+    assert_eq!(
+        (names(first.list()), first.list().pinned),
+        (vec!["one", "two"], [Some(b), Some(a)])
+    );
     second.remove(b).unwrap();
     // One that still shows it renames it; it stays removed.
     first.rename(b, "gone").unwrap();
     agree(&mut first, &mut second);
-    assert_eq!((names(first.list()), first.list().pinned), (vec!["one"], [None, Some(a)]));
+    assert_eq!(
+        (names(first.list()), first.list().pinned),
+        (vec!["one"], [None, Some(a)])
+    );
     assert_eq!(contents(folder.path()).len(), 3);
 }
 
@@ -147,7 +158,9 @@ fn many_programs_that_write_at_once_lose_nothing() {
 fn a_damaged_run_is_named_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let kept = two(folder.path());
-    let [first, damaged] = &kept.list().runs[..] else { panic!() };
+    let [first, damaged] = &kept.list().runs[..] else {
+        panic!()
+    };
     let path = run_path(folder.path(), damaged);
     let whole = fs::read_to_string(&path).unwrap();
     let texts = [
@@ -164,7 +177,9 @@ fn a_damaged_run_is_named_and_left_alone() {
         let (mut found, problems) = RunFolder::open(folder.path()).unwrap();
         assert_eq!(found.list().runs[..], [first.clone()]);
         assert_eq!(found.list().pinned, [None, None], "what is not there is not pinned");
-        let [problem] = &problems[..] else { panic!("{problems:?}") };
+        let [problem] = &problems[..] else {
+            panic!("{problems:?}")
+        };
         assert!(problem.contains(&path.display().to_string()), "{problem}");
         assert!(found.look().is_empty(), "told once");
         assert_eq!(contents(folder.path()), before, "left to the letter");
@@ -190,7 +205,10 @@ fn damaged_names_and_pins_cost_no_run() {
             fs::write(&path, text).unwrap();
             let (found, problems) = RunFolder::open(folder.path()).unwrap();
             assert_eq!(found.list().runs.len(), 2, "{name}: {text}");
-            assert!(problems.len() == 1 && problems[0].contains(&name), "{text}: {problems:?}");
+            assert!(
+                problems.len() == 1 && problems[0].contains(&name),
+                "{text}: {problems:?}"
+            );
         }
         fs::write(&path, whole).unwrap();
     }
@@ -205,7 +223,12 @@ fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
     let run = kept.list().runs[0].clone();
     let last = format!("run-{}.json", u64::MAX);
     fs::copy(run_path(folder.path(), &run), folder.path().join(&last)).unwrap();
-    for name in ["run-007.json", "run-.json", "run-1.txt", "run-99999999999999999999.json"] {
+    for name in [
+        "run-007.json",
+        "run-.json",
+        "run-1.txt",
+        "run-99999999999999999999.json",
+    ] {
         fs::write(folder.path().join(name), "mine").unwrap();
     }
     fs::create_dir(folder.path().join("more")).unwrap();
@@ -247,7 +270,10 @@ fn the_list_of_earlier_versions_is_taken_over_once_and_stays_as_it_is() {
         fs::write(&old, text).unwrap();
         let (kept, problems) = RunFolder::open(&path).unwrap();
         assert_eq!(kept.list().runs.len(), runs);
-        assert!(problems.len() == 1 && problems[0].contains("workspace.json"), "{problems:?}");
+        assert!(
+            problems.len() == 1 && problems[0].contains("workspace.json"),
+            "{problems:?}"
+        );
         assert_eq!(fs::read_to_string(&old).unwrap(), text);
         fs::remove_dir_all(&path).unwrap();
     }

@@ -67,7 +67,9 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, String
         Ok(heading) if heading.format == FORMAT => {
             if let Some(version) = heading.newer_than(VERSION) {
                 let program = heading.program();
-                return Err(told(format!("it has version {version}, written by {program}: install that")));
+                return Err(told(format!(
+                    "it has version {version}, written by {program}: install that"
+                )));
             }
         }
         _ => return Err(told("it is damaged".to_owned())),

@@ -92,11 +92,16 @@ impl RunFolder {
             Ok(ids) => ids,
             Err(error) => {
                 let path = path.display();
-                return self.untold(vec![format!("cannot read the run list '{path}': {}", system_cause(&error))]);
+                return self.untold(vec![format!(
+                    "cannot read the run list '{path}': {}",
+                    system_cause(&error)
+                )]);
             }
         };
         let unwritten = &self.unwritten;
-        self.list.runs.retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
+        self.list
+            .runs
+            .retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
         for id in ids {
             if let Err(place) = self.list.runs.binary_search_by_key(&id, |run| run.id) {
                 match NetworkFile::load(&run_path(path, id)) {
@@ -115,12 +120,17 @@ impl RunFolder {
             match read(&name_path(path, run.id)) {
                 Ok(Some(name)) => run.name = name,
                 Ok(None) => {}
-                Err(flaw) => problems.push(format!("the name of a run cannot be read: {flaw}; rename '{}'", run.name)),
+                Err(flaw) => problems.push(format!(
+                    "the name of a run cannot be read: {flaw}; rename '{}'",
+                    run.name
+                )),
             }
         }
         match read::<[Option<u64>; 2]>(&pinned_path(path)) {
             Ok(pinned) => self.list.pinned = pinned.unwrap_or(self.list.pinned),
-            Err(flaw) => problems.push(format!("the runs compared cannot be read: {flaw}; choose A and B again")),
+            Err(flaw) => problems.push(format!(
+                "the runs compared cannot be read: {flaw}; choose A and B again"
+            )),
         }
         let runs = &self.list.runs;
         let is_there = |id: &u64| runs.iter().any(|run| run.id == *id);

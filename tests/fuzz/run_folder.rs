@@ -28,9 +28,17 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
             let (found, problems) = RunFolder::open(folder.path()).unwrap();
             let text = || String::from_utf8_lossy(&damaged);
             assert!(problems.len() <= 1, "{problems:?}");
-            assert!(found.list().runs.len() + problems.len() >= kept.list().runs.len(), "{}", text());
+            assert!(
+                found.list().runs.len() + problems.len() >= kept.list().runs.len(),
+                "{}",
+                text()
+            );
             for run in &found.list().runs {
-                assert!(kept.list().runs.iter().any(|original| same(original, run)), "{}", text());
+                assert!(
+                    kept.list().runs.iter().any(|original| same(original, run)),
+                    "{}",
+                    text()
+                );
             }
             assert_eq!(fs::read(path).unwrap(), damaged);
         });

@@ -132,7 +132,11 @@ fn a_damaged_run_is_named_and_the_others_are_there() {
     driver.click("Dismiss");
     driver.click_button("Compare");
     driver.settle();
-    assert!(driver.state().notice.is_none(), "told once: {:?}", driver.state().notice);
+    assert!(
+        driver.state().notice.is_none(),
+        "told once: {:?}",
+        driver.state().notice
+    );
     assert!(damaged.exists(), "nothing is lost");
 }
 
@@ -154,7 +158,9 @@ fn two_windows_see_each_others_runs_names_pins_and_removals() {
     first.train();
     wait_for_text(&mut first, &path, FIRST);
     second.click_button("Compare");
-    second.wait("the run of the first window", |driver| driver.has(&format!("{FIRST} as A")));
+    second.wait("the run of the first window", |driver| {
+        driver.has(&format!("{FIRST} as A"))
+    });
     second.enter("Name of run 1", "Renamed");
     wait_for_text(&mut second, &path, "Renamed");
     second.click("Renamed as A");
@@ -192,7 +198,9 @@ fn any_number_of_a_kept_run_leaves_room_for_the_next() {
     driver.configure_small();
     driver.train();
     driver.click_button("Compare");
-    driver.wait("both runs", |driver| driver.has("Old as A") && driver.has(&format!("{FIRST} as A")));
+    driver.wait("both runs", |driver| {
+        driver.has("Old as A") && driver.has(&format!("{FIRST} as A"))
+    });
 }
 
 #[test]
