@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::interruption;
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
-    evaluation::{RunError, experiments::ExperimentError},
+    evaluation::{Preset, RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
     scene::Rows,
     training::SettingError,
@@ -41,14 +41,20 @@ pub(super) enum Failure {
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
+    #[error("noise {noise}, preset {preset}: {cause}; only what was measured before is printed")]
+    TradeLevel {
+        noise: f64,
+        preset: Preset,
+        cause: Box<Failure>,
+    },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
-    #[error(transparent)]
-    Picture(#[from] PictureError),
+    #[error("{}", joined(.0))]
+    Files(Vec<PictureError>),
     #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
@@ -85,6 +91,11 @@ impl fmt::Display for Interruption {
             None => write!(f, "with --checkpoint FILE it could go on from here"),
         }
     }
+}
+
+fn joined(errors: &[PictureError]) -> String {
+    let told: Vec<_> = errors.iter().map(ToString::to_string).collect();
+    told.join("; ")
 }
 
 impl From<SettingError> for Failure {

@@ -1,15 +1,16 @@
 use std::{
     fs,
+    io::Write,
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
     failure::Failure,
     interruption::Graceful,
+    output::progress_bar,
     parsers::{count, seed},
     reproduce_report::{Reproduced, print_json, print_text},
 };
@@ -113,7 +114,12 @@ impl Reproduce {
             .flat_map(|results| &results.cells)
             .map(|cell| cell.expected)
             .sum();
-        let bar = self.progress_bar(trials);
+        let bar = progress_bar(
+            self.json,
+            trials,
+            "{bar:30} {pos} of {len} trials, {elapsed} gone, {msg}",
+        );
+        bar.set_message("the time left is not known yet");
         let graceful = Graceful::begin();
         let mut done = 0;
         run_experiments(
@@ -141,16 +147,17 @@ impl Reproduce {
             })
             .collect();
         // Whatever fails here, the figures are printed.
-        let written = match &self.out {
-            Some(folder) => reproduced.iter().try_for_each(|table| write_files(folder, table)),
-            None => Ok(()),
-        };
+        let folder = self.out.iter();
+        let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
+        let unwritten: Vec<PictureError> = written.filter_map(Result::err).collect();
         if self.json {
             print_json(&reproduced, begun.elapsed())?;
         } else {
             print_text(&reproduced, begun.elapsed())?;
         }
-        written?;
+        if !unwritten.is_empty() {
+            return Err(Failure::Files(unwritten));
+        }
         if done < trials {
             return Err(Failure::InterruptedTrials { done, trials });
         }
@@ -191,18 +198,6 @@ impl Reproduce {
         }
         experiment
     }
-
-    fn progress_bar(&self, trials: usize) -> ProgressBar {
-        if self.json {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::new(trials as u64);
-        let style = ProgressStyle::with_template("{bar:30} {pos} of {len} trials, {elapsed} gone, {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message("the time left is not known yet");
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
-    }
 }
 
 /// Paths of the files of a table: its cells, its trials, the table in Markdown, and the figure as SVG and PNG.
@@ -228,20 +223,23 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
 }
 
-fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), PictureError> {
+/// Writes every file of a table, whatever becomes of the others.
+fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureError>; 5] {
     let Reproduced {
         table,
         results,
         verdicts,
     } = reproduced;
     let [cells, trials, markdown, svg, png] = files(folder, *table);
-    atomic_write(&cells, |writer| write_cells(results, writer))?;
-    atomic_write(&trials, |writer| write_trials(results, writer))?;
-    atomic_write(&markdown, |writer| {
-        let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
-        write_experiment_markdown(&title, &conditions, results, verdicts, writer)
-    })?;
     let picture = draw_experiment(results);
-    picture.save(PictureFormat::Svg, &svg)?;
-    picture.save(PictureFormat::Png, &png)
+    let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
+    let write_markdown =
+        |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);
+    [
+        atomic_write(&cells, |writer| write_cells(results, writer)).map_err(PictureError::from),
+        atomic_write(&trials, |writer| write_trials(results, writer)).map_err(PictureError::from),
+        atomic_write(&markdown, write_markdown).map_err(PictureError::from),
+        picture.save(PictureFormat::Svg, &svg),
+        picture.save(PictureFormat::Png, &png),
+    ]
 }
