@@ -118,7 +118,10 @@ fn a_file_that_cannot_be_written_costs_neither_the_report_nor_the_other_files() 
         let [report, message] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(report.contains("Table 1") || report.contains("\"table\":1"), "{report}");
-        assert!(message.contains("table_1.csv") && message.contains("disk is full"), "{message}");
+        assert!(
+            message.contains("table_1.csv") && message.contains("disk is full"),
+            "{message}"
+        );
         for name in ["table_1_trials.csv", "table_1.md", "table_1.svg", "table_1.png"] {
             let path = folder.path().join(name);
             assert!(fs::metadata(&path).is_ok_and(|file| file.len() > 0), "{name}");

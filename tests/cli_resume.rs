@@ -149,7 +149,7 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     assert_eq!(checkpoint.starts[0].history().len(), part.training.history.len());
     assert_eq!(names(folder), ["part.json", "run.checkpoint"]);
     // What it said, but not quite as far.
-    let resume = resume.strip_prefix(" to go on: decoupler ").unwrap();
+    let resume = resume.strip_prefix(" to resume: decoupler ").unwrap();
     let epochs = part.training.history.len() + 30;
     success(&format!("{resume} --epochs {epochs}"), folder);
     success(&format!("train {LONG} {epochs} --out whole.json"), folder);

@@ -11,7 +11,7 @@ use super::interruption;
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
-    export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
+    export::{DocumentError, WriteError, figures::PictureError},
     scene::Rows,
     training::SettingError,
 };
@@ -30,9 +30,7 @@ pub(super) enum Failure {
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
-    Network(#[from] NetworkFileError),
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointFileError),
+    Document(#[from] DocumentError),
     #[error("'{}': {source}", .path.display())]
     Resume { path: PathBuf, source: RunError },
     #[error("{0}")]
@@ -61,7 +59,7 @@ pub(super) enum Failure {
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: it is of row {row}, but the network reads row {rows} only", .path.display())]
+    #[error("'{}': line {line}: it belongs to row {row}, but the network reads only row {rows}", .path.display())]
     OtherRow {
         path: PathBuf,
         line: u64,
@@ -70,7 +68,7 @@ pub(super) enum Failure {
     },
     #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
     PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
-    #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
+    #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
 }
 
@@ -87,8 +85,8 @@ impl fmt::Display for Interruption {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "interrupted after epoch {}; ", self.epoch)?;
         match &self.resume {
-            Some(command) => write!(f, "to go on: {command}"),
-            None => write!(f, "with --checkpoint FILE it could go on from here"),
+            Some(command) => write!(f, "to resume: {command}"),
+            None => write!(f, "with --checkpoint FILE it could be resumed from here"),
         }
     }
 }

@@ -30,7 +30,7 @@ use crate::{
     training::StoppingRules,
 };
 
-/// Redo the paper's tables beside the published figures
+/// Reproduce the paper's tables beside the published figures
 ///
 /// Runs every cell with several seeds on all cores and prints the published error beside the median, least and largest
 /// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
@@ -38,18 +38,18 @@ use crate::{
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Reproduce {
-    /// Table to redo
+    /// Table to reproduce
     #[arg(long, default_value = "all")]
     table: Tables,
-    /// Seeds in succession for each cell
+    /// Number of consecutive seeds for each cell
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
     seeds: usize,
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Most epochs", |experiment| experiment.base.training.stopping.epochs))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Maximum number of epochs", |experiment| experiment.base.training.stopping.epochs))]
     epochs: Option<usize>,
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Starts of each network; the best by validation error counts", |experiment| experiment.base.starts))]
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Restarts of each network; the best by validation error is kept", |experiment| experiment.base.starts))]
     starts: Option<usize>,
     /// Hidden nodes of Table 1 [default: 6,8,10,12,14,16]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = count(1..=LARGEST_HIDDEN))]
@@ -58,13 +58,13 @@ pub(super) struct Reproduce {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     arrays: Vec<ArrayScale>,
     /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, so that no training sample
-    /// is of the same moment as a test sample
+    /// is from the same moment as a test sample
     #[arg(long, value_enum, default_value = "sample")]
     folds: Unit,
     /// Number of folds of Table 2
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
     k: usize,
-    /// Times that the samples of Table 2 are shuffled into new folds, for each seed
+    /// Shuffles of the samples of Table 2 into new folds, for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
     /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; created if missing
@@ -117,9 +117,9 @@ impl Reproduce {
         let bar = progress_bar(
             self.json,
             trials,
-            "{bar:30} {pos} of {len} trials, {elapsed} gone, {msg}",
+            "{bar:30} {pos} of {len} trials, {elapsed} elapsed, {msg}",
         );
-        bar.set_message("the time left is not known yet");
+        bar.set_message("estimating the time left");
         let graceful = Graceful::begin();
         let mut done = 0;
         run_experiments(

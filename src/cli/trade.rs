@@ -44,10 +44,10 @@ pub(super) struct Trade {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    /// Also tell the fastest decoder whose Z error is at most this many percent
+    /// Also print the fastest decoder whose Z error is at most this many percent
     #[arg(long, value_name = "PERCENT", value_parser = number)]
     under_percent: Option<f64>,
-    /// Also tell the most accurate decoder that takes at most this many microseconds for a frame
+    /// Also print the most accurate decoder that takes at most this many microseconds for a frame
     #[arg(long, value_name = "US", value_parser = number)]
     under_us: Option<f64>,
     /// Print one JSON object instead of text and progress
@@ -162,7 +162,14 @@ mod tests {
                     return Err(Failure::Arguments("too wide".to_owned()));
                 }
                 let keep = |point| points.push(point);
-                Ok(measure_trade(preset, &settings, &[], &[DecoderKind::Mean], || false, keep)?)
+                Ok(measure_trade(
+                    preset,
+                    &settings,
+                    &[],
+                    &[DecoderKind::Mean],
+                    || false,
+                    keep,
+                )?)
             })
         };
         for (place, preset) in Preset::ALL.into_iter().enumerate() {

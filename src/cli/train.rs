@@ -21,12 +21,12 @@ use crate::{
     export::{CheckpointFile, NetworkFile, check_writable, format_number},
 };
 
-/// Train a network and print what it is worth
+/// Train a network and print its errors
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
-/// set, with the best linear map, with other decoders, with what is possible at all in the scene (the reference), and
+/// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
 /// with the published figures where there are any. Ctrl-C stops after the epoch,
-/// keeps what there is, and ends with status 130; a second Ctrl-C ends at once.
+/// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
@@ -124,7 +124,7 @@ impl Train {
             if run.stop_reason().is_some() {
                 let epochs = training.stopping.epochs;
                 return Err(Failure::Arguments(format!(
-                    "all {epochs} epochs of the checkpoint are run: give more with --epochs to go on with another method"
+                    "the checkpoint has run all of its {epochs} epochs: give more with --epochs to continue with another method"
                 )));
             }
         }

@@ -263,7 +263,7 @@ fn write_text(
     write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
     writeln!(
         out,
-        "\nErrors in % are means of the coordinate, as in the paper; of the stroke where said so."
+        "\nErrors in % are relative to the coordinate, as in the paper, or to the stroke where stated."
     )?;
     for note in scale.note().iter().map(String::as_str).chain([Geometry::ASSUMPTION]) {
         writeln!(out, "{note}")?;
@@ -356,7 +356,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     }
     writeln!(
         out,
-        "The residual is the relative difference (rms) of the readings from those of the answer: it needs no ground truth."
+        "The residual is the rms relative difference between the readings and those of the decoded deformation; it needs no actual one."
     )
 }
 

@@ -9,11 +9,9 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::value::to_raw_value;
 
-use super::{AtomicFile, WriteError, heading::Heading, limited::read_limited, network_file::PROGRAM, sealed::Sealed};
-use crate::dataset::system_cause;
+use super::{AtomicFile, DocumentError, DocumentKind, WriteError, document::PROGRAM, sealed::Sealed};
 
-const FORMAT: &str = "decoupler run list";
-const VERSION: u64 = 1;
+const KIND: DocumentKind = DocumentKind::RunList;
 
 /// Network file of run `id`.
 pub(super) fn run_path(folder: &Path, id: u64) -> PathBuf {
@@ -49,34 +47,22 @@ pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
 /// Writes a small value, sealed with a checksum.
 pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
     let value = to_raw_value(value).map_err(|error| WriteError::io(path, error.into()))?;
-    Sealed::new(FORMAT, VERSION, PROGRAM, &value).save(path, AtomicFile::commit)
+    Sealed::new(KIND, PROGRAM, &value).save(path, AtomicFile::commit)
 }
 
 /// Reads what [`write`] has written; `None` if there is no file.
 ///
 /// # Errors
-/// A description of the damage, with the path.
-pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, String> {
-    let told = |flaw: String| format!("'{}': {flaw}", path.display());
-    let bytes = match read_limited(path) {
-        Ok(bytes) => bytes,
-        Err(missing) if missing.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(told(system_cause(&error))),
+/// The file cannot be read, is of another kind or version, or is damaged.
+pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
+    let bytes = match KIND.read(path) {
+        Ok((_, bytes)) => bytes,
+        Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error),
     };
-    match Heading::read(&bytes) {
-        Ok(heading) if heading.format == FORMAT => {
-            if let Some(version) = heading.newer_than(VERSION) {
-                let program = heading.program();
-                return Err(told(format!(
-                    "it has version {version}, written by {program}: install that"
-                )));
-            }
-        }
-        _ => return Err(told("it is damaged".to_owned())),
-    }
     let read = Sealed::read(&bytes).and_then(|sealed| {
         let value = serde_json::from_str(sealed.run.get());
         value.map_err(|error| error.to_string())
     });
-    read.map(Some).map_err(told)
+    read.map(Some).map_err(|flaw| KIND.damaged(path, flaw))
 }

@@ -3,6 +3,7 @@
 
 mod atomic;
 mod checkpoint_file;
+mod document;
 #[cfg(feature = "figures")]
 mod experiment_figure;
 #[cfg(feature = "figures")]
@@ -32,13 +33,14 @@ mod unfinished;
 mod workload_words;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
-pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
+pub use checkpoint_file::CheckpointFile;
+pub use document::{DocumentError, DocumentKind};
 #[cfg(feature = "figures")]
 pub use experiment_figure::draw_experiment;
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use format::{format_duration, format_number, format_percent};
-pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
+pub use network_file::{NetworkFile, TrainingRecord};
 pub use run_folder::{KeptRun, RunFolder, RunList};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};

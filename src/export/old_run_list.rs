@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::{NetworkFile, limited::read_limited};
+use super::{DocumentKind, NetworkFile, limited::read_limited};
 use crate::dataset::system_cause;
 
 /// Runs of the file by position, with their names, and the positions of the two that are compared.
@@ -43,7 +43,9 @@ impl OldRunList {
         let position = |id| document.runs.iter().position(|run| run.id == id);
         let pinned = document.pinned.map(|id| id.and_then(position));
         let runs = document.runs.into_iter().map(|run| {
-            let file = NetworkFile::parse(path, run.network.get().as_bytes());
+            let bytes = run.network.get().as_bytes();
+            let heading = DocumentKind::Network.heading(path, bytes);
+            let file = heading.and_then(|heading| NetworkFile::parse(path, &heading, bytes));
             (run.name, file.map_err(|error| error.to_string()))
         });
         Ok(Self {

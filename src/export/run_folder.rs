@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    AtomicFile, NetworkFile, NetworkFileError, WriteError,
+    AtomicFile, DocumentError, NetworkFile, WriteError,
     kept_files::{ids, name_path, pinned_path, read, run_path, write},
     old_run_list::OldRunList,
 };
@@ -39,7 +39,7 @@ pub struct KeptRun {
 /// pair that is compared; each is written when it changes. So several programs share a folder without locks: no two
 /// write the same run, the last name given counts, and [`Self::look`] finds what others have done.
 ///
-/// What cannot be written is kept in memory.
+/// A run that cannot be written stays in memory.
 #[derive(Debug, Default)]
 pub struct RunFolder {
     /// `None` if runs are not kept.
@@ -57,7 +57,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn open(path: &Path) -> Result<(Self, Vec<String>), NetworkFileError> {
+    pub fn open(path: &Path) -> Result<(Self, Vec<String>), DocumentError> {
         fs::create_dir_all(path).map_err(|source| WriteError::io(path, source))?;
         let mut problems = Vec::new();
         if !pinned_path(path).exists() {
@@ -147,7 +147,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// Its file cannot be written; it is then in the list until the program ends.
-    pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), NetworkFileError> {
+    pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
         let name = new_name(&self.list.runs, &file.settings);
         let (id, written) = self.write_run(&file, &name);
         if self.folder_of(id).is_none() {
@@ -159,14 +159,14 @@ impl RunFolder {
     }
 
     /// Writes the run under an id that no other has, not even one that another program is writing just now.
-    fn write_run(&self, file: &NetworkFile, name: &str) -> (u64, Result<(), NetworkFileError>) {
+    fn write_run(&self, file: &NetworkFile, name: &str) -> (u64, Result<(), DocumentError>) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let mut id = u64::try_from(now.as_micros()).unwrap_or(0);
         loop {
             if !self.list.runs.iter().any(|run| run.id == id) {
                 let Some(folder) = &self.path else { return (id, Ok(())) };
                 match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
-                    Err(NetworkFileError::Write(error)) if error.is_taken() => {}
+                    Err(DocumentError::Write(error)) if error.is_taken() => {}
                     Err(error) => return (id, Err(error)),
                     Ok(()) => return (id, write(&name_path(folder, id), &name).map_err(Into::into)),
                 }
@@ -240,7 +240,7 @@ fn new_name(runs: &[KeptRun], settings: &SimulatedSettings) -> String {
 
 /// Copies the runs of the file `old` to `folder`, numbered from 1, and returns the two that are compared. What cannot be
 /// read is added to `problems`.
-fn take_over(old: &Path, folder: &Path, problems: &mut Vec<String>) -> Result<[Option<u64>; 2], NetworkFileError> {
+fn take_over(old: &Path, folder: &Path, problems: &mut Vec<String>) -> Result<[Option<u64>; 2], DocumentError> {
     if !old.exists() {
         return Ok([None; 2]);
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use super::{
-    AtomicFile, WriteError,
+    AtomicFile, DocumentKind, WriteError,
     limited::{LARGEST_BYTES, too_large},
 };
 
@@ -22,10 +22,10 @@ pub(super) struct Sealed<'a> {
 }
 
 impl<'a> Sealed<'a> {
-    pub(super) fn new(format: &str, version: u64, program: &str, run: &'a RawValue) -> Self {
+    pub(super) fn new(kind: DocumentKind, program: &str, run: &'a RawValue) -> Self {
         Self {
-            format: format.to_owned(),
-            version,
+            format: kind.format().to_owned(),
+            version: *kind.versions().end(),
             program: program.to_owned(),
             crc32: checksum(run),
             run,

@@ -1,6 +1,6 @@
 //! Several starts, checkpoints, and going on with another method.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Duration};
 
 use decoupler::{
     app::{Notice, Phase},
@@ -208,6 +208,29 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
     });
     assert!(driver.has("Continue"));
+}
+
+/// Starts run side by side: the time by the clock is saved, and without it there is none to show.
+#[test]
+fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6)).unwrap();
+    let mut driver = Driver::open();
+    for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
+        file.wall_time = saved.map(Duration::from_secs);
+        file.save(&path).unwrap();
+        give_path(&mut driver, OPEN, &path);
+        driver.wait("the training", |driver| {
+            let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
+            result.is_some_and(|result| result.wall_time == file.wall_time)
+        });
+        let texts = driver.texts();
+        for (name, value) in [("Training, all starts", all), ("An epoch", an_epoch)] {
+            let place = texts.iter().position(|text| text == name).unwrap();
+            assert_eq!(texts[place + 1], value, "{texts:#?}");
+        }
+    }
 }
 
 #[test]

@@ -4,10 +4,7 @@ use thiserror::Error;
 
 use crate::{
     evaluation::{Run, SimulatedSettings, error_rows},
-    export::{
-        CheckpointFile, CheckpointFileError, NetworkFile, NetworkFileError, WriteError, atomic_write, write_errors,
-        write_loss_curves,
-    },
+    export::{CheckpointFile, DocumentError, NetworkFile, WriteError, atomic_write, write_errors, write_loss_curves},
 };
 
 /// What can be written about a training.
@@ -27,12 +24,9 @@ pub enum ExportKind {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The network file.
+    /// The network file or checkpoint.
     #[error(transparent)]
-    Network(#[from] NetworkFileError),
-    /// The checkpoint.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointFileError),
+    Document(#[from] DocumentError),
     /// A table.
     #[error(transparent)]
     Write(#[from] WriteError),
