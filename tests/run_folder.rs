@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, fs, path::Path, sync::Arc, thread};
 
 use decoupler::{
     evaluation::{Run, SimulatedSettings, Simulation},
-    export::{KeptRun, NetworkFile, RunFolder, RunList},
+    export::{KeptRun, KeptRuns, NetworkFile, RunFolder},
 };
 
 fn trained(hidden: usize) -> Arc<NetworkFile> {
@@ -41,7 +41,7 @@ fn two(path: &Path) -> RunFolder {
     for hidden in [2, 3] {
         folder.keep(trained(hidden)).unwrap();
     }
-    let id = folder.list().runs[1].id;
+    let id = folder.runs().runs[1].id;
     folder.rename(id, "zweiter \"Lauf\" ×").unwrap();
     folder.pin([Some(id), None]).unwrap();
     folder
@@ -60,7 +60,7 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn names(list: &RunList) -> Vec<&str> {
+fn names(list: &KeptRuns) -> Vec<&str> {
     list.runs.iter().map(|run| run.name.as_str()).collect()
 }
 
@@ -72,12 +72,12 @@ fn run_path(folder: &Path, run: &KeptRun) -> std::path::PathBuf {
 fn what_was_kept_comes_back_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("data").join("runs");
-    assert_eq!(*open(&path).list(), RunList::default());
+    assert_eq!(*open(&path).runs(), KeptRuns::default());
     let kept = two(&path);
-    assert_eq!(names(kept.list()), ["4×3_2×9 h2 lm", "zweiter \"Lauf\" ×"]);
-    assert_eq!(open(&path).list(), kept.list());
+    assert_eq!(names(kept.runs()), ["4×3_2×9 h2 lm", "zweiter \"Lauf\" ×"]);
+    assert_eq!(open(&path).runs(), kept.runs());
     // Each run is a network file like any other.
-    let run = &kept.list().runs[0];
+    let run = &kept.runs().runs[0];
     assert_eq!(NetworkFile::load(&run_path(&path, run)).unwrap(), *run.file);
 }
 
@@ -85,7 +85,7 @@ fn what_was_kept_comes_back_the_same() {
 fn a_change_writes_one_small_file() {
     let folder = tempfile::tempdir().unwrap();
     let mut kept = two(folder.path());
-    let id = kept.list().runs[0].id;
+    let id = kept.runs().runs[0].id;
     let changed = |before: &BTreeMap<String, Vec<u8>>| {
         let mut after = contents(folder.path());
         after.retain(|name, text| before.get(name) != Some(text));
@@ -112,18 +112,18 @@ fn two_programs_see_what_the_other_does() {
     let [mut first, mut second] = [(); 2].map(|()| open(folder.path()));
     let agree = |first: &mut RunFolder, second: &mut RunFolder| {
         assert!(first.look().is_empty() && second.look().is_empty());
-        assert_eq!(first.list(), second.list());
+        assert_eq!(first.runs(), second.runs());
     };
     first.keep(trained(2)).unwrap();
     second.keep(trained(3)).unwrap();
     agree(&mut first, &mut second);
-    let [a, b] = [0, 1].map(|index| first.list().runs[index].id);
+    let [a, b] = [0, 1].map(|index| first.runs().runs[index].id);
     first.rename(a, "one").unwrap();
     second.rename(b, "two").unwrap();
     second.pin([Some(b), Some(a)]).unwrap();
     agree(&mut first, &mut second);
     assert_eq!(
-        (names(first.list()), first.list().pinned),
+        (names(first.runs()), first.runs().pinned),
         (vec!["one", "two"], [Some(b), Some(a)])
     );
     second.remove(b).unwrap();
@@ -131,7 +131,7 @@ fn two_programs_see_what_the_other_does() {
     first.rename(b, "gone").unwrap();
     agree(&mut first, &mut second);
     assert_eq!(
-        (names(first.list()), first.list().pinned),
+        (names(first.runs()), first.runs().pinned),
         (vec!["one"], [None, Some(a)])
     );
     assert_eq!(contents(folder.path()).len(), 3);
@@ -151,14 +151,14 @@ fn many_programs_that_write_at_once_lose_nothing() {
             });
         }
     });
-    assert_eq!(open(folder.path()).list().runs.len(), 40);
+    assert_eq!(open(folder.path()).runs().runs.len(), 40);
 }
 
 #[test]
 fn a_damaged_run_is_named_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let kept = two(folder.path());
-    let [first, damaged] = &kept.list().runs[..] else {
+    let [first, damaged] = &kept.runs().runs[..] else {
         panic!()
     };
     let path = run_path(folder.path(), damaged);
@@ -175,8 +175,8 @@ fn a_damaged_run_is_named_and_left_alone() {
         fs::write(&path, text).unwrap();
         let before = contents(folder.path());
         let (mut found, problems) = RunFolder::open(folder.path()).unwrap();
-        assert_eq!(found.list().runs[..], [first.clone()]);
-        assert_eq!(found.list().pinned, [None, None], "what is not there is not pinned");
+        assert_eq!(found.runs().runs[..], [first.clone()]);
+        assert_eq!(found.runs().pinned, [None, None], "what is not there is not pinned");
         let [problem] = &problems[..] else {
             panic!("{problems:?}")
         };
@@ -186,7 +186,7 @@ fn a_damaged_run_is_named_and_left_alone() {
         // Put right, it is there again, with its name and place.
         fs::write(&path, &whole).unwrap();
         found.look();
-        assert_eq!(found.list(), kept.list());
+        assert_eq!(found.runs(), kept.runs());
     }
 }
 
@@ -194,7 +194,7 @@ fn a_damaged_run_is_named_and_left_alone() {
 fn damaged_names_and_pins_cost_no_run() {
     let folder = tempfile::tempdir().unwrap();
     let kept = two(folder.path());
-    let id = kept.list().runs[1].id;
+    let id = kept.runs().runs[1].id;
     for name in [format!("run-{id}.name.json"), "pinned.json".to_owned()] {
         let path = folder.path().join(&name);
         let whole = fs::read_to_string(&path).unwrap();
@@ -204,7 +204,7 @@ fn damaged_names_and_pins_cost_no_run() {
         for text in [&changed, &newer, "", "{}", "null"] {
             fs::write(&path, text).unwrap();
             let (found, problems) = RunFolder::open(folder.path()).unwrap();
-            assert_eq!(found.list().runs.len(), 2, "{name}: {text}");
+            assert_eq!(found.runs().runs.len(), 2, "{name}: {text}");
             assert!(
                 problems.len() == 1 && problems[0].contains(&name),
                 "{text}: {problems:?}"
@@ -212,7 +212,7 @@ fn damaged_names_and_pins_cost_no_run() {
         }
         fs::write(&path, whole).unwrap();
     }
-    assert_eq!(open(folder.path()).list(), kept.list());
+    assert_eq!(open(folder.path()).runs(), kept.runs());
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let mut kept = open(folder.path());
     kept.keep(trained(2)).unwrap();
-    let run = kept.list().runs[0].clone();
+    let run = kept.runs().runs[0].clone();
     let last = format!("run-{}.json", u64::MAX);
     fs::copy(run_path(folder.path(), &run), folder.path().join(&last)).unwrap();
     for name in [
@@ -235,8 +235,8 @@ fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
     assert!(kept.look().is_empty());
     kept.keep(trained(3)).unwrap();
     let again = open(folder.path());
-    assert_eq!(again.list().runs.len(), 3);
-    assert_eq!(again.list().runs[2].id, u64::MAX);
+    assert_eq!(again.runs().runs.len(), 3);
+    assert_eq!(again.runs().runs[2].id, u64::MAX);
 }
 
 #[test]
@@ -256,12 +256,12 @@ fn the_list_of_earlier_versions_is_taken_over_once_and_stays_as_it_is() {
     let text = list(&runs, &format!("[{},null]", u64::MAX));
     fs::write(&old, &text).unwrap();
     let mut kept = open(&path);
-    assert_eq!(names(kept.list()), ["first", "second"]);
-    let [first, second] = [0, 1].map(|index| kept.list().runs[index].id);
-    assert_eq!(kept.list().pinned, [Some(second), None]);
+    assert_eq!(names(kept.runs()), ["first", "second"]);
+    let [first, second] = [0, 1].map(|index| kept.runs().runs[index].id);
+    assert_eq!(kept.runs().pinned, [Some(second), None]);
     assert_eq!(fs::read_to_string(&old).unwrap(), text);
     kept.remove(first).unwrap();
-    assert_eq!(names(open(&path).list()), ["second"], "only once");
+    assert_eq!(names(open(&path).runs()), ["second"], "only once");
 
     fs::remove_dir_all(&path).unwrap();
     let damaged = list(&[run(1, "broken", "{}"), run(2, "whole", &network)], "[1,2]");
@@ -269,7 +269,7 @@ fn the_list_of_earlier_versions_is_taken_over_once_and_stays_as_it_is() {
     for (text, runs) in cases {
         fs::write(&old, text).unwrap();
         let (kept, problems) = RunFolder::open(&path).unwrap();
-        assert_eq!(kept.list().runs.len(), runs);
+        assert_eq!(kept.runs().runs.len(), runs);
         assert!(
             problems.len() == 1 && problems[0].contains("workspace.json"),
             "{problems:?}"
@@ -286,7 +286,7 @@ fn what_cannot_be_written_lasts_as_long_as_the_program() {
         kept.keep(trained(hidden)).unwrap();
     }
     assert!(kept.look().is_empty());
-    assert_eq!(names(kept.list()), ["4×3_2×9 h2 lm", "4×3_2×9 h2 lm (2)"]);
+    assert_eq!(names(kept.runs()), ["4×3_2×9 h2 lm", "4×3_2×9 h2 lm (2)"]);
 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("runs");
@@ -294,14 +294,14 @@ fn what_cannot_be_written_lasts_as_long_as_the_program() {
     fs::remove_dir_all(&path).unwrap();
     let error = kept.keep(trained(4)).unwrap_err().to_string();
     assert!(error.contains("runs' does not exist"), "{error}");
-    assert_eq!(kept.list().runs.len(), 3);
+    assert_eq!(kept.runs().runs.len(), 3);
     fs::create_dir(&path).unwrap();
     kept.look();
-    assert_eq!(names(kept.list()), ["4×3_2×9 h4 lm"], "others have removed the rest");
-    let id = kept.list().runs[0].id;
+    assert_eq!(names(kept.runs()), ["4×3_2×9 h4 lm"], "others have removed the rest");
+    let id = kept.runs().runs[0].id;
     kept.rename(id, "named").unwrap();
     kept.look();
-    assert_eq!(names(kept.list()), ["named"]);
+    assert_eq!(names(kept.runs()), ["named"]);
     fs::write(folder.path().join("file"), "").unwrap();
     assert!(RunFolder::open(&folder.path().join("file")).is_err());
 }

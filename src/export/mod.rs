@@ -41,7 +41,7 @@ pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markd
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use format::{format_duration, format_number, format_percent};
 pub use network_file::{NetworkFile, TrainingRecord};
-pub use run_folder::{KeptRun, RunFolder, RunList};
+pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};

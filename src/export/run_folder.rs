@@ -15,7 +15,7 @@ use crate::{dataset::system_cause, evaluation::SimulatedSettings};
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RunList {
+pub struct KeptRuns {
     /// The runs in the order in which they were finished.
     pub runs: Vec<KeptRun>,
     /// [`KeptRun::id`] of the two runs that are compared.
@@ -44,7 +44,7 @@ pub struct KeptRun {
 pub struct RunFolder {
     /// `None` if runs are not kept.
     path: Option<PathBuf>,
-    list: RunList,
+    kept: KeptRuns,
     /// Runs that are in memory only.
     unwritten: BTreeSet<u64>,
     /// Problems that [`Self::look`] has returned.
@@ -79,8 +79,8 @@ impl RunFolder {
     }
 
     /// The list as it was last seen.
-    pub fn list(&self) -> &RunList {
-        &self.list
+    pub fn runs(&self) -> &KeptRuns {
+        &self.kept
     }
 
     /// Reads what other programs have changed: new runs, names, the pair that is compared, removals. Returns the files
@@ -99,16 +99,16 @@ impl RunFolder {
             }
         };
         let unwritten = &self.unwritten;
-        self.list
+        self.kept
             .runs
             .retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
         for id in ids {
-            if let Err(place) = self.list.runs.binary_search_by_key(&id, |run| run.id) {
+            if let Err(place) = self.kept.runs.binary_search_by_key(&id, |run| run.id) {
                 match NetworkFile::load(&run_path(path, id)) {
                     Ok(file) => {
-                        let name = new_name(&self.list.runs, &file.settings);
+                        let name = new_name(&self.kept.runs, &file.settings);
                         let file = Arc::new(file);
-                        self.list.runs.insert(place, KeptRun { id, name, file });
+                        self.kept.runs.insert(place, KeptRun { id, name, file });
                     }
                     // Another program has removed it just now.
                     Err(_) if !run_path(path, id).exists() => {}
@@ -116,7 +116,7 @@ impl RunFolder {
                 }
             }
         }
-        for run in &mut self.list.runs {
+        for run in &mut self.kept.runs {
             match read(&name_path(path, run.id)) {
                 Ok(Some(name)) => run.name = name,
                 Ok(None) => {}
@@ -127,14 +127,14 @@ impl RunFolder {
             }
         }
         match read::<[Option<u64>; 2]>(&pinned_path(path)) {
-            Ok(pinned) => self.list.pinned = pinned.unwrap_or(self.list.pinned),
+            Ok(pinned) => self.kept.pinned = pinned.unwrap_or(self.kept.pinned),
             Err(flaw) => problems.push(format!(
                 "the runs compared cannot be read: {flaw}; choose A and B again"
             )),
         }
-        let runs = &self.list.runs;
+        let runs = &self.kept.runs;
         let is_there = |id: &u64| runs.iter().any(|run| run.id == *id);
-        self.list.pinned = self.list.pinned.map(|id| id.filter(is_there));
+        self.kept.pinned = self.kept.pinned.map(|id| id.filter(is_there));
         self.untold(problems)
     }
 
@@ -148,13 +148,13 @@ impl RunFolder {
     /// # Errors
     /// Its file cannot be written; it is then in the list until the program ends.
     pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
-        let name = new_name(&self.list.runs, &file.settings);
+        let name = new_name(&self.kept.runs, &file.settings);
         let (id, written) = self.write_run(&file, &name);
         if self.folder_of(id).is_none() {
             self.unwritten.insert(id);
         }
-        let place = self.list.runs.partition_point(|run| run.id < id);
-        self.list.runs.insert(place, KeptRun { id, name, file });
+        let place = self.kept.runs.partition_point(|run| run.id < id);
+        self.kept.runs.insert(place, KeptRun { id, name, file });
         written
     }
 
@@ -163,7 +163,7 @@ impl RunFolder {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let mut id = u64::try_from(now.as_micros()).unwrap_or(0);
         loop {
-            if !self.list.runs.iter().any(|run| run.id == id) {
+            if !self.kept.runs.iter().any(|run| run.id == id) {
                 let Some(folder) = &self.path else { return (id, Ok(())) };
                 match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
                     Err(DocumentError::Write(error)) if error.is_taken() => {}
@@ -180,7 +180,7 @@ impl RunFolder {
     /// # Errors
     /// The name cannot be written; it then lasts until the next look.
     pub fn rename(&mut self, id: u64, name: &str) -> Result<(), WriteError> {
-        let Some(run) = self.list.runs.iter_mut().find(|run| run.id == id) else {
+        let Some(run) = self.kept.runs.iter_mut().find(|run| run.id == id) else {
             return Ok(());
         };
         name.clone_into(&mut run.name);
@@ -195,7 +195,7 @@ impl RunFolder {
     /// # Errors
     /// The choice cannot be written; it then lasts until the next look.
     pub fn pin(&mut self, pinned: [Option<u64>; 2]) -> Result<(), WriteError> {
-        self.list.pinned = pinned;
+        self.kept.pinned = pinned;
         match &self.path {
             Some(folder) => write(&pinned_path(folder), &pinned),
             None => Ok(()),
@@ -216,9 +216,9 @@ impl RunFolder {
             }
             None => Ok(()),
         };
-        self.list.runs.retain(|run| run.id != id);
+        self.kept.runs.retain(|run| run.id != id);
         self.unwritten.remove(&id);
-        self.list.pinned = self.list.pinned.map(|pinned| pinned.filter(|pinned| *pinned != id));
+        self.kept.pinned = self.kept.pinned.map(|pinned| pinned.filter(|pinned| *pinned != id));
         removed
     }
 

@@ -14,7 +14,7 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
     for run in trained() {
         kept.keep(Arc::new(NetworkFile::from_run(&run).unwrap())).unwrap();
     }
-    kept.pin([Some(kept.list().runs[0].id), None]).unwrap();
+    kept.pin([Some(kept.runs().runs[0].id), None]).unwrap();
     let paths = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
     let files: BTreeMap<PathBuf, Vec<u8>> = paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect();
     let same = |a: &KeptRun, b: &KeptRun| {
@@ -29,13 +29,13 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
             let text = || String::from_utf8_lossy(&damaged);
             assert!(problems.len() <= 1, "{problems:?}");
             assert!(
-                found.list().runs.len() + problems.len() >= kept.list().runs.len(),
+                found.runs().runs.len() + problems.len() >= kept.runs().runs.len(),
                 "{}",
                 text()
             );
-            for run in &found.list().runs {
+            for run in &found.runs().runs {
                 assert!(
-                    kept.list().runs.iter().any(|original| same(original, run)),
+                    kept.runs().runs.iter().any(|original| same(original, run)),
                     "{}",
                     text()
                 );
@@ -45,5 +45,5 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
         fs::write(path, valid).unwrap();
     }
     let (found, problems) = RunFolder::open(folder.path()).unwrap();
-    assert_eq!((found.list(), problems), (kept.list(), Vec::new()));
+    assert_eq!((found.runs(), problems), (kept.runs(), Vec::new()));
 }

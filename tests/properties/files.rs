@@ -128,14 +128,14 @@ proptest! {
         let file = Arc::new(TRAINED.clone());
         for name in &names {
             kept.keep(Arc::clone(&file)).unwrap();
-            let id = kept.list().runs.last().map(|run| run.id).unwrap();
+            let id = kept.runs().runs.last().map(|run| run.id).unwrap();
             kept.rename(id, name).unwrap();
         }
-        let pinned = pinned.and_then(|index| kept.list().runs.get(index)).map(|run| run.id);
+        let pinned = pinned.and_then(|index| kept.runs().runs.get(index)).map(|run| run.id);
         kept.pin([pinned, None]).unwrap();
-        let found = Vec::from_iter(kept.list().runs.iter().map(|run| &run.name));
+        let found = Vec::from_iter(kept.runs().runs.iter().map(|run| &run.name));
         prop_assert_eq!(found, Vec::from_iter(&names));
         let (again, problems) = open();
-        prop_assert_eq!((again.list(), problems), (kept.list(), Vec::new()));
+        prop_assert_eq!((again.runs(), problems), (kept.runs(), Vec::new()));
     }
 }

@@ -1,9 +1,9 @@
-//! The thread that keeps the run list and prepares what is compared. Requests go in, events come out, and each event
-//! wakes the window. When the window closes it waits for what is still to be written.
+//! The thread that keeps the run list in its folder. Requests go in, the list as it then is comes out, which wakes the
+//! window. When the window closes it waits for what is still to be written.
 
 use std::{
     fmt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         Arc,
         mpsc::{Receiver, Sender, channel},
@@ -11,21 +11,13 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::Compared;
 use crate::{
-    app::{
-        test_view::{Frame, TestView},
-        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
-        views::train::shown_figure::Undrawn,
-    },
-    export::{
-        NetworkFile, RunFolder, RunList,
-        figures::{PictureError, PictureFormat},
-    },
+    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+    export::{KeptRuns, NetworkFile, RunFolder},
 };
 
-/// What the window asks of the thread.
-pub enum RunsRequest {
+/// Requests to the thread.
+pub(super) enum RunsRequest {
     /// Keep the runs in this folder.
     Open(PathBuf),
     /// See what other windows have changed.
@@ -38,26 +30,21 @@ pub enum RunsRequest {
     Pin(usize, Option<u64>),
     /// Remove a run for good.
     Remove(u64),
-    /// Prepare this run to be drawn in one of the two places.
-    Prepare(usize, u64, Arc<NetworkFile>),
-    /// Draw and write a picture.
-    Write(Box<Undrawn>, PathBuf),
 }
 
-/// What the thread tells the window.
-pub enum RunsEvent {
-    /// The run list as it is now, where it is kept, and what cannot be read or written.
-    Listed(RunList, Option<PathBuf>, Vec<String>),
-    /// A run can be drawn, or why not.
-    Prepared(usize, Result<Box<Compared>, String>),
-    /// A picture was written, or why not.
-    Written(Result<PathBuf, String>),
+/// The run list after a request.
+pub(super) struct Listed {
+    pub(super) runs: KeptRuns,
+    /// Folder in which they are kept, if they are.
+    pub(super) path: Option<PathBuf>,
+    /// Files that cannot be read or written.
+    pub(super) problems: Vec<String>,
 }
 
 /// The window's end of the thread.
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
-    events: Receiver<RunsEvent>,
+    events: Receiver<Listed>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -77,7 +64,7 @@ impl RunsWorker {
                 report.send(answer(request, &mut folder));
             }
         };
-        let thread = thread::Builder::new().name("runs".to_owned()).spawn(work)?;
+        let thread = thread::Builder::new().name("run list".to_owned()).spawn(work)?;
         Ok(Self {
             requests: Some(requests),
             events,
@@ -85,8 +72,22 @@ impl RunsWorker {
         })
     }
 
-    /// Asks for something.
-    pub fn ask(&self, request: RunsRequest) {
+    /// Shows the runs in the folder `path`, and keeps runs there from now on.
+    pub fn open(&self, path: PathBuf) {
+        self.ask(RunsRequest::Open(path));
+    }
+
+    /// Shows what other windows have changed.
+    pub fn look(&self) {
+        self.ask(RunsRequest::Look);
+    }
+
+    /// Adds a finished training.
+    pub fn keep(&self, file: NetworkFile) {
+        self.ask(RunsRequest::Keep(Arc::new(file)));
+    }
+
+    pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The other end is gone only if the thread died, which the next look at the events shows.
             let _ = requests.send(request);
@@ -97,7 +98,7 @@ impl RunsWorker {
     ///
     /// # Errors
     /// The thread has ended.
-    pub fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
+    pub(super) fn next_event(&self) -> Result<Option<Listed>, WorkerDied> {
         next_event(&self.events)
     }
 }
@@ -118,58 +119,34 @@ impl fmt::Debug for RunsWorker {
     }
 }
 
-fn answer(request: RunsRequest, folder: &mut RunFolder) -> RunsEvent {
+fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
     // Changes are made to what is there now.
     let mut problems = folder.look();
-    let failed: Option<String> = match request {
-        RunsRequest::Prepare(place, id, file) => {
-            return RunsEvent::Prepared(place, prepare(id, &file).map(Box::new));
-        }
-        RunsRequest::Write(picture, path) => {
-            let written = write(&picture, &path).map(|()| path);
-            return RunsEvent::Written(written.map_err(|error| error.to_string()));
-        }
+    match request {
         RunsRequest::Open(path) => match RunFolder::open(&path) {
             Ok((opened, found)) => {
                 *folder = opened;
                 problems.extend(found);
-                None
             }
-            Err(error) => Some(format!("{error}; runs of this session are not kept")),
+            Err(error) => problems.push(format!("{error}; runs of this session are not kept")),
         },
-        RunsRequest::Look => None,
-        RunsRequest::Keep(file) => failure(folder.keep(file)),
-        RunsRequest::Rename(id, name) => failure(folder.rename(id, &name)),
+        RunsRequest::Look => {}
+        RunsRequest::Keep(file) => problems.extend(failure(folder.keep(file))),
+        RunsRequest::Rename(id, name) => problems.extend(failure(folder.rename(id, &name))),
         RunsRequest::Pin(place, id) => {
-            let mut pinned = folder.list().pinned;
+            let mut pinned = folder.runs().pinned;
             pinned[place] = id;
-            failure(folder.pin(pinned))
+            problems.extend(failure(folder.pin(pinned)));
         }
-        RunsRequest::Remove(id) => failure(folder.remove(id)),
-    };
-    problems.extend(failed);
-    let path = folder.path().map(PathBuf::from);
-    RunsEvent::Listed(folder.list().clone(), path, problems)
+        RunsRequest::Remove(id) => problems.extend(failure(folder.remove(id))),
+    }
+    Listed {
+        runs: folder.runs().clone(),
+        path: folder.path().map(PathBuf::from),
+        problems,
+    }
 }
 
 fn failure<E: fmt::Display>(written: Result<(), E>) -> Option<String> {
     written.err().map(|error| format!("{error}; the change is not kept"))
-}
-
-fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {
-    let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
-    let decoupled_mm = file.network.decouple(&test.set);
-    let mut compared = Compared {
-        id,
-        test,
-        decoupled_mm: Arc::new(decoupled_mm),
-        frames: [Frame::default(), Frame::default(), Frame::default()],
-    };
-    compared.show(0);
-    Ok(compared)
-}
-
-fn write(picture: &Undrawn, path: &Path) -> Result<(), PictureError> {
-    let format = PictureFormat::of_path(path)?;
-    picture.draw().save(format, path)
 }
