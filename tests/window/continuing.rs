@@ -227,7 +227,7 @@ fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
         });
         let texts = driver.texts();
         for (name, value) in [("Training, all starts", all), ("An epoch", an_epoch)] {
-            let place = texts.iter().position(|text| text == name).unwrap();
+            let place = texts.iter().rposition(|text| text == name).unwrap();
             assert_eq!(texts[place + 1], value, "{texts:#?}");
         }
     }
@@ -250,7 +250,7 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         ("is cut off", sound[..sound.len() / 2].to_owned()),
         ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
         ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
-        ("has version 9", sound.replacen("\"version\":2", "\"version\":9", 1)),
+        ("has version 9", sound.replacen("\"version\":3", "\"version\":9", 1)),
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
