@@ -1,4 +1,7 @@
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -30,6 +33,8 @@ pub struct Run {
     test: Arc<Dataset>,
     scalings: PerRow<(Inputs, MinMax)>,
     starts: Vec<StartTrainer>,
+    /// See [`Self::wall_time`].
+    wall_time: Option<Duration>,
     /// Errors of the training mean and of the linear map, target by target.
     target_baselines: [TargetRow; 2],
     /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
@@ -98,7 +103,7 @@ impl Run {
         split: Split,
         test: Dataset,
     ) -> Result<Self, RunError> {
-        Self::with_sets(settings, split, test, |tasks| {
+        let mut run = Self::with_sets(settings, split, test, |tasks| {
             let networks = tasks.len();
             check_states(&states, settings.starts * networks)?;
             let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
@@ -113,7 +118,13 @@ impl Run {
             let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
             let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
             Ok(starts.collect())
-        })
+        })?;
+        // Trainings side by side do not know how long they took together.
+        run.wall_time = match &run.starts[..] {
+            [only] if only.rows().len() == 1 => Some(only.elapsed()),
+            _ => None,
+        };
+        Ok(run)
     }
 
     fn with_sets(
@@ -148,8 +159,11 @@ impl Run {
         let samples = first.problem.training.samples();
         let trainings = settings.starts * tasks.values().len();
         check_width(&settings.training.method, first.shape, samples, trainings)?;
+        let begun = Instant::now();
         let starts = begin(tasks.values())?;
+        let wall_time = Some(begun.elapsed());
         Ok(Self {
+            wall_time,
             settings,
             test: Arc::new(test),
             scalings: tasks.map(|task| task.scaling.clone()),
@@ -167,16 +181,29 @@ impl Run {
     /// Runs one epoch of every restart that has not ended, in parallel. Returns the reason for stopping once every
     /// restart has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
+        let begun = Instant::now();
         match self.starts.as_mut_slice() {
             // Stays on this thread, which saves a hand-over every epoch.
-            [only] => only.step(),
-            all => {
-                all.par_iter_mut().for_each(|start| {
-                    start.step();
-                });
-                self.stop_reason()
+            [only] => {
+                only.step();
             }
+            all => all.par_iter_mut().for_each(|start| {
+                start.step();
+            }),
         }
+        self.wall_time = self.wall_time.map(|time| time.saturating_add(begun.elapsed()));
+        self.stop_reason()
+    }
+
+    /// Time that all restarts together have taken by the clock, without pauses; `None` if the run was resumed and the
+    /// time before is not known. [`StartTrainer::elapsed`] adds up the times of trainings that ran side by side.
+    pub fn wall_time(&self) -> Option<Duration> {
+        self.wall_time
+    }
+
+    /// Sets the time of a resumed run, if it was saved.
+    pub(crate) fn set_wall_time(&mut self, saved: Option<Duration>) {
+        self.wall_time = saved.or(self.wall_time);
     }
 
     /// Stops every restart at the user's request.

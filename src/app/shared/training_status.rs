@@ -69,8 +69,10 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             result.starts_ended, run.settings.starts
         ));
     }
-    if epochs_run > 0 {
-        let per_epoch = result.elapsed.div_f64(epochs_run as f64);
+    if let Some(time) = result.wall_time
+        && epochs_run > 0
+    {
+        let per_epoch = time.div_f64(epochs_run as f64);
         parts.push(format!("{} an epoch", format_duration(per_epoch)));
         if phase.is_busy() {
             parts.push(format!(
@@ -78,7 +80,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
                 format_duration(time_left(per_epoch, epochs.saturating_sub(epochs_run)))
             ));
         } else {
-            parts.push(format!("{} in all", format_duration(result.elapsed)));
+            parts.push(format!("{} in all", format_duration(time)));
         }
     }
     parts

@@ -38,8 +38,6 @@ pub(super) struct Labour {
     is_paused: bool,
     /// Whether the window was told what is to be kept of the run.
     is_kept: bool,
-    /// Time spent in training, all starts side by side.
-    elapsed: Duration,
     /// The start last reported, and how many of its epochs.
     reported: (usize, usize),
     next_report: Instant,
@@ -54,7 +52,6 @@ impl Labour {
             id: None,
             is_paused: false,
             is_kept: false,
-            elapsed: Duration::ZERO,
             reported: (0, 0),
             next_report: Instant::now(),
             next_starts: Instant::now(),
@@ -141,7 +138,6 @@ impl Labour {
 
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
     fn begin(&mut self, run: Run, id: RunId, is_paused: bool, event: Event) {
-        self.elapsed = run.leader().elapsed();
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
         (self.run, self.id) = (Some(run), Some(id));
@@ -169,9 +165,7 @@ impl Labour {
 
     fn train_one_epoch(&mut self) {
         let Some(run) = &mut self.run else { return };
-        let begun = Instant::now();
         let ended = run.step().is_some();
-        self.elapsed += begun.elapsed();
         if ended || Instant::now() >= self.next_report {
             self.report_progress();
         }
@@ -214,7 +208,7 @@ impl Labour {
                     .iter()
                     .filter(|start| start.stop_reason().is_some())
                     .count(),
-                elapsed: self.elapsed,
+                wall_time: run.wall_time(),
                 frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
                 networks: is_standing.then(|| Arc::new(run.network())),
             },

@@ -124,8 +124,8 @@ pub struct RunResult {
     pub epochs_run: usize,
     /// How many starts have ended.
     pub starts_ended: usize,
-    /// Time spent in training.
-    pub elapsed: Duration,
+    /// Time of the training by the clock, all starts side by side, if it is known.
+    pub wall_time: Option<Duration>,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
     /// The networks; there when the training pauses or ends.

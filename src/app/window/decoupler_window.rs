@@ -72,11 +72,11 @@ impl DecouplerWindow {
         Ok(window)
     }
 
-    /// Takes up the run list in `path`, and keeps finished trainings there from now on. Without it they are gone when the
-    /// window closes.
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.load(path);
+        self.runs.open(path);
         self
     }
 
@@ -102,6 +102,10 @@ impl DecouplerWindow {
 
     /// Lays out the window and does what the user meant.
     pub fn show_ui(&mut self, ui: &mut Ui) {
+        // Another window may have been at work.
+        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+            self.runs.look();
+        }
         let mut effects = Vec::new();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
         // The question for a path is to be answered first.

@@ -133,7 +133,7 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
             }
-            Event::Finished(Ok(file)) => shared.runs.keep(*file, &self.runs),
+            Event::Finished(Ok(file)) => self.runs.keep(*file),
             Event::Finished(Err(reason)) => self.notice = Some(Notice::Failed(reason)),
             Event::Exported(written) => self.tell_written(written),
         }

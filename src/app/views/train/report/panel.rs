@@ -252,9 +252,11 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     } else {
         "Training"
     };
-    let mut rows = vec![(training, format_duration(result.elapsed))];
+    let told = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
+    let mut rows = vec![(training, told(result.wall_time))];
     if epochs > 0 {
-        rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
+        let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
+        rows.push(("An epoch", told(an_epoch)));
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
