@@ -123,7 +123,7 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, &self.names, self.shown, |ui| {
-                    view.tools_ui(ui, shared, &mut effects)
+                    view.tools_ui(ui, shared, &mut effects);
                 })
             });
         Panel::bottom("status line")
