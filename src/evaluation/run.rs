@@ -16,8 +16,8 @@ use super::{
 use crate::{
     dataset::{Dataset, PerRow, Split, Stream},
     decoupling::decode_set,
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, Shape, nguyen_widrow},
-    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, nguyen_widrow},
+    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState, check_width},
 };
 
 /// A run: its sets of samples, one training per restart, and the errors of the best network.
@@ -44,9 +44,6 @@ pub struct NodeScores {
     /// Errors of the baselines.
     pub baselines: Baselines,
 }
-
-/// Largest memory for the equations of all restarts together.
-const LARGEST_EQUATIONS_BYTES: usize = 8_000_000_000;
 
 impl Run {
     /// Draws and scales the sets, initialises the networks and measures the baselines.
@@ -150,7 +147,7 @@ impl Run {
         let first = tasks.at(0);
         let samples = first.problem.training.samples();
         let trainings = settings.starts * tasks.values().len();
-        check_memory(&settings.training.method, first.shape, samples, trainings)?;
+        check_width(&settings.training.method, first.shape, samples, trainings)?;
         let starts = begin(tasks.values())?;
         Ok(Self {
             settings,
@@ -198,10 +195,9 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Finds the defect of the leader, once its trainings have ended, given [`Self::errors_of`] its answers; `None` for a
-    /// sound or a measured run.
-    pub fn flaw(&self, network: &Errors) -> Option<RunFlaw> {
-        RunFlaw::of(self.leader(), network, &self.baselines.as_ref()?.mean)
+    /// Finds the defect of the leader, once its trainings have ended; `None` for a sound run.
+    pub fn flaw(&self) -> Option<RunFlaw> {
+        RunFlaw::of(self.leader())
     }
 
     /// Continues every restart from its present weights with another method: [`Trainer::continue_with`].
@@ -212,7 +208,7 @@ impl Run {
         let rows = self.leader().rows();
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
-        check_memory(&method, rows[0].present().shape(), samples, trainings)?;
+        check_width(&method, rows[0].present().shape(), samples, trainings)?;
         // Restarts have the same shapes, so either the first is refused or none.
         for start in &mut self.starts {
             start.continue_with(method)?;
@@ -340,13 +336,4 @@ pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);
     Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
-}
-
-/// Checks that the equations of all restarts fit into memory together; a single one is checked by the trainer.
-fn check_memory(method: &Method, shape: Shape, samples: usize, trainings: usize) -> Result<(), RunError> {
-    let bytes = method.equations_bytes(shape, samples).saturating_mul(trainings);
-    if trainings > 1 && bytes > LARGEST_EQUATIONS_BYTES {
-        return Err(RunError::TooManyTrainings { trainings, bytes });
-    }
-    Ok(())
 }

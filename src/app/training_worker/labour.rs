@@ -207,7 +207,7 @@ impl Labour {
                 decoupled_mm: Arc::new(decoupled_mm),
                 errors,
                 best_epoch: trainer.best_epoch(),
-                flaw: run.flaw(&errors),
+                flaw: run.flaw(),
                 epochs_run: furthest_epoch(run),
                 starts_ended: run
                     .trainers()
