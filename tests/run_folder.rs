@@ -175,7 +175,7 @@ fn a_damaged_run_is_named_and_left_alone() {
         fs::write(&path, text).unwrap();
         let before = contents(folder.path());
         let (mut found, problems) = RunFolder::open(folder.path()).unwrap();
-        assert_eq!(found.runs().runs[..], *std::slice::from_ref(&first));
+        assert_eq!(&found.runs().runs[..], std::slice::from_ref(first));
         assert_eq!(found.runs().pinned, [None, None], "what is not there is not pinned");
         let [problem] = &problems[..] else {
             panic!("{problems:?}")

@@ -55,7 +55,7 @@ impl Driver {
         // Before the first frame, as the real window does, so that its fonts are there.
         let set_up = move |ctx: &Context| {
             // At the end of a test the window outlives the driver.
-            ctx.set_request_repaint_callback(move |info| drop(asks.send(info.delay)));
+            ctx.set_request_repaint_callback(move |info| asks.send(info.delay).unwrap_or(()));
             let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
             let window = match runs {
                 Some(path) => window.keeping_runs(path),

@@ -73,7 +73,7 @@ pub struct RunId(u64);
 
 impl RunId {
     /// That of no other training.
-    pub(super) fn new() -> Self {
+    pub fn new() -> Self {
         static BEGUN: AtomicU64 = AtomicU64::new(0);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }

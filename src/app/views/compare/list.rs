@@ -6,8 +6,8 @@ use super::scene_words::unlike_paper;
 use crate::{
     app::{
         shared::{Effect, PLACES, Shared},
-        theme::{Theme, space, type_size},
-        widgets::{scrolled_ui, section_heading_ui},
+        theme::{space, type_size},
+        widgets::{dim_ui, scrolled_ui, section_heading_ui},
     },
     evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
@@ -38,11 +38,6 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
             None => dim_ui(ui, "Not kept after this session."),
         };
     });
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
 fn run_ui(

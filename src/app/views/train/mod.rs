@@ -17,6 +17,5 @@ mod view;
 mod workbench;
 
 pub use charts::BottomTab;
-pub use decoders::{DecoderResult, DecodersState};
-pub use drawn::{Drawn, Frames};
+pub use decoders::DecoderResult;
 pub use state::TrainView;

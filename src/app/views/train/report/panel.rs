@@ -13,7 +13,7 @@ use crate::{
             shown_figure::ShownPicture,
             state::TrainView,
         },
-        widgets::{Column, Row, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+        widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
     },
     evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
@@ -199,11 +199,6 @@ fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).chain(['.']).collect()
-}
-
-fn dim_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
 /// Returns the worst node, if the user wants to see it.
