@@ -114,7 +114,7 @@ impl Driver {
                 panic!("{what} never came; the window shows {:#?}", self.texts());
             }
             // One frame answers all that was asked before it.
-            self.asked.try_iter().for_each(drop);
+            while self.asked.try_recv().is_ok() {}
             self.harness.step();
         }
     }
@@ -122,7 +122,7 @@ impl Driver {
     /// Whether the window comes to draw no more frames: it asks for none, at no delay.
     pub(crate) fn comes_to_rest(&mut self) -> bool {
         self.harness.run();
-        self.asked.try_iter().for_each(drop);
+        while self.asked.try_recv().is_ok() {}
         self.harness.step();
         self.asked.try_iter().next().is_none()
     }
