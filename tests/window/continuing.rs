@@ -53,8 +53,7 @@ fn start_endless(driver: &mut Driver) {
 /// Presses Pause and waits until the last epoch under way is shown.
 fn pause(driver: &mut Driver) {
     driver.click("⏸ Pause");
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    driver.harness().run_steps(2);
+    driver.wait_for_hold();
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
