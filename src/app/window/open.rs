@@ -2,8 +2,7 @@ use directories::ProjectDirs;
 use eframe::{NativeOptions, egui};
 use thiserror::Error;
 
-use super::DecouplerWindow;
-use crate::app::DialogKind;
+use super::{DecouplerWindow, DialogKind};
 
 /// Why the window cannot open.
 #[derive(Debug, Error)]
