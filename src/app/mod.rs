@@ -13,6 +13,7 @@ mod experiments;
 mod export_kind;
 mod file_task;
 mod identifiability;
+mod job;
 mod open;
 mod panels;
 mod paper_figure;
