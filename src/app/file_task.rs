@@ -1,13 +1,17 @@
 use std::path::PathBuf;
 
-use super::{
-    action::Action,
-    experiments::{ExperimentAction, ExperimentFile, Topic},
-    export_kind::ExportKind,
-    shown_figure::ShownPicture,
-    trade::{TradeAction, TradeFile},
+use crate::{
+    app::{
+        training_worker::ExportKind,
+        views::{
+            experiments::{ExperimentAction, ExperimentFile, Topic},
+            trade_off::{TradeAction, TradeFile},
+            train::shown_figure::ShownPicture,
+        },
+        window::Action,
+    },
+    export::figures::PictureFormat,
 };
-use crate::export::figures::PictureFormat;
 
 /// What is to be done with a file once its path is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,16 +3,11 @@
 //! Panels take colours, sizes and distances from here and write none of their own.
 
 mod colour_map;
-mod components;
 mod fonts;
 mod style;
 mod tokens;
 
 pub use colour_map::ColourMap;
-pub use components::{
-    PrimaryButton, card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button,
-    progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, slider_style, tabs_ui,
-};
 pub use fonts::{font_definitions, semibold};
 pub use style::{apply, install};
 pub use tokens::{Palette, SPACE, TypeSizes, radius, space, type_size};

@@ -1,14 +1,19 @@
-use super::{DecouplerWindow, decoupler_window::wake};
+use super::{Action, DecouplerWindow, decoupler_window::wake};
 use crate::{
     app::{
-        action::Action,
-        experiments,
-        identifiability::{self, IdentifiabilityAction},
-        paper_figure::PaperFigure,
-        runs::{self, RunsAction, RunsRequest},
-        state::{Notice, Phase, RightCard, RunView, Saving, View},
-        theme, trade,
-        worker::{Request, Worker},
+        shared::{
+            Notice, Phase, RightCard, RunView, Saving, View,
+            run_list::{self, RunsRequest},
+        },
+        theme,
+        training_worker::{Request, Worker},
+        views::{
+            compare::RunsAction,
+            experiments,
+            identifiability::{self, IdentifiabilityAction},
+            trade_off,
+            train::PaperFigure,
+        },
     },
     evaluation::SimulatedSettings,
     training::StopReason,
@@ -127,9 +132,9 @@ impl DecouplerWindow {
                     self.configure(settings);
                 }
             }
-            Action::Runs(action) => runs::apply(action, state, &self.runs),
+            Action::Runs(action) => run_list::apply(action, state, &self.runs),
             Action::Trade(action) => {
-                if let Some(settings) = trade::apply(action, state, &mut self.trade) {
+                if let Some(settings) = trade_off::apply(action, state, &mut self.trade) {
                     state.view = View::Train;
                     self.configure(settings);
                 }

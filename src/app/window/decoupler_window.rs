@@ -2,19 +2,23 @@ use std::{path::PathBuf, sync::Arc};
 
 use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
+use super::{notice::notice_ui, save_form::save_form_ui, status_line::status_line_ui, top_bar::top_bar_ui};
 use crate::app::{
-    decoders::DecoderMeasuring,
     dialogs::{DialogKind, Dialogs},
-    experiments::{self, ExperimentWorker},
-    identifiability::{self, IdentifiabilityWorker},
-    panels,
-    runs::{self, RunsRequest, RunsWorker},
-    shortcuts::pressed_shortcuts,
-    state::{State, View},
+    shared::{
+        State, View,
+        run_list::{RunsRequest, RunsWorker},
+    },
     theme::{self, Theme, space},
     threads::Wake,
-    trade::{self, TradeWorker},
-    worker::Worker,
+    training_worker::Worker,
+    views::{
+        compare,
+        experiments::{self, ExperimentWorker},
+        identifiability::{self, IdentifiabilityWorker},
+        trade_off::{self, TradeWorker},
+        train::{self, decoders::DecoderMeasuring, pressed_shortcuts},
+    },
 };
 
 /// The window: its state, the worker, and the one place where actions are applied.
@@ -75,13 +79,13 @@ impl DecouplerWindow {
         let mut actions = match state.view {
             View::Train => pressed_shortcuts(ui.ctx(), state),
             View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
-            View::TradeOff => trade::pressed_shortcuts(ui.ctx(), state),
+            View::TradeOff => trade_off::pressed_shortcuts(ui.ctx(), state),
             View::Compare | View::Identifiability => Vec::new(),
         };
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let layout = panels::WorkbenchLayout::of_width(ui.available_width());
-        let has_report_beside = layout == panels::WorkbenchLayout::ReportBeside;
+        let layout = train::WorkbenchLayout::of_width(ui.available_width());
+        let has_report_beside = layout == train::WorkbenchLayout::ReportBeside;
         let left = if has_report_beside || !is_training_view {
             space(68)
         } else {
@@ -97,16 +101,16 @@ impl DecouplerWindow {
         Panel::top("top bar")
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
-            .show(ui, |ui| actions.extend(panels::top_bar_ui(ui, state)));
+            .show(ui, |ui| actions.extend(top_bar_ui(ui, state)));
         Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| {
                 match state.view {
-                    View::Train | View::Compare => panels::status_line_ui(ui, state),
+                    View::Train | View::Compare => status_line_ui(ui, state),
                     View::Experiments => experiments::status_ui(ui, &state.experiments),
                     View::Identifiability => identifiability::status_ui(ui, &state.identifiability),
-                    View::TradeOff => trade::status_ui(ui, &state.trade),
+                    View::TradeOff => trade_off::status_ui(ui, &state.trade),
                 };
             });
         Panel::left("configuration")
@@ -115,11 +119,11 @@ impl DecouplerWindow {
             .frame(panel(side))
             .show(ui, |ui| {
                 actions.extend(match state.view {
-                    View::Train => panels::configuration_ui(ui, state),
+                    View::Train => train::configuration_ui(ui, state),
                     View::Experiments => experiments::form_ui(ui, state),
-                    View::Compare => runs::run_list_ui(ui, state),
+                    View::Compare => compare::run_list_ui(ui, state),
                     View::Identifiability => identifiability::form_ui(ui, state),
-                    View::TradeOff => trade::form_ui(ui, state),
+                    View::TradeOff => trade_off::form_ui(ui, state),
                 });
             });
         if has_report_beside && is_training_view {
@@ -127,20 +131,20 @@ impl DecouplerWindow {
                 .exact_size(space(96))
                 .resizable(false)
                 .frame(panel(side))
-                .show(ui, |ui| actions.extend(panels::report_ui(ui, state)));
+                .show(ui, |ui| actions.extend(train::report_ui(ui, state)));
         }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         egui::CentralPanel::default().frame(background).show(ui, |ui| {
-            actions.extend(panels::notice_ui(ui, state));
+            actions.extend(notice_ui(ui, state));
             actions.extend(match state.view {
-                View::Train => panels::workbench_ui(ui, state, layout),
+                View::Train => train::workbench_ui(ui, state, layout),
                 View::Experiments => experiments::experiments_ui(ui, state),
-                View::Compare => runs::compare_ui(ui, state),
+                View::Compare => compare::compare_ui(ui, state),
                 View::Identifiability => identifiability::identifiability_ui(ui, state),
-                View::TradeOff => trade::trade_ui(ui, state),
+                View::TradeOff => trade_off::trade_ui(ui, state),
             });
         });
-        actions.extend(panels::save_form_ui(ui, state));
+        actions.extend(save_form_ui(ui, state));
         for action in actions {
             self.apply(action);
             self.ctx.request_repaint();
@@ -169,7 +173,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::app::{ExportKind, Notice, Phase, action::Action};
+    use crate::app::{ExportKind, Notice, Phase, window::Action};
 
     fn window() -> DecouplerWindow {
         let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();

@@ -1,18 +1,16 @@
 use std::sync::Arc;
 
 use super::{
-    DecouplerWindow,
+    Action, DecouplerWindow,
     applying::{have_same_sets, have_same_test_set},
     decoupler_window::wake,
 };
 use crate::{
     app::{
-        action::Action,
         dialogs::Answer,
-        experiments, identifiability, runs,
-        state::{Notice, Phase, Preview, RunView},
-        trade,
-        worker::Event,
+        shared::{Notice, Phase, Preview, RunView, run_list},
+        training_worker::Event,
+        views::{experiments, identifiability, trade_off},
     },
     evaluation::SimulatedSettings,
 };
@@ -35,9 +33,9 @@ impl DecouplerWindow {
             }
         }
         experiments::take_news(&mut self.state, &self.experiments);
-        runs::take_news(&mut self.state, &self.runs);
+        run_list::take_news(&mut self.state, &self.runs);
         identifiability::take_news(&mut self.state, &mut self.identifiability);
-        trade::take_news(&mut self.state, &self.trade);
+        trade_off::take_news(&mut self.state, &self.trade);
         self.measuring.take_news(&mut self.state.decoders);
         while let Some(answer) = self.dialogs.next_answer() {
             match answer {
@@ -139,7 +137,7 @@ impl DecouplerWindow {
             },
             // The network is another one by now.
             Event::Networks(..) => {}
-            Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
+            Event::Finished(Ok(file)) => run_list::keep(state, *file, &self.runs),
             Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
             Event::Exported(Ok(path)) => {
                 state.typed = None;

@@ -1,0 +1,198 @@
+use std::ops::RangeInclusive;
+
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
+
+use super::{
+    Analysis, IdentifiabilityAction, IdentifiabilityState, facts::facts_ui, singular_values::singular_values_ui,
+};
+use crate::{
+    app::{
+        shared::State,
+        surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
+        test_view::Frame,
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui},
+        window::Action,
+    },
+    export::format_number,
+};
+
+/// The middle of the Identifiability view: pattern and sensitivity above, singular values and what they come to below.
+pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
+    let mut actions = Vec::new();
+    let shown = &state.identifiability;
+    let whole = ui.available_rect_before_wrap();
+    let Some(analysis) = &shown.analysis else {
+        card_ui(ui, whole, |ui| match &shown.problem {
+            Some(problem) => {
+                note_ui(ui, problem);
+            }
+            None => placeholder_ui(ui, "The singular values are being computed."),
+        });
+        return actions;
+    };
+    let gap = space(2);
+    let lower_height = (0.44 * whole.height()).clamp(space(60), space(100));
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+    let upper = upper.with_max_y(upper.max.y - gap);
+    let width = 0.5 * (upper.width() - gap);
+    let place = shown.place_of_axis(analysis.question.scene.movement.axes());
+    let sides = [
+        Side {
+            title: "Worst-seen deformation",
+            label: "Worst-seen deformation of each row",
+            frame: &analysis.patterns[place],
+            colours: Colours::Pattern,
+            range: -1.0..=1.0,
+            mode: state.look.mode,
+        },
+        Side {
+            title: "Sensitivity of each node",
+            label: "Sensitivity of each node",
+            frame: &analysis.sensitivities[place],
+            colours: Colours::Sensitivity,
+            range: sensitivity_range(analysis),
+            mode: ViewMode::Top,
+        },
+    ];
+    for (number, side) in sides.iter().enumerate() {
+        let left = upper.left() + (width + gap) * number as f32;
+        let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
+        card_ui(ui, card, |ui| side.show_ui(ui, state, analysis, &mut actions));
+    }
+    let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
+    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
+        singular_values_ui(ui, analysis);
+    });
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "identifiability facts", |ui| {
+            if let Some(problem) = &shown.problem {
+                note_ui(ui, problem);
+            }
+            facts_ui(ui, analysis);
+        });
+    });
+    ui.allocate_rect(whole, Sense::hover());
+    actions
+}
+
+/// From no sensitivity to the largest of any axis.
+fn sensitivity_range(analysis: &Analysis) -> RangeInclusive<f64> {
+    let nodes = analysis.sensitivities.iter().flat_map(|frame| &frame.nodes_mm);
+    let largest = nodes.map(|node| node.z).filter(|z| z.is_finite()).fold(0.0, f64::max);
+    0.0..=largest.max(f64::MIN_POSITIVE)
+}
+
+/// One of the two pictures.
+struct Side<'a> {
+    title: &'static str,
+    label: &'static str,
+    frame: &'a Frame,
+    colours: Colours,
+    range: RangeInclusive<f64>,
+    mode: ViewMode,
+}
+
+impl Side<'_> {
+    fn show_ui(&self, ui: &mut Ui, state: &State, analysis: &Analysis, actions: &mut Vec<Action>) {
+        let theme = Theme::of(ui);
+        ui.horizontal(|ui| {
+            ui.set_min_height(space(7));
+            ui.label(RichText::new(self.title).font(semibold(type_size().title)));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| match self.colours {
+                Colours::Pattern => {
+                    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+                    let picked = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false);
+                    actions.extend(picked.map(Action::SetViewMode));
+                }
+                _ => axes_ui(ui, &state.identifiability, analysis, actions),
+            });
+        });
+        let space_left = ui.available_rect_before_wrap();
+        let (picture, scale) = space_left.split_left_right_at_x(space_left.right() - ColourBar::WIDTH);
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(picture));
+        let view = SurfaceView {
+            label: self.label,
+            grid: analysis.surface.grid(),
+            values_mm: &self.frame.grid_mm,
+            nodes_mm: &self.frame.nodes_mm,
+            range_mm: self.range.clone(),
+            colours: self.colours,
+            mode: self.mode,
+            highlight: state.look.node,
+            theme,
+        };
+        let shown = view.show(&mut slot, state.look.camera);
+        if shown.camera != state.look.camera {
+            actions.push(Action::MoveCamera(shown.camera));
+        }
+        if shown.response.contains_pointer() && shown.hovered_node != state.look.node {
+            actions.push(Action::HoverNode(shown.hovered_node));
+        }
+        shown.node_tooltip_ui(|ui, node| self.node_ui(ui, analysis, node));
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
+        let bar = ColourBar {
+            title: self.colours.title(),
+            range: self.range.clone(),
+            colours: self.colours,
+            theme,
+        };
+        bar.show(&mut slot, scale.height());
+    }
+
+    fn node_ui(&self, ui: &mut Ui, analysis: &Analysis, node: usize) {
+        let per_row = analysis.question.sensor.scale.nodes_per_row();
+        let (Some(at), Some(row)) = (self.frame.nodes_mm.get(node), analysis.rows.get(node / per_row)) else {
+            return;
+        };
+        let name = format!("Row {}, node {}", row.row + 1, node % per_row + 1);
+        ui.label(RichText::new(name).font(semibold(type_size().note)));
+        let value = format_number(at.z);
+        let text = match self.colours {
+            Colours::Pattern => format!("{value} of the largest deflection"),
+            _ => format!("readings change by {value} per mm"),
+        };
+        ui.label(RichText::new(text).size(type_size().note));
+    }
+}
+
+/// Which coordinate is shown, where several are unknown.
+fn axes_ui(ui: &mut Ui, shown: &IdentifiabilityState, analysis: &Analysis, actions: &mut Vec<Action>) {
+    let axes = analysis.question.scene.movement.axes().indices();
+    if axes.len() < 2 {
+        return;
+    }
+    let options = [(0, "x"), (1, "y"), (2, "z")];
+    let picked = segmented_ui(ui, "Axis on show", &options, shown.axis, false);
+    actions.extend(picked.map(IdentifiabilityAction::ShowAxis).map(Action::from));
+}
+
+/// What is looked at, in the line at the bottom.
+pub fn status_ui(ui: &mut Ui, shown: &IdentifiabilityState) {
+    let palette = Theme::of(ui).palette;
+    let (colour, text) = match (&shown.problem, &shown.analysis) {
+        _ if shown.is_pending => (palette.accent, "Computing".to_owned()),
+        (Some(_), _) => (
+            palette.bad,
+            "This sensor or scene is impossible: the note says why".to_owned(),
+        ),
+        (None, Some(analysis)) => match analysis.warnings.len() {
+            0 => (palette.good, "Nothing stands in the way of decoupling".to_owned()),
+            1 => (palette.warning, "1 warning".to_owned()),
+            count => (palette.warning, format!("{count} warnings")),
+        },
+        (None, None) => (palette.dim, "Nothing computed yet".to_owned()),
+    };
+    ui.horizontal_centered(|ui| {
+        ui.spacing_mut().item_spacing.x = space(4);
+        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+        ui.painter().circle_filled(dot.center(), 4.0, colour);
+        ui.label(RichText::new(text).size(type_size().note));
+        if let Some(analysis) = &shown.analysis {
+            let sensor = &analysis.question.sensor;
+            let text = format!("{}, {} rows read", sensor.scale, analysis.rows.len());
+            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+        }
+    });
+}
