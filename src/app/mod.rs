@@ -14,13 +14,14 @@
 
 mod dialogs;
 mod file_task;
+mod files;
 mod job;
 mod plotting;
+mod preview;
 mod shared;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
-mod threads;
 mod training_worker;
 mod views;
 mod widgets;

@@ -1,10 +1,17 @@
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::{Arc, mpsc::Sender},
+    time::Duration,
+};
 
 use ndarray::Array2;
 
 use super::export_kind::ExportKind;
 use crate::{
-    app::test_view::{TestView, TestViewError},
+    app::{
+        job::JobError,
+        test_view::{TestView, TestViewError},
+    },
     evaluation::{Baselines, Errors, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
@@ -14,10 +21,6 @@ use crate::{
 /// What the window asks of the worker.
 #[derive(Debug)]
 pub enum Request {
-    /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
-    Preview(Box<SimulatedSettings>),
-    /// Measure what will stand beside the network of these settings. Only the newest one counts.
-    Baselines(Box<SimulatedSettings>),
     /// Begin a training; one in progress is dropped.
     Train(Box<SimulatedSettings>),
     /// Take up the training saved in this file and hold it; one in progress is dropped.
@@ -34,22 +37,19 @@ pub enum Request {
     Stop,
     /// Hand over the best networks so far; the answer bears this number.
     Networks(u64),
-    /// Write a file about the present training.
-    Export(ExportKind, PathBuf),
+    /// Write a file about the present training, and tell here how that went.
+    Export(ExportKind, PathBuf, Sender<Result<(), String>>),
 }
 
 /// What the worker tells the window.
 #[derive(Debug)]
 pub enum Event {
-    /// The test set of these settings.
-    Previewed(Box<SimulatedSettings>, Result<TestView, TestViewError>),
-    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
-    /// training would explain.
-    Compared(Box<SimulatedSettings>, Option<Baselines>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
     /// A saved training stands where it was saved, or why it cannot.
     Opened(Result<Box<Began>, String>),
+    /// A training that was cancelled while it was prepared has not begun.
+    Abandoned,
     /// The training goes on with these settings, or why it cannot.
     Continued(Result<Box<SimulatedSettings>, String>),
     /// News of the training.
@@ -58,8 +58,8 @@ pub enum Event {
     Finished(Result<Box<NetworkFile>, String>),
     /// The best networks so far, or why there are none; with the number of the request.
     Networks(u64, Result<Box<Networks>, String>),
-    /// A file was written, or why not.
-    Exported(Result<PathBuf, String>),
+    /// The thread has ended, and why, unless it was to end.
+    Died(Option<JobError>),
 }
 
 /// What is known when a training begins.
@@ -88,6 +88,19 @@ pub struct Progress {
     pub result: RunResult,
     /// Why the training has ended, if it has.
     pub stop_reason: Option<StopReason>,
+}
+
+impl Progress {
+    /// Takes the place of an older one that nobody saw: its epochs, and how its starts stood, are not lost.
+    pub fn replace(&mut self, older: Self) {
+        let mut epochs = older.epochs;
+        if let Some(first) = self.epochs.first() {
+            epochs.retain(|record| record.epoch < first.epoch);
+        }
+        epochs.append(&mut self.epochs);
+        self.epochs = epochs;
+        self.starts = self.starts.take().or(older.starts);
+    }
 }
 
 /// What the best network so far makes of the test set, and what it cost.

@@ -9,4 +9,5 @@ mod message;
 
 pub use export_kind::{ExportKind, file_name};
 pub use handle::Worker;
+pub use labour::LOST;
 pub use message::{Began, Event, Progress, Request, RunResult};

@@ -1,12 +1,12 @@
+use std::sync::mpsc::channel;
+
 use super::{Action, DecouplerWindow, decoupler_window::wake};
 use crate::{
     app::{
-        shared::{
-            Notice, Phase, RightCard, RunView, Saving, View,
-            run_list::{self, RunsRequest},
-        },
+        preview,
+        shared::{Phase, RightCard, RunView, Saving, View, run_list},
         theme,
-        training_worker::{Request, Worker},
+        training_worker::{LOST, Request, Worker},
         views::{
             compare::RunsAction,
             experiments,
@@ -57,7 +57,13 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Continue(state.draft.training));
             }
             Action::Continue => {}
-            Action::Stop => self.worker.ask(Request::Stop),
+            Action::Stop => {
+                self.worker.ask(Request::Stop);
+                // What was being prepared does not begin; the training before it stays.
+                if state.phase == Phase::Preparing {
+                    state.phase = state.phase_at_rest();
+                }
+            }
             Action::ShowSnapshot(snapshot) => {
                 state.look.snapshot = snapshot;
                 state.refresh_frames();
@@ -86,9 +92,9 @@ impl DecouplerWindow {
                 theme::apply(&self.ctx, is_dark);
             }
             Action::ChooseFile(task) => {
-                let ctx = self.ctx.clone();
-                self.dialogs
-                    .ask(task, &state.suggested_path(task), move || ctx.request_repaint());
+                if !self.dialogs.ask(task, &state.suggested_path(task), wake(&self.ctx)) {
+                    self.apply(Action::TypePath(task));
+                }
             }
             Action::TypePath(task) => {
                 let typed = state.typed.clone().filter(|typed| typed.task == task);
@@ -105,7 +111,10 @@ impl DecouplerWindow {
             }
             Action::Export(kind, path) => {
                 state.typed = state.saving.take();
-                self.worker.ask(Request::Export(kind, path));
+                let (send, written) = channel();
+                self.worker.ask(Request::Export(kind, path.clone(), send));
+                self.files
+                    .write(path, move |_| written.recv().unwrap_or_else(|_| Err(LOST.to_owned())));
             }
             Action::ShowView(view) => {
                 state.view = view;
@@ -119,11 +128,13 @@ impl DecouplerWindow {
                 self.configure(settings);
             }
             Action::Identifiability(action) => identifiability::apply(action, state, &mut self.identifiability),
-            Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
+            Action::Experiments(action) => {
+                experiments::apply(action, state, &mut self.experiments, &mut self.files);
+            }
             Action::ExportPicture(picture, path) => {
                 state.typed = state.saving.take();
                 if let Some(picture) = picture.of(state) {
-                    self.runs.ask(RunsRequest::Write(Box::new(picture), path));
+                    self.files.write(path, move |path| picture.write(path));
                 }
             }
             Action::Runs(RunsAction::TakeSettings(id)) => {
@@ -134,7 +145,7 @@ impl DecouplerWindow {
             }
             Action::Runs(action) => run_list::apply(action, state, &self.runs),
             Action::Trade(action) => {
-                if let Some(settings) = trade_off::apply(action, state, &mut self.trade) {
+                if let Some(settings) = trade_off::apply(action, state, &mut self.trade, &mut self.files) {
                     state.view = View::Train;
                     self.configure(settings);
                 }
@@ -150,15 +161,11 @@ impl DecouplerWindow {
             }
             Action::CancelSave => state.saving = None,
             Action::DismissNotice => state.notice = None,
-            Action::RestartWorker => match Worker::start(wake(&self.ctx)) {
-                Ok(worker) => {
-                    self.worker = worker;
-                    state.phase = state.phase_at_rest();
-                    state.notice = None;
-                    self.ask_for_what_is_missing();
-                }
-                Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
-            },
+            Action::RestartWorker => {
+                self.worker = Worker::start(wake(&self.ctx));
+                state.phase = state.phase_at_rest();
+                state.notice = None;
+            }
         }
     }
 
@@ -208,15 +215,15 @@ impl DecouplerWindow {
     }
 
     /// Asks for what the settings are to show before a training and the window does not know yet.
-    pub(super) fn ask_for_what_is_missing(&self) {
+    pub(super) fn ask_for_what_is_missing(&mut self) {
         let state = &self.state;
-        let draft = Box::new(state.draft);
+        let draft = state.draft;
         match (&state.preview, &state.run) {
             (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
-                self.worker.ask(Request::Baselines(draft));
+                preview::compare(&mut self.previews, draft);
             }
             (None, Some(run)) if have_same_test_set(&run.settings, &draft) => {}
-            _ => self.worker.ask(Request::Preview(draft)),
+            _ => preview::draw(&mut self.previews, draft),
         }
     }
 }

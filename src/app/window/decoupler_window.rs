@@ -5,18 +5,20 @@ use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 use super::{notice::notice_ui, save_form::save_form_ui, status_line::status_line_ui, top_bar::top_bar_ui};
 use crate::app::{
     dialogs::{DialogKind, Dialogs},
+    files::Files,
+    job::{Job, Wake},
+    preview::PreviewEvent,
     shared::{
         State, View,
         run_list::{RunsRequest, RunsWorker},
     },
     theme::{self, Theme, space},
-    threads::Wake,
     training_worker::Worker,
     views::{
         compare,
-        experiments::{self, ExperimentWorker},
+        experiments::{self, ExperimentEvent},
         identifiability::{self, IdentifiabilityWorker},
-        trade_off::{self, TradeWorker},
+        trade_off::{self, TradeEvent},
         train::{self, decoders::DecoderMeasuring, pressed_shortcuts},
     },
 };
@@ -26,10 +28,12 @@ use crate::app::{
 pub struct DecouplerWindow {
     pub(super) state: State,
     pub(super) worker: Worker,
-    pub(super) experiments: ExperimentWorker,
+    pub(super) previews: Job<PreviewEvent>,
+    pub(super) files: Files,
+    pub(super) experiments: Job<ExperimentEvent>,
     pub(super) runs: RunsWorker,
     pub(super) identifiability: IdentifiabilityWorker,
-    pub(super) trade: TradeWorker,
+    pub(super) trade: Job<TradeEvent>,
     pub(super) measuring: DecoderMeasuring,
     pub(super) dialogs: Dialogs,
     pub(super) ctx: Context,
@@ -44,14 +48,16 @@ impl DecouplerWindow {
         let is_dark = ctx.system_theme() != Some(egui::Theme::Light);
         theme::install(ctx, is_dark);
         let wake = wake(ctx);
-        let window = Self {
+        let mut window = Self {
             state: State::new(is_dark),
-            worker: Worker::start(Arc::clone(&wake))?,
-            experiments: ExperimentWorker::new(Arc::clone(&wake)),
-            runs: RunsWorker::start(Arc::clone(&wake))?,
+            worker: Worker::start(Arc::clone(&wake)),
+            previews: Job::new("preview", Arc::clone(&wake)),
+            files: Files::new(Arc::clone(&wake)),
+            experiments: Job::new("experiments", Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake)),
             identifiability: IdentifiabilityWorker::new(Arc::clone(&wake)),
-            trade: TradeWorker::new(wake),
-            measuring: DecoderMeasuring::default(),
+            trade: Job::new("trade-off", Arc::clone(&wake)),
+            measuring: DecoderMeasuring::new(wake),
             dialogs: Dialogs::new(dialogs),
             ctx: ctx.clone(),
         };

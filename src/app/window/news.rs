@@ -3,11 +3,11 @@ use std::sync::Arc;
 use super::{
     Action, DecouplerWindow,
     applying::{have_same_sets, have_same_test_set},
-    decoupler_window::wake,
 };
 use crate::{
     app::{
         dialogs::Answer,
+        preview::PreviewEvent,
         shared::{Notice, Phase, Preview, RunView, run_list},
         training_worker::Event,
         views::{experiments, identifiability, trade_off},
@@ -18,40 +18,41 @@ use crate::{
 impl DecouplerWindow {
     /// Takes what the worker and the dialogs have to tell.
     pub fn take_news(&mut self) {
-        loop {
-            match self.worker.next_event() {
-                Ok(Some(event)) => self.take_event(event),
-                Ok(None) => break,
-                Err(_) => {
-                    if self.state.phase != Phase::Died {
-                        self.state.phase = Phase::Died;
-                        let text = "The training thread ended unexpectedly. What is shown can still be looked at.";
-                        self.state.notice = Some(Notice::Failed(text.to_owned()));
-                    }
-                    break;
+        while let Some(event) = self.worker.next_event() {
+            self.take_event(event);
+        }
+        while let Some(event) = self.previews.next_event() {
+            self.take_preview(event);
+        }
+        while let Some(written) = self.files.next_written() {
+            self.state.notice = Some(match written {
+                Ok(path) => {
+                    self.state.typed = None;
+                    Notice::Done(format!("Saved {}", path.display()))
                 }
-            }
+                Err(reason) => Notice::Failed(reason),
+            });
         }
         experiments::take_news(&mut self.state, &self.experiments);
         run_list::take_news(&mut self.state, &self.runs);
         identifiability::take_news(&mut self.state, &mut self.identifiability);
         trade_off::take_news(&mut self.state, &self.trade);
         self.measuring.take_news(&mut self.state.decoders);
-        while let Some(answer) = self.dialogs.next_answer() {
+        while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(task, path) => self.apply(task.at(path)),
-                Answer::NoDialog(task) => self.apply(Action::TypePath(task)),
+                Answer::Chosen(path) => self.apply(task.at(path)),
+                Answer::NoDialog => self.apply(Action::TypePath(task)),
                 Answer::Cancelled => {}
             }
         }
     }
 
-    fn take_event(&mut self, event: Event) {
+    fn take_preview(&mut self, event: PreviewEvent) {
         let state = &mut self.state;
         match event {
             // Settings that have moved on meanwhile have asked for another test set, or need none.
-            Event::Previewed(settings, _) if !have_same_test_set(&settings, &state.draft) => {}
-            Event::Previewed(settings, Ok(test)) => {
+            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &state.draft) => {}
+            PreviewEvent::Drawn(settings, Ok(test)) => {
                 if !state.phase.is_busy() {
                     state.preview = Some(Preview {
                         settings: *settings,
@@ -62,14 +63,21 @@ impl DecouplerWindow {
                     self.ask_for_what_is_missing();
                 }
             }
-            Event::Previewed(_, Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
-            Event::Compared(settings, baselines) => {
+            PreviewEvent::Drawn(_, Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
+            PreviewEvent::Compared(settings, baselines) => {
                 if let Some(preview) = &mut state.preview
                     && have_same_sets(&settings, &state.draft)
                 {
                     preview.baselines = baselines;
                 }
             }
+            PreviewEvent::Failed(error) => state.notice = Some(Notice::Failed(error.to_string())),
+        }
+    }
+
+    fn take_event(&mut self, event: Event) {
+        let state = &mut self.state;
+        match event {
             Event::Began(Ok(began)) => {
                 self.measuring.forget(&mut state.decoders);
                 state.preview = None;
@@ -127,10 +135,7 @@ impl DecouplerWindow {
             Event::Networks(number, networks) if self.measuring.awaits(number) => match (networks, &state.run) {
                 (Ok(networks), Some(run)) => {
                     let test = Arc::clone(&run.test.set);
-                    let measured = self.measuring.begin(run.settings, *networks, test, wake(&self.ctx));
-                    if let Err(error) = measured {
-                        state.decoders.end(&format!("no thread could be started: {error}"));
-                    }
+                    self.measuring.begin(run.settings, *networks, test);
                 }
                 (Err(reason), _) => state.decoders.end(&reason),
                 (Ok(_), None) => {}
@@ -139,11 +144,18 @@ impl DecouplerWindow {
             Event::Networks(..) => {}
             Event::Finished(Ok(file)) => run_list::keep(state, *file, &self.runs),
             Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
-            Event::Exported(Ok(path)) => {
-                state.typed = None;
-                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
+            Event::Died(reason) => {
+                state.phase = Phase::Died;
+                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                let text = format!("The training ended unexpectedly{reason}. What is shown can still be looked at.");
+                state.notice = Some(Notice::Failed(text));
             }
-            Event::Exported(Err(error)) => state.notice = Some(Notice::Failed(error)),
+            // The worker keeps these to itself.
+            Event::Abandoned => {}
+        }
+        if self.worker.is_preparing() {
+            // This was news of the training before.
+            self.state.phase = Phase::Preparing;
         }
     }
 }

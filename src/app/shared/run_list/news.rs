@@ -13,20 +13,7 @@ use crate::{
 
 /// Takes what the thread has to tell.
 pub fn take_news(state: &mut State, worker: &RunsWorker) {
-    loop {
-        let event = match worker.next_event() {
-            Ok(Some(event)) => event,
-            Ok(None) => return,
-            Err(_) => {
-                if !std::mem::replace(&mut state.runs.has_worker_died, true) {
-                    state.runs.path = None;
-                    let text = "The thread that keeps the run list ended unexpectedly: runs are not kept from now on. \
-                                Start the program again.";
-                    state.notice = Some(Notice::Failed(text.to_owned()));
-                }
-                return;
-            }
-        };
+    while let Some(event) = worker.next_event() {
         match event {
             RunsEvent::Loaded(path, Ok(FoundWorkspace { workspace, warning })) => {
                 state.runs.path = Some(path);
@@ -54,11 +41,12 @@ pub fn take_news(state: &mut State, worker: &RunsWorker) {
                 }
                 state.notice = Some(Notice::Failed(reason));
             }
-            RunsEvent::Written(Ok(path)) => {
-                state.typed = None;
-                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
+            RunsEvent::Died(reason) => {
+                state.runs.path = None;
+                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                let text = format!("Runs are not kept from now on{reason}. Start the program again.");
+                state.notice = Some(Notice::Failed(text));
             }
-            RunsEvent::Written(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
         }
     }
 }

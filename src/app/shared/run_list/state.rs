@@ -27,8 +27,6 @@ pub struct RunsState {
     pub card: RightCard,
     /// The run that the user is asked about before it is removed.
     pub removing: Option<u64>,
-    /// Whether the thread that keeps them has ended, which the user was told.
-    pub has_worker_died: bool,
     /// Where runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
 }

@@ -3,28 +3,26 @@
 
 use std::{
     collections::VecDeque,
-    fmt,
     fs::{self, File},
     path::{Path, PathBuf},
     sync::{
         Arc,
         mpsc::{Receiver, Sender, channel},
     },
-    thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use super::Compared;
 use crate::{
     app::{
+        job::{Job, JobError, Wake},
         test_view::{Frame, TestView},
-        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
-        views::train::shown_figure::Undrawn,
     },
-    export::{
-        FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError,
-        figures::{PictureError, PictureFormat},
-    },
+    export::{FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError},
 };
+
+/// Longest time that closing waits for the files.
+const LONGEST_WRITE: Duration = Duration::from_secs(5);
 
 /// What the window asks of the thread.
 pub enum RunsRequest {
@@ -34,8 +32,6 @@ pub enum RunsRequest {
     Save(Workspace),
     /// Prepare this run to be drawn in one of the two places.
     Prepare(usize, u64, Arc<NetworkFile>),
-    /// Draw and write a picture.
-    Write(Box<Undrawn>, PathBuf),
 }
 
 /// What the thread tells the window.
@@ -46,57 +42,50 @@ pub enum RunsEvent {
     NotSaved(String),
     /// A run can be drawn, or why not.
     Prepared(usize, Result<Box<Compared>, String>),
-    /// A picture was written, or why not.
-    Written(Result<PathBuf, String>),
+    /// The thread has ended, and why, unless it was to end.
+    Died(Option<JobError>),
 }
 
 /// The window's end of the thread.
+#[derive(Debug)]
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
-    events: Receiver<RunsEvent>,
-    thread: Option<JoinHandle<()>>,
+    job: Job<RunsEvent>,
 }
 
 impl RunsWorker {
     /// Starts the thread. `wake` is called after each event.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn start(wake: Wake) -> std::io::Result<Self> {
+    pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let (outgoing, events) = channel();
-        let report = Report::new(outgoing, wake);
-        let work = move || {
-            yield_to_window();
-            let mut labour = Labour::default();
-            while let Some(request) = labour.next(&incoming) {
-                if let Some(event) = labour.answer(request) {
-                    report.send(event);
+        let mut job = Job::new("run list", wake);
+        job.start(
+            move |report| {
+                let mut labour = Labour::default();
+                while let Some(request) = labour.next(&incoming) {
+                    if let Some(event) = labour.answer(request) {
+                        report.send(event);
+                    }
                 }
-            }
-        };
-        let thread = thread::Builder::new().name("workspace".to_owned()).spawn(work)?;
-        Ok(Self {
+            },
+            |ended| RunsEvent::Died(ended.err()),
+        );
+        Self {
             requests: Some(requests),
-            events,
-            thread: Some(thread),
-        })
+            job,
+        }
     }
 
     /// Asks for something.
     pub fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
-            // The other end is gone only if the thread died, which the next look at the events shows.
+            // The other end is gone only if the thread died, which is the last event.
             let _ = requests.send(request);
         }
     }
 
     /// The next event, if one has come.
-    ///
-    /// # Errors
-    /// The thread has ended.
-    pub fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
-        next_event(&self.events)
+    pub fn next_event(&self) -> Option<RunsEvent> {
+        self.job.next_event()
     }
 }
 
@@ -104,15 +93,7 @@ impl Drop for RunsWorker {
     fn drop(&mut self) {
         // The thread ends when everything asked for is done.
         self.requests = None;
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-impl fmt::Debug for RunsWorker {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RunsWorker").finish_non_exhaustive()
+        self.job.wait(LONGEST_WRITE);
     }
 }
 
@@ -158,10 +139,6 @@ impl Labour {
                 let prepared = prepare(id, &file).map(Box::new);
                 Some(RunsEvent::Prepared(place, prepared))
             }
-            RunsRequest::Write(picture, path) => {
-                let written = write(&picture, &path).map(|()| path);
-                Some(RunsEvent::Written(written.map_err(|error| error.to_string())))
-            }
         }
     }
 
@@ -204,9 +181,4 @@ fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {
     };
     compared.show(0);
     Ok(compared)
-}
-
-fn write(picture: &Undrawn, path: &Path) -> Result<(), PictureError> {
-    let format = PictureFormat::of_path(path)?;
-    picture.draw().save(format, path)
 }

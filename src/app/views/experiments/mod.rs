@@ -27,4 +27,4 @@ pub use panel::form_ui;
 pub use state::{Ending, ExperimentsState, Outcome, Running, SortBy, Topic};
 pub use status::status_ui;
 pub use view::experiments_ui;
-pub use worker::{ExperimentEvent, ExperimentWorker};
+pub use worker::ExperimentEvent;

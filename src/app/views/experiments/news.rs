@@ -4,33 +4,27 @@ use std::{sync::Arc, time::Instant};
 
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
-use super::{ExperimentAction, ExperimentEvent, ExperimentWorker};
+use super::{ExperimentAction, ExperimentEvent, worker};
 use crate::app::{
+    files::Files,
+    job::Job,
     shared::{Notice, State},
     window::Action,
 };
 
 /// Takes what the threads have to tell.
-pub fn take_news(state: &mut State, worker: &ExperimentWorker) {
+pub fn take_news(state: &mut State, job: &Job<ExperimentEvent>) {
     let mut finished = Vec::new();
-    let present = state.experiments.running.map(|running| running.number);
-    while let Some(event) = worker.next_event() {
+    while let Some(event) = job.next_event() {
         match event {
-            // Of one that was cancelled.
-            ExperimentEvent::Finished(number, _) | ExperimentEvent::Ended(number, _) if Some(number) != present => {}
-            ExperimentEvent::Finished(_, trial) => finished.push(*trial),
-            ExperimentEvent::Ended(_, result) => {
+            ExperimentEvent::Finished(trial) => finished.push(*trial),
+            ExperimentEvent::Ended(result) => {
                 state.experiments.record(std::mem::take(&mut finished));
                 state.experiments.end(Instant::now());
                 if let Err(reason) = result {
                     state.notice = Some(Notice::Failed(reason));
                 }
             }
-            ExperimentEvent::Written(Ok(path)) => {
-                state.typed = None;
-                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
-            }
-            ExperimentEvent::Written(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
         }
     }
     if !finished.is_empty() {
@@ -39,14 +33,14 @@ pub fn take_news(state: &mut State, worker: &ExperimentWorker) {
 }
 
 /// Does what the user meant.
-pub fn apply(action: ExperimentAction, state: &mut State, worker: &mut ExperimentWorker) {
+pub fn apply(action: ExperimentAction, state: &mut State, job: &mut Job<ExperimentEvent>, files: &mut Files) {
     let experiments = &mut state.experiments;
     match action {
         ExperimentAction::Choose(topic) => experiments.choose(topic),
         ExperimentAction::Edit(form) => experiments.edit(*form),
-        ExperimentAction::Run => run(state, worker),
+        ExperimentAction::Run => run(state, job),
         ExperimentAction::Cancel => {
-            worker.cancel();
+            job.abandon();
             experiments.end(Instant::now());
         }
         ExperimentAction::Mark(cell) => experiments.marked = Some(cell),
@@ -54,13 +48,14 @@ pub fn apply(action: ExperimentAction, state: &mut State, worker: &mut Experimen
         ExperimentAction::Save(topic, file, path) => {
             state.typed = state.saving.take();
             if let Some(outcome) = state.experiments.outcome_of(topic) {
-                worker.write(topic, file, Arc::clone(&outcome.results), path);
+                let results = Arc::clone(&outcome.results);
+                files.write(path, move |path| file.write(topic, &results, path));
             }
         }
     }
 }
 
-fn run(state: &mut State, worker: &mut ExperimentWorker) {
+fn run(state: &mut State, job: &mut Job<ExperimentEvent>) {
     if state.experiments.running.is_some() {
         return;
     }
@@ -71,13 +66,9 @@ fn run(state: &mut State, worker: &mut ExperimentWorker) {
             return;
         }
     };
-    match worker.run(experiment.clone()) {
-        Ok(number) => {
-            state.notice = None;
-            state.experiments.begin(experiment, number);
-        }
-        Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
-    }
+    state.notice = None;
+    state.experiments.begin(experiment.clone());
+    worker::run(job, experiment);
 }
 
 /// What the keys of this frame mean in this view.

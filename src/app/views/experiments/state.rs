@@ -4,7 +4,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{ExperimentFile, Form, worker::RunNumber};
+use super::{ExperimentFile, Form};
 use crate::{
     evaluation::{
         SimulatedSettings,
@@ -101,8 +101,6 @@ pub struct Running {
     pub time_left: Option<Duration>,
     /// When it began.
     pub begun: Instant,
-    /// By which its news are known.
-    pub(in crate::app) number: RunNumber,
 }
 
 /// How an experiment ended.
@@ -229,7 +227,7 @@ impl ExperimentsState {
     }
 
     /// Makes room for the results of `experiment`.
-    pub(in crate::app) fn begin(&mut self, experiment: Experiment, number: RunNumber) {
+    pub(in crate::app) fn begin(&mut self, experiment: Experiment) {
         let outcome = Outcome::new(experiment);
         self.running = Some(Running {
             topic: self.topic,
@@ -237,7 +235,6 @@ impl ExperimentsState {
             trials: outcome.trials().1,
             time_left: None,
             begun: Instant::now(),
-            number,
         });
         self.marked = None;
         self.sort = SortBy::default();

@@ -46,8 +46,5 @@ pub fn enter(state: &mut State, worker: &mut IdentifiabilityWorker) {
 fn ask(state: &mut State, worker: &mut IdentifiabilityWorker) {
     let shown = &mut state.identifiability;
     shown.is_pending = true;
-    if let Err(error) = worker.ask(shown.question) {
-        shown.is_pending = false;
-        shown.problem = Some(format!("No thread could be started: {error}"));
-    }
+    worker.ask(shown.question);
 }

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use super::{Analysis, Question};
 use crate::{
     evaluation::SimulatedSettings,
@@ -11,7 +13,7 @@ pub struct IdentifiabilityState {
     /// What is asked.
     pub question: Question,
     /// The newest answer; it stays in view while the next is computed.
-    pub analysis: Option<Box<Analysis>>,
+    pub analysis: Option<Arc<Analysis>>,
     /// Why the question has no answer.
     pub problem: Option<String>,
     /// Whether the answer to the question is still to come.

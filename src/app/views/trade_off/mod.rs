@@ -23,4 +23,4 @@ pub use panel::form_ui;
 pub use plan::TradePlan;
 pub use state::{TradeEnding, TradeLimits, TradeOutcome, TradeRunning, TradeState};
 pub use view::{status_ui, trade_ui};
-pub use worker::TradeWorker;
+pub use worker::TradeEvent;

@@ -4,9 +4,11 @@ use std::time::Instant;
 
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
-use super::{TradeAction, TradeState, TradeWorker, worker::TradeEvent};
+use super::{TradeAction, TradeEvent, TradeState, worker};
 use crate::{
     app::{
+        files::Files,
+        job::Job,
         shared::{Notice, State},
         window::Action,
     },
@@ -14,36 +16,33 @@ use crate::{
 };
 
 /// Takes what the threads have to tell.
-pub fn take_news(state: &mut State, worker: &TradeWorker) {
-    while let Some(event) = worker.next_event() {
-        let present = state.trade.running.map(|running| running.number);
+pub fn take_news(state: &mut State, job: &Job<TradeEvent>) {
+    while let Some(event) = job.next_event() {
         match event {
-            // Of one that was cancelled.
-            TradeEvent::Measured(number, ..) | TradeEvent::Ended(number, _) if Some(number) != present => {}
-            TradeEvent::Measured(_, level, point) => state.trade.record(level, *point),
-            TradeEvent::Ended(_, result) => {
+            TradeEvent::Measured(level, point) => state.trade.record(level, *point),
+            TradeEvent::Ended(result) => {
                 state.trade.end(Instant::now());
                 if let Err(reason) = result {
                     state.notice = Some(Notice::Failed(reason));
                 }
             }
-            TradeEvent::Written(Ok(path)) => {
-                state.typed = None;
-                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
-            }
-            TradeEvent::Written(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
         }
     }
 }
 
 /// Does what the user meant; returns the settings of the next training, if they are to change.
-pub fn apply(action: TradeAction, state: &mut State, worker: &mut TradeWorker) -> Option<SimulatedSettings> {
+pub fn apply(
+    action: TradeAction,
+    state: &mut State,
+    job: &mut Job<TradeEvent>,
+    files: &mut Files,
+) -> Option<SimulatedSettings> {
     let trade = &mut state.trade;
     match action {
         TradeAction::Edit(form) => trade.form = *form,
-        TradeAction::Measure => measure(state, worker),
+        TradeAction::Measure => measure(state, job),
         TradeAction::Cancel => {
-            worker.cancel();
+            job.abandon();
             trade.end(Instant::now());
         }
         TradeAction::ShowLevel(level) => {
@@ -60,7 +59,8 @@ pub fn apply(action: TradeAction, state: &mut State, worker: &mut TradeWorker) -
             state.typed = state.saving.take();
             let trade = &state.trade;
             if let Some(outcome) = &trade.outcome {
-                worker.write(file, outcome.levels.clone(), trade.level, path);
+                let (levels, shown) = (outcome.levels.clone(), trade.level);
+                files.write(path, move |path| file.write(&levels, shown, path));
             }
         }
     }
@@ -71,7 +71,7 @@ fn settings_of(trade: &TradeState, point: usize) -> Option<SimulatedSettings> {
     Some(trade.shown()?.points.get(point)?.settings)
 }
 
-fn measure(state: &mut State, worker: &mut TradeWorker) {
+fn measure(state: &mut State, job: &mut Job<TradeEvent>) {
     if !can_measure(state) {
         return;
     }
@@ -82,13 +82,9 @@ fn measure(state: &mut State, worker: &mut TradeWorker) {
             return;
         }
     };
-    match worker.measure(plan.clone()) {
-        Ok(number) => {
-            state.notice = None;
-            state.trade.begin(plan, number);
-        }
-        Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
-    }
+    state.notice = None;
+    state.trade.begin(plan.clone());
+    worker::measure(job, plan);
 }
 
 /// Whether nothing else of this program computes, which would disturb the times.

@@ -1,6 +1,6 @@
 use std::time::{Duration, Instant};
 
-use super::{TradeForm, TradeFormError, TradePlan, worker::TradeNumber};
+use super::{TradeForm, TradeFormError, TradePlan};
 use crate::evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
 
 /// Everything the Trade-off view reads.
@@ -34,8 +34,6 @@ pub struct TradeLimits {
 pub struct TradeRunning {
     /// When it began.
     pub begun: Instant,
-    /// By which its news are known.
-    pub(in crate::app) number: TradeNumber,
 }
 
 /// How a measurement ended.
@@ -87,17 +85,14 @@ impl TradeState {
     }
 
     /// Makes room for the points of `plan`.
-    pub(in crate::app) fn begin(&mut self, plan: TradePlan, number: TradeNumber) {
+    pub(in crate::app) fn begin(&mut self, plan: TradePlan) {
         let level = |&noise: &f64| TradeLevel {
             noise,
             points: Vec::new(),
         };
         self.level = self.level.min(plan.noises.len() - 1);
         self.marked = None;
-        self.running = Some(TradeRunning {
-            begun: Instant::now(),
-            number,
-        });
+        self.running = Some(TradeRunning { begun: Instant::now() });
         self.outcome = Some(TradeOutcome {
             levels: plan.noises.iter().map(level).collect(),
             plan,

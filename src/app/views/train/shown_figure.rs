@@ -1,5 +1,7 @@
 //! What the window shows, as a figure for print.
 
+use std::path::Path;
+
 use super::charts;
 use crate::{
     app::{
@@ -9,8 +11,8 @@ use crate::{
         test_view::Frame,
     },
     export::figures::{
-        Hue, Marker, Picture, Plot, PlotAxis, PlotPoint, Series, Span, SurfaceFigure, SurfaceLook, SurfacePanel,
-        node_plot,
+        Hue, Marker, Picture, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, SurfaceFigure,
+        SurfaceLook, SurfacePanel, node_plot,
     },
     training::EpochRecord,
 };
@@ -40,6 +42,14 @@ impl Undrawn {
             Self::Surfaces(figure) => figure.draw(),
             Self::Plot(plot) => plot.draw(),
         }
+    }
+
+    /// Draws it into the file `path`.
+    ///
+    /// # Errors
+    /// The path has another ending than those of pictures, or cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), PictureError> {
+        self.draw().save(PictureFormat::of_path(path)?, path)
     }
 }
 

@@ -1,35 +1,40 @@
-//! The thread that measures decoders. It yields to the window and ends after the last, or after the one in hand when
-//! nobody waits for more.
+//! Measures decoders in the background. It ends after the last, or after the one in hand when nobody waits for more.
 
-use std::{
-    fmt,
-    sync::{
-        Arc,
-        mpsc::{Receiver, channel},
-    },
-    thread,
-};
+use std::sync::Arc;
 
 use super::{DecoderResult, DecodersState};
 use crate::{
-    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+    app::job::{Job, JobError, Report, Wake},
     dataset::Dataset,
     evaluation::{DecoderReport, DecoderSet, SimulatedSettings},
     network::Networks,
 };
 
-/// The place of a decoder in the list, and what it is worth.
-type News = (usize, Result<DecoderReport, String>);
+/// What the thread tells the window.
+enum News {
+    /// What the decoder at this place in the list is worth.
+    Measured(usize, Result<DecoderReport, String>),
+    /// Nothing more will come.
+    Ended(Result<(), JobError>),
+}
 
-/// The window's end of the thread; without it the thread ends after the decoder in hand.
-#[derive(Default)]
+/// The window's end of the thread.
+#[derive(Debug)]
 pub struct DecoderMeasuring {
-    news: Option<Receiver<News>>,
+    job: Job<News>,
     /// Tells networks apart that are measured one after the other.
     number: u64,
 }
 
 impl DecoderMeasuring {
+    /// Nothing measured yet. `wake` is called after each decoder and at the end.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::new("decoders", wake),
+            number: 0,
+        }
+    }
+
     /// All decoders are to be measured once the networks of this number are there.
     pub fn expect(&mut self, state: &mut DecodersState) -> u64 {
         self.forget(state);
@@ -45,67 +50,51 @@ impl DecoderMeasuring {
     /// Forgets what was measured, and what is still to come: the network is another one from now on.
     pub fn forget(&mut self, state: &mut DecodersState) {
         self.number += 1;
-        self.news = None;
+        self.job.abandon();
         state.measured = None;
     }
 
-    /// Measures all decoders of `settings` with their trained `networks` on `test`. `wake` is called after each decoder
-    /// and at the end.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn begin(
-        &mut self,
-        settings: SimulatedSettings,
-        networks: Networks,
-        test: Arc<Dataset>,
-        wake: Wake,
-    ) -> std::io::Result<()> {
-        let (outgoing, incoming) = channel();
-        let news = Report::new(outgoing, wake);
-        let work = move || {
-            yield_to_window();
-            let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
-            for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
-                let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, &test) {
-                    Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
-                    Err(error) => Err(error.to_string()),
-                };
-                let report = set.as_ref().map_err(String::clone).and_then(measure);
-                // Nobody waits any more.
-                if !news.try_send((place, report)) {
-                    return;
-                }
-            }
-        };
-        thread::Builder::new().name("decoders".to_owned()).spawn(work)?;
-        self.news = Some(incoming);
-        Ok(())
+    /// Measures all decoders of `settings` with their trained `networks` on `test`.
+    pub fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) {
+        self.job.start(
+            move |report| measure_all(settings, networks, &test, report),
+            News::Ended,
+        );
     }
 
     /// Takes what the thread has to tell.
     pub fn take_news(&mut self, state: &mut DecodersState) {
-        while let Some(news) = &self.news {
-            match next_event(news) {
-                Ok(Some((place, report))) => state.take(place, report),
-                Ok(None) => return,
-                Err(WorkerDied) => {
-                    state.end("measuring ended unexpectedly: fold the table and unfold it again");
-                    self.news = None;
-                }
+        while let Some(news) = self.job.next_event() {
+            match news {
+                News::Measured(place, report) => state.take(place, report),
+                News::Ended(Ok(())) => {}
+                News::Ended(Err(error)) => state.end(&format!("{error}: fold the table and unfold it again")),
             }
         }
     }
 }
 
-impl fmt::Debug for DecoderMeasuring {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("DecoderMeasuring").finish_non_exhaustive()
+fn measure_all(settings: SimulatedSettings, networks: Networks, test: &Dataset, report: &Report<News>) {
+    let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
+    for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
+        if report.is_cancelled() {
+            return;
+        }
+        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
+            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
+            Err(error) => Err(error.to_string()),
+        };
+        report.send(News::Measured(
+            place,
+            set.as_ref().map_err(String::clone).and_then(measure),
+        ));
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::evaluation::{Run, Simulation};
 
@@ -123,18 +112,13 @@ mod tests {
         };
         settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
         let run = Run::prepare(settings).unwrap();
-        let (mut measuring, mut state) = (DecoderMeasuring::default(), DecodersState::default());
+        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(|| ())), DecodersState::default());
         let number = measuring.expect(&mut state);
         assert!(measuring.awaits(number) && state.is_measuring());
-        let (waking, woken) = channel();
         let mut impossible = settings;
         impossible.source.samples = 0;
-        let wake = move || waking.send(()).unwrap_or(());
-        measuring
-            .begin(impossible, run.network(), Arc::clone(run.test()), Arc::new(wake))
-            .unwrap();
-        // Until the thread has ended.
-        while woken.recv().is_ok() {}
+        measuring.begin(impossible, run.network(), Arc::clone(run.test()));
+        measuring.job.wait(Duration::from_secs(60));
         measuring.take_news(&mut state);
         assert!(!state.is_measuring());
         for result in state.measured.iter().flatten() {
