@@ -68,3 +68,57 @@ impl fmt::Debug for Files {
         f.debug_set().entries(self.paths()).finish()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, sync::mpsc::channel};
+
+    use super::*;
+    use crate::export::WriteError;
+
+    #[test]
+    fn every_file_is_told_also_one_whose_writing_panicked() {
+        let (woke, wakes) = channel();
+        let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
+        let folder = tempfile::tempdir().unwrap();
+        let [whole, broken, missing] = ["whole", "broken", "none/missing"].map(|name| folder.path().join(name));
+        files.write(whole.clone(), |path| fs::write(path, "text"));
+        files.write(broken.clone(), |_| -> Result<(), WriteError> { panic!("a defect") });
+        files.write(missing, |path| crate::export::atomic_write(path, |_| Ok(())));
+        assert_eq!(files.paths().count(), 3);
+        let mut told = Vec::new();
+        while told.len() < 3 {
+            wakes.recv_timeout(Duration::from_secs(60)).unwrap();
+            told.extend(std::iter::from_fn(|| files.next_written()));
+        }
+        assert_eq!(files.paths().count(), 0);
+        let has = |wanted: &dyn Fn(&Result<PathBuf, String>) -> bool| told.iter().any(wanted);
+        assert!(has(&|told| told.as_ref() == Ok(&whole)));
+        assert!(has(&|told| told
+            .as_ref()
+            .is_err_and(|reason| reason.contains("does not exist"))));
+        let name = broken.display().to_string();
+        assert!(has(&|told| {
+            let reason = told.as_ref().err();
+            reason.is_some_and(|reason| reason.contains(&name) && reason.contains("a defect"))
+        }));
+    }
+
+    #[test]
+    fn dropping_waits_for_what_is_being_written() {
+        let (begun, has_begun) = channel();
+        let (gate, opened) = channel::<()>();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("slow");
+        let mut files = Files::new(Arc::new(|| ()));
+        files.write(path.clone(), move |path| {
+            begun.send(()).unwrap();
+            opened.recv().unwrap();
+            fs::write(path, "text")
+        });
+        has_begun.recv().unwrap();
+        gate.send(()).unwrap();
+        drop(files);
+        assert_eq!(fs::read(path).unwrap(), b"text");
+    }
+}

@@ -93,14 +93,18 @@ pub struct Progress {
 impl Progress {
     /// Takes the place of an older one that nobody saw: its epochs, and how its starts stood, are not lost.
     pub fn replace(&mut self, older: Self) {
-        let mut epochs = older.epochs;
-        if let Some(first) = self.epochs.first() {
-            epochs.retain(|record| record.epoch < first.epoch);
-        }
-        epochs.append(&mut self.epochs);
-        self.epochs = epochs;
+        let newer = std::mem::replace(&mut self.epochs, older.epochs);
+        append_epochs(&mut self.epochs, newer);
         self.starts = self.starts.take().or(older.starts);
     }
+}
+
+/// Adds newer epochs to a history, in the place of those that it had of another leader.
+pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
+    if let Some(first) = newer.first() {
+        history.retain(|record| record.epoch < first.epoch);
+    }
+    history.extend(newer);
 }
 
 /// What the best network so far makes of the test set, and what it cost.
@@ -122,4 +126,50 @@ pub struct RunResult {
     pub elapsed: Duration,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Epochs of the start with this error.
+    fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {
+        let record = |epoch| EpochRecord {
+            epoch,
+            training_mse: start,
+            validation_mse: None,
+            test_mse: None,
+            gradient_norm: 0.0,
+            parameter: 0.0,
+            effective_parameters: None,
+            validation_failures: 0,
+        };
+        numbers.map(record).collect()
+    }
+
+    #[test]
+    fn no_epoch_is_lost_where_progress_replaces_progress() {
+        let [a, b] = [1.0, 2.0];
+        let cases = [
+            ("the leader goes on", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
+            ("nothing is new", epochs(a, 0..3), epochs(a, 3..3), epochs(a, 0..3)),
+            ("another start leads", epochs(a, 0..3), epochs(b, 0..5), epochs(b, 0..5)),
+            (
+                "it has run fewer epochs",
+                epochs(a, 0..5),
+                epochs(b, 0..3),
+                epochs(b, 0..3),
+            ),
+            (
+                "the older starts later",
+                epochs(a, 7..9),
+                epochs(a, 9..12),
+                epochs(a, 7..12),
+            ),
+        ];
+        for (sentence, mut older, newer, expected) in cases {
+            append_epochs(&mut older, newer);
+            assert_eq!(older, expected, "{sentence}");
+        }
+    }
 }

@@ -10,4 +10,4 @@ mod message;
 pub use export_kind::{ExportKind, file_name};
 pub use handle::Worker;
 pub use labour::LOST;
-pub use message::{Began, Event, Progress, Request, RunResult};
+pub use message::{Began, Event, Progress, Request, RunResult, append_epochs};

@@ -1,6 +1,6 @@
 use std::sync::mpsc::channel;
 
-use super::{Action, DecouplerWindow, decoupler_window::wake};
+use super::{Action, DecouplerWindow, closing::Closing, decoupler_window::wake};
 use crate::{
     app::{
         preview,
@@ -44,7 +44,8 @@ impl DecouplerWindow {
             }
             Action::Resume => {
                 // The settings on the left are always those that are trained with.
-                if let Some(run) = &state.run {
+                if let Some(run) = &mut state.run {
+                    run.is_saved = false;
                     state.draft.training = run.asked.training;
                 }
                 state.phase = Phase::Training;
@@ -113,6 +114,9 @@ impl DecouplerWindow {
                 state.typed = state.saving.take();
                 let (send, written) = channel();
                 self.worker.ask(Request::Export(kind, path.clone(), send));
+                if self.closing == Some(Closing::ChoosingPath) {
+                    self.closing = Some(Closing::Finishing);
+                }
                 self.files
                     .write(path, move |_| written.recv().unwrap_or_else(|_| Err(LOST.to_owned())));
             }

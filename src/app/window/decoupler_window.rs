@@ -2,7 +2,9 @@ use std::{path::PathBuf, sync::Arc};
 
 use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
-use super::{notice::notice_ui, save_form::save_form_ui, status_line::status_line_ui, top_bar::top_bar_ui};
+use super::{
+    closing::Closing, notice::notice_ui, save_form::save_form_ui, status_line::status_line_ui, top_bar::top_bar_ui,
+};
 use crate::app::{
     dialogs::{DialogKind, Dialogs},
     files::Files,
@@ -36,6 +38,7 @@ pub struct DecouplerWindow {
     pub(super) trade: Job<TradeEvent>,
     pub(super) measuring: DecoderMeasuring,
     pub(super) dialogs: Dialogs,
+    pub(super) closing: Option<Closing>,
     pub(super) ctx: Context,
 }
 
@@ -59,6 +62,7 @@ impl DecouplerWindow {
             trade: Job::new("trade-off", Arc::clone(&wake)),
             measuring: DecoderMeasuring::new(wake),
             dialogs: Dialogs::new(dialogs),
+            closing: None,
             ctx: ctx.clone(),
         };
         window.ask_for_what_is_missing();
@@ -83,6 +87,8 @@ impl DecouplerWindow {
         let state = &self.state;
         let is_training_view = state.view == View::Train;
         let mut actions = match state.view {
+            // The question is to be answered first.
+            _ if self.closing.is_some() => Vec::new(),
             View::Train => pressed_shortcuts(ui.ctx(), state),
             View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
             View::TradeOff => trade_off::pressed_shortcuts(ui.ctx(), state),
@@ -155,6 +161,7 @@ impl DecouplerWindow {
             self.apply(action);
             self.ctx.request_repaint();
         }
+        self.closing_ui(ui);
     }
 }
 

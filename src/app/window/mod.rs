@@ -2,6 +2,7 @@
 
 mod action;
 mod applying;
+mod closing;
 mod decoupler_window;
 mod news;
 mod notice;

@@ -30,7 +30,11 @@ impl DecouplerWindow {
                     self.state.typed = None;
                     Notice::Done(format!("Saved {}", path.display()))
                 }
-                Err(reason) => Notice::Failed(reason),
+                Err(reason) => {
+                    // The user has to see this.
+                    self.closing = None;
+                    Notice::Failed(reason)
+                }
             });
         }
         experiments::take_news(&mut self.state, &self.experiments);
@@ -45,6 +49,7 @@ impl DecouplerWindow {
                 Answer::Cancelled => {}
             }
         }
+        self.take_close_request();
     }
 
     fn take_preview(&mut self, event: PreviewEvent) {
@@ -93,7 +98,10 @@ impl DecouplerWindow {
                 self.measuring.forget(&mut state.decoders);
                 state.draft = began.settings;
                 state.preview = None;
-                state.run = Some(RunView::new(*began));
+                state.run = Some(RunView {
+                    is_saved: true,
+                    ..RunView::new(*began)
+                });
                 state.typed = None;
                 // If it has ended, the news of it say so.
                 state.phase = Phase::Paused;
@@ -111,6 +119,7 @@ impl DecouplerWindow {
                         ..run.asked
                     };
                     run.settings = *settings;
+                    run.is_saved = false;
                     run.stop_reason = None;
                 }
                 state.phase = Phase::Training;

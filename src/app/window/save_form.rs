@@ -9,7 +9,7 @@ use crate::app::{
     widgets::{ghost_button, primary_button},
 };
 
-fn form_frame(ui: &Ui) -> Frame {
+pub(super) fn form_frame(ui: &Ui) -> Frame {
     Frame::popup(ui.style()).inner_margin(Margin::same(16))
 }
 
