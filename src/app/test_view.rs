@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::DVec3;
 use ndarray::ArrayView2;
@@ -65,7 +65,7 @@ impl TestView {
     }
 
     /// z from full compression to rest, in millimetres: what the height scale spans.
-    pub fn z_range_mm(&self) -> std::ops::RangeInclusive<f64> {
+    pub fn z_range_mm(&self) -> RangeInclusive<f64> {
         let height_mm = self.sensor.geometry.height_mm;
         height_mm - self.stroke_mm..=height_mm
     }
@@ -129,4 +129,27 @@ pub struct Frame {
     pub nodes_mm: Vec<DVec3>,
     /// Value at each grid point of the surface.
     pub grid_mm: Vec<f64>,
+}
+
+impl Frame {
+    /// `decoupled` − this one: z of the nodes and of the grid.
+    pub fn error_of(&self, decoupled: &Self) -> Self {
+        let nodes = self.nodes_mm.iter().zip(&decoupled.nodes_mm);
+        let grid = self.grid_mm.iter().zip(&decoupled.grid_mm);
+        Self {
+            nodes_mm: nodes
+                .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
+                .collect(),
+            grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
+        }
+    }
+
+    /// ± the largest z of a node, so that zero keeps its colour.
+    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
+        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
+        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
+        // Nothing finer than a nanometre is told apart.
+        let largest = largest.max(1e-6);
+        -largest..=largest
+    }
 }

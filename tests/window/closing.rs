@@ -3,7 +3,7 @@
 use std::{fs, path::Path, time::Instant};
 
 use decoupler::{
-    app::{Action, ExportKind, Phase},
+    app::{Effect, Phase},
     export::CheckpointFile,
     training::StopReason,
 };
@@ -140,7 +140,7 @@ fn a_training_that_ends_while_it_is_asked_about_needs_no_answer() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     assert!(!close(&mut driver));
-    driver.window_mut().apply(Action::Stop);
+    driver.window_mut().apply(Effect::Stop);
     wait_for_closing(&mut driver);
 }
 
@@ -155,9 +155,9 @@ fn a_file_under_way_is_finished_before_the_window_closes() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver
-        .window_mut()
-        .apply(Action::Export(ExportKind::Errors, pipe.clone()));
+    driver.open_form("Type a path for the error table");
+    driver.type_into("File", &pipe.display().to_string());
+    driver.click_button("Save");
     assert!(!close(&mut driver));
     driver.harness().step();
     assert!(driver.has("Finishing files") && driver.says("pipe is still being written"));

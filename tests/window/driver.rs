@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
+use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views};
 use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
@@ -81,8 +81,23 @@ impl Driver {
     }
 
     /// What the window knows.
-    pub(crate) fn state(&self) -> &State {
-        self.window().state()
+    pub(crate) fn state(&self) -> &Shared {
+        self.window().shared()
+    }
+
+    /// What only one of its views knows.
+    pub(crate) fn views(&self) -> &Views {
+        self.window().views()
+    }
+
+    /// What the user is told.
+    pub(crate) fn notice(&self) -> Option<&Notice> {
+        self.window().notice()
+    }
+
+    /// The name of the view on show.
+    pub(crate) fn shown(&self) -> &'static str {
+        self.window().shown()
     }
 
     fn window(&self) -> &DecouplerWindow {
@@ -225,7 +240,7 @@ impl Driver {
         self.open_form(button);
         self.type_into("File", &path.display().to_string());
         self.click_button("Save");
-        self.wait("the answer", |driver| driver.state().notice.is_some());
+        self.wait("the answer", |driver| driver.notice().is_some());
         self.settle();
     }
 

@@ -3,7 +3,7 @@
 use std::{thread, time::Duration};
 
 use decoupler::{
-    app::{Action, Phase, surface_view::ViewMode},
+    app::{Effect, Phase, surface_view::ViewMode},
     evaluation::{Run, SimulatedSettings},
     training::{Method, MomentumSettings, StopReason},
 };
@@ -108,8 +108,8 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
 
     driver.click("Show");
     let worst = driver.state().result().unwrap().errors.worst_node;
-    assert_eq!(driver.state().look.snapshot, worst.snapshot);
-    assert_eq!(driver.state().look.node, Some(worst.row * 6 + worst.node));
+    assert_eq!(driver.views().train.snapshot, worst.snapshot);
+    assert_eq!(driver.views().train.node, Some(worst.row * 6 + worst.node));
     for theme in ["Light", "Dark"] {
         driver.click_button(theme);
         driver.settle();
@@ -196,12 +196,12 @@ fn stop_while_a_training_is_prepared_is_answered_at_once_and_the_one_before_stay
         // So many that the training cannot have begun before it is stopped.
         let mut many = small();
         many.source.samples = 200_000;
-        driver.window_mut().apply(Action::Configure(Box::new(many)));
-        driver.window_mut().apply(Action::Train);
+        driver.window_mut().apply(Effect::Configure(Box::new(many)));
+        driver.window_mut().apply(Effect::Train);
         assert_eq!(driver.state().phase, Phase::Preparing);
-        driver.window_mut().apply(Action::Stop);
+        driver.window_mut().apply(Effect::Stop);
         assert_eq!(driver.state().phase, before);
-        driver.window_mut().apply(Action::Configure(Box::new(small())));
+        driver.window_mut().apply(Effect::Configure(Box::new(small())));
         driver.train();
         assert_eq!(driver.table(), table_of(&trained(small())));
         assert!(!driver.says("stopped by you"));

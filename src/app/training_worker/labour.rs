@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::{
-    Began, Event, Progress, Request, RunResult,
+    Began, Event, Progress, Request, RunId, RunResult,
     continuation::{continue_run, furthest_epoch},
 };
 use crate::{
@@ -36,6 +36,8 @@ pub(super) struct Labour<'a> {
     /// Preparations so far.
     preparations: u64,
     run: Option<Run>,
+    /// Which training `run` is.
+    id: Option<RunId>,
     is_paused: bool,
     /// Whether the window was told what is to be kept of the run.
     is_kept: bool,
@@ -54,6 +56,7 @@ impl<'a> Labour<'a> {
             cancelled,
             preparations: 0,
             run: None,
+            id: None,
             is_paused: false,
             is_kept: false,
             elapsed: Duration::ZERO,
@@ -114,14 +117,10 @@ impl<'a> Labour<'a> {
                     self.report_progress();
                 }
             }
-            Request::Networks(number) => {
-                let networks = self.run.as_ref().map(|run| Box::new(run.network()));
-                let networks = networks.ok_or_else(|| LOST.to_owned());
-                self.report.send(Event::Networks(number, networks));
-            }
-            Request::Export(kind, path, answer) => {
+            Request::Export(id, write, path, answer) => {
                 let result = match &self.run {
-                    Some(run) => kind.write(run, &path).map_err(|error| error.to_string()),
+                    Some(run) if self.id == Some(id) => write(run, &path),
+                    Some(_) => Err(REPLACED.to_owned()),
                     // The window offers no export before a training, so there was one.
                     None => Err(LOST.to_owned()),
                 };
@@ -158,7 +157,7 @@ impl<'a> Labour<'a> {
         self.elapsed = run.leader().elapsed();
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
-        self.run = Some(run);
+        (self.run, self.id) = (Some(run), Some(began.id));
         self.is_paused = is_paused;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
@@ -230,6 +229,7 @@ impl<'a> Labour<'a> {
                     .count(),
                 elapsed: self.elapsed,
                 frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+                networks: is_standing.then(|| Arc::new(run.network())),
             },
             stop_reason: run.stop_reason(),
         });
@@ -262,12 +262,17 @@ impl<'a> Labour<'a> {
 /// What the window says where the training it shows is not in the worker: only a worker that died lost it.
 pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
+/// What the window says where a file was asked for before another training began.
+const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
+                        finished trainings are in the run list of the Compare view";
+
 /// A run, and what the window is to know of it.
 fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
     let simulated = run.settings().simulated().zip(run.baselines().copied());
     let (settings, baselines) = simulated.ok_or(TestViewError::Measured)?;
     let test = TestView::of(&settings, run.test().clone())?;
     let began = Began {
+        id: RunId::new(),
         settings,
         weights: run.leader().weights(),
         test,

@@ -1,11 +1,10 @@
-use eframe::egui::{Align, Id, Layout, Modal, RichText, Ui, ViewportCommand};
+use eframe::egui::{Align, Frame, Id, Layout, Margin, Modal, RichText, Ui, ViewportCommand};
 
-use super::{Action, DecouplerWindow, save_form::form_frame};
+use super::DecouplerWindow;
 use crate::app::{
-    file_task::FileTask,
-    shared::Phase,
+    shared::{Effect, Phase},
     theme::{semibold, space, type_size},
-    training_worker::ExportKind,
+    views::ExportKind,
     widgets::{ghost_button, primary_button},
 };
 
@@ -33,13 +32,13 @@ impl DecouplerWindow {
         }
         match self.closing {
             Some(Closing::Asking) if !self.has_unfinished_training() => {
-                if self.state.phase == Phase::Preparing {
-                    self.apply(Action::Stop);
+                if self.shared.phase == Phase::Preparing {
+                    self.apply(Effect::Stop);
                 }
                 self.closing = Some(Closing::Finishing);
             }
             // The user thought better of saving, and so of closing.
-            Some(Closing::ChoosingPath) if !self.dialogs.is_asking() && self.state.saving.is_none() => {
+            Some(Closing::ChoosingPath) if !self.dialogs.is_asking() && self.saving.is_none() => {
                 self.closing = None;
             }
             _ => {}
@@ -59,8 +58,8 @@ impl DecouplerWindow {
 
     /// Whether closing loses epochs.
     fn has_unfinished_training(&self) -> bool {
-        let is_saved = self.state.run.as_ref().is_some_and(|run| run.is_saved);
-        matches!(self.state.phase, Phase::Training | Phase::Paused) && !is_saved
+        let is_saved = self.shared.run.as_ref().is_some_and(|run| run.is_saved);
+        matches!(self.shared.phase, Phase::Training | Phase::Paused) && !is_saved
     }
 
     /// Asks about the unfinished training, or tells what closing waits for.
@@ -90,7 +89,7 @@ impl DecouplerWindow {
             Some(Closing::ChoosingPath | Closing::Now) | None => return,
         };
         let mut chosen = None;
-        let frame = form_frame(ui);
+        let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
         let modal = Modal::new(Id::unique("closing")).frame(frame).show(ui.ctx(), |ui| {
             ui.set_width(space(110));
             ui.label(RichText::new(heading).font(semibold(type_size().title)));
@@ -114,14 +113,14 @@ impl DecouplerWindow {
         }
         let Some(closing) = chosen else { return };
         self.closing = closing;
-        if closing == Some(Closing::ChoosingPath) {
-            self.apply(Action::ChooseFile(FileTask::Save(ExportKind::Checkpoint)));
+        if let (Some(Closing::ChoosingPath), Some(run)) = (closing, &self.shared.run) {
+            self.apply(Effect::ChooseFile(ExportKind::Checkpoint.task(run)));
         }
         ui.request_repaint();
     }
 
     fn how_far_the_training_is(&self) -> String {
-        let run = self.state.run.as_ref();
+        let run = self.shared.run.as_ref();
         let latest = run.and_then(|run| Some((run, run.latest()?)));
         latest.map_or_else(
             || "The training has only just begun.".to_owned(),

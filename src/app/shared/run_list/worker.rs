@@ -1,47 +1,36 @@
-//! The thread that reads and writes files of the window's own and prepares what is compared. Requests go in, events
+//! The thread that reads and writes the workspace file. Requests go in, events
 //! come out, and each event wakes the window. When the window closes it waits for what is still to be written.
 
 use std::{
     collections::VecDeque,
     fs::{self, File},
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        mpsc::{Receiver, Sender, channel},
-    },
+    sync::mpsc::{Receiver, Sender, channel},
     time::Duration,
 };
 
-use super::Compared;
 use crate::{
-    app::{
-        job::{Job, JobError, Wake},
-        test_view::{Frame, TestView},
-    },
-    export::{FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError},
+    app::job::{Job, JobError, Wake},
+    export::{FoundWorkspace, Workspace, WorkspaceError, WriteError},
 };
 
 /// Longest time that closing waits for the files.
 const LONGEST_WRITE: Duration = Duration::from_secs(5);
 
 /// What the window asks of the thread.
-pub enum RunsRequest {
+pub(super) enum RunsRequest {
     /// Take up the workspace in this file.
     Load(PathBuf),
     /// Write the workspace. Only the newest one counts.
     Save(Workspace),
-    /// Prepare this run to be drawn in one of the two places.
-    Prepare(usize, u64, Arc<NetworkFile>),
 }
 
 /// What the thread tells the window.
-pub enum RunsEvent {
+pub(super) enum RunsEvent {
     /// The workspace, or why runs are not kept.
     Loaded(PathBuf, Result<FoundWorkspace, String>),
     /// The workspace could not be written.
     NotSaved(String),
-    /// A run can be drawn, or why not.
-    Prepared(usize, Result<Box<Compared>, String>),
     /// The thread has ended, and why, unless it was to end.
     Died(Option<JobError>),
 }
@@ -75,8 +64,13 @@ impl RunsWorker {
         }
     }
 
+    /// Takes up the workspace in `path`, and keeps runs there from now on.
+    pub fn load(&self, path: PathBuf) {
+        self.ask(RunsRequest::Load(path));
+    }
+
     /// Asks for something.
-    pub fn ask(&self, request: RunsRequest) {
+    pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The other end is gone only if the thread died, which is the last event.
             let _ = requests.send(request);
@@ -84,7 +78,7 @@ impl RunsWorker {
     }
 
     /// The next event, if one has come.
-    pub fn next_event(&self) -> Option<RunsEvent> {
+    pub(super) fn next_event(&self) -> Option<RunsEvent> {
         self.job.next_event()
     }
 }
@@ -135,10 +129,6 @@ impl Labour {
                 let saved = workspace.save(path);
                 saved.err().map(|error| RunsEvent::NotSaved(error.to_string()))
             }
-            RunsRequest::Prepare(place, id, file) => {
-                let prepared = prepare(id, &file).map(Box::new);
-                Some(RunsEvent::Prepared(place, prepared))
-            }
         }
     }
 
@@ -168,17 +158,4 @@ fn lock(path: &Path) -> Result<File, String> {
         // Some network folders know no locks; one window at a time is then the user's care.
         Err(fs::TryLockError::Error(_)) => Ok(file),
     }
-}
-
-fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {
-    let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
-    let decoupled_mm = file.network.decouple(&test.set);
-    let mut compared = Compared {
-        id,
-        test,
-        decoupled_mm: Arc::new(decoupled_mm),
-        frames: [Frame::default(), Frame::default(), Frame::default()],
-    };
-    compared.show(0);
-    Ok(compared)
 }

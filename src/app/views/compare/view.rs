@@ -3,60 +3,130 @@ use std::ops::RangeInclusive;
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
 use super::{
-    RunsAction,
+    CompareView, Compared,
     curves::{colours, curves_keys, curves_ui},
     figures_table::figures_ui,
+    list::run_list_ui,
 };
 use crate::app::{
     plotting::{legend_ui, legend_width},
-    shared::{Compared, PLACES, RightCard, RunsState, State},
+    shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View},
     surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
     theme::{Theme, semibold, space, type_size},
-    views::train::surfaces::symmetric_range_mm,
-    widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui},
-    window::Action,
+    widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
 };
 
-/// The middle of the Compare view: the surfaces of both runs above, their curves and figures below.
-pub fn compare_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let whole = ui.available_rect_before_wrap();
-    let gap = space(2);
-    let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-    let upper = upper.with_max_y(upper.max.y - gap);
-    let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
-    let width = 0.5 * (cards.width() - gap);
-    let range_mm = common_range_mm(&state.runs);
-    for place in 0..2 {
-        let left = cards.left() + (width + gap) * place as f32;
-        let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
-        card_ui(ui, card, |ui| side_ui(ui, state, place, &range_mm, &mut actions));
+impl View for CompareView {
+    fn name(&self) -> &'static str {
+        "Compare"
     }
-    if state.runs.compared.iter().any(Option::is_some) {
-        scale_ui(ui, scale.shrink2(Vec2::new(0.0, space(4))), state.runs.card, range_mm);
+
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.follow(&shared.runs, effects);
     }
-    let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| losses_ui(ui, &state.runs));
-    card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "compared figures", |ui| {
-            section_heading_ui(ui, "Errors on the test sets");
-            figures_ui(ui, &state.runs);
+
+    fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, self.snapshots()) {
+            self.show_snapshot(snapshot);
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        run_list_ui(ui, shared, &mut self.removing, effects);
+    }
+
+    /// The surfaces of both runs above, their curves and figures below.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        let whole = ui.available_rect_before_wrap();
+        let gap = space(2);
+        let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        let upper = upper.with_max_y(upper.max.y - gap);
+        let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
+        let width = 0.5 * (cards.width() - gap);
+        let range_mm = self.common_range_mm();
+        for place in 0..2 {
+            let left = cards.left() + (width + gap) * place as f32;
+            let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
+            card_ui(ui, card, |ui| self.side_ui(ui, shared, place, &range_mm, effects));
+        }
+        if self.places.iter().any(|place| place.compared.is_some()) {
+            scale_ui(ui, scale.shrink2(Vec2::new(0.0, space(4))), self.card, range_mm);
+        }
+        let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
+        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| losses_ui(ui, &shared.runs));
+        card_ui(ui, right, |ui| {
+            scrolled_ui(ui, "compared figures", |ui| {
+                section_heading_ui(ui, "Errors on the test sets");
+                figures_ui(ui, &shared.runs);
+            });
         });
-    });
-    ui.allocate_rect(whole, Sense::hover());
-    actions
+        ui.allocate_rect(whole, Sense::hover());
+    }
 }
 
-/// One scale for both, so that colours and heights mean the same.
-fn common_range_mm(runs: &RunsState) -> RangeInclusive<f64> {
-    let ranges = runs.compared.iter().flatten().map(|compared| match runs.card {
-        RightCard::Decoupled => compared.test.z_range_mm(),
-        RightCard::Error => symmetric_range_mm(&compared.frames[2]),
-    });
-    let union = |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
-    ranges.reduce(union).unwrap_or(0.0..=1.0)
+impl CompareView {
+    /// One scale for both, so that colours and heights mean the same.
+    fn common_range_mm(&self) -> RangeInclusive<f64> {
+        let compared = self.places.iter().filter_map(|place| place.compared.as_ref());
+        let ranges = compared.map(|compared| match self.card {
+            RightCard::Decoupled => compared.test.z_range_mm(),
+            RightCard::Error => compared.frames[2].symmetric_range_mm(),
+        });
+        let union = |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
+        ranges.reduce(union).unwrap_or(0.0..=1.0)
+    }
+
+    fn side_ui(
+        &mut self,
+        ui: &mut Ui,
+        shared: &Shared,
+        place: usize,
+        range_mm: &RangeInclusive<f64>,
+        effects: &mut Vec<Effect>,
+    ) {
+        let theme = Theme::of(ui);
+        let (runs, look) = (&shared.runs, shared.look);
+        ui.horizontal(|ui| {
+            ui.set_min_height(space(7));
+            let colour = colours(&theme.palette)[place];
+            ui.label(
+                RichText::new(PLACES[place])
+                    .font(semibold(type_size().title))
+                    .color(colour),
+            );
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                // What holds for both is asked for once.
+                match place {
+                    0 => {
+                        let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+                        let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                        effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+                    }
+                    _ => {
+                        let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
+                        let picked = segmented_ui(ui, "What the cards show", &cards, self.card, false);
+                        self.card = picked.unwrap_or(self.card);
+                    }
+                }
+                if let Some(run) = runs.pinned(place) {
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                        let name = RichText::new(&run.name).font(semibold(type_size().title));
+                        ui.add(eframe::egui::Label::new(name).truncate());
+                    });
+                }
+            });
+        });
+        match &self.places[place].compared {
+            Some(compared) => surface_ui(ui, (place, compared, self.card), range_mm, look, effects),
+            None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
+            None => {
+                let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
+                placeholder_ui(ui, &text);
+            }
+        }
+    }
 }
 
 fn colours_of(card: RightCard) -> Colours {
@@ -79,59 +149,15 @@ fn scale_ui(ui: &mut Ui, rect: Rect, card: RightCard, range: RangeInclusive<f64>
     bar.show(&mut slot, rect.height());
 }
 
-fn side_ui(ui: &mut Ui, state: &State, place: usize, range_mm: &RangeInclusive<f64>, actions: &mut Vec<Action>) {
-    let theme = Theme::of(ui);
-    let runs = &state.runs;
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        let colour = colours(&theme.palette)[place];
-        ui.label(
-            RichText::new(PLACES[place])
-                .font(semibold(type_size().title))
-                .color(colour),
-        );
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            // What holds for both is asked for once.
-            match place {
-                0 => {
-                    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                    let picked = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false);
-                    actions.extend(picked.map(Action::SetViewMode));
-                }
-                _ => {
-                    let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
-                    let picked = segmented_ui(ui, "What the cards show", &cards, runs.card, false);
-                    actions.extend(picked.map(RunsAction::ShowCard).map(Action::from));
-                }
-            }
-            if let Some(run) = runs.pinned(place) {
-                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    let name = RichText::new(&run.name).font(semibold(type_size().title));
-                    ui.add(eframe::egui::Label::new(name).truncate());
-                });
-            }
-        });
-    });
-    match &runs.compared[place] {
-        Some(compared) => surface_ui(ui, state, place, compared, range_mm, actions),
-        None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
-        None => {
-            let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
-            placeholder_ui(ui, &text);
-        }
-    }
-}
-
 fn surface_ui(
     ui: &mut Ui,
-    state: &State,
-    place: usize,
-    compared: &Compared,
+    (place, compared, card): (usize, &Compared, RightCard),
     range_mm: &RangeInclusive<f64>,
-    actions: &mut Vec<Action>,
+    look: Look,
+    effects: &mut Vec<Effect>,
 ) {
     let [_, decoupled, error] = &compared.frames;
-    let frame = match state.runs.card {
+    let frame = match card {
         RightCard::Decoupled => decoupled,
         RightCard::Error => error,
     };
@@ -141,18 +167,18 @@ fn surface_ui(
         values_mm: &frame.grid_mm,
         nodes_mm: &frame.nodes_mm,
         range_mm: range_mm.clone(),
-        colours: colours_of(state.runs.card),
-        mode: state.look.mode,
+        colours: colours_of(card),
+        mode: look.mode,
         highlight: None,
         theme: Theme::of(ui),
     };
-    let shown = view.show(ui, state.look.camera);
-    if shown.camera != state.look.camera {
-        actions.push(Action::MoveCamera(shown.camera));
+    let camera = view.show(ui, look.camera).camera;
+    if camera != look.camera {
+        effects.push(Effect::Look(Look { camera, ..look }));
     }
 }
 
-fn losses_ui(ui: &mut Ui, runs: &RunsState) {
+fn losses_ui(ui: &mut Ui, runs: &RunList) {
     let keys = curves_keys(&Theme::of(ui).palette, runs);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Loss").font(semibold(type_size().title)));

@@ -2,25 +2,60 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{
-    Analysis, IdentifiabilityAction, IdentifiabilityState, facts::facts_ui, singular_values::singular_values_ui,
-};
+use super::{Analysis, IdentifiabilityView, facts::facts_ui, form, singular_values::singular_values_ui};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Look, Shared, View},
         surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui},
-        window::Action,
     },
     export::format_number,
 };
 
-/// The middle of the Identifiability view: pattern and sensitivity above, singular values and what they come to below.
-pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let shown = &state.identifiability;
+impl View for IdentifiabilityView {
+    fn name(&self) -> &'static str {
+        "Identifiability"
+    }
+
+    /// Shows the sensor and scene of the Train view, with what was last tried on them.
+    fn enter(&mut self, shared: &Shared) {
+        if self.follow(&shared.draft) || self.problem.is_some() {
+            self.ask();
+        }
+    }
+
+    fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        while let Some(answer) = self.worker.next_answer() {
+            if answer.is_newest {
+                self.is_pending = false;
+            }
+            match answer.analysis {
+                Ok(analysis) => {
+                    self.problem = None;
+                    self.analysis = Some(analysis);
+                }
+                Err(reason) => self.problem = Some(reason),
+            }
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        form::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        identifiability_ui(ui, self, shared, effects);
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Pattern and sensitivity above, singular values and what they come to below.
+fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     let Some(analysis) = &shown.analysis else {
         card_ui(ui, whole, |ui| match &shown.problem {
@@ -29,7 +64,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             }
             None => placeholder_ui(ui, "The singular values are being computed."),
         });
-        return actions;
+        return;
     };
     let gap = space(2);
     let lower_height = (0.44 * whole.height()).clamp(space(60), space(100));
@@ -44,7 +79,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             frame: &analysis.patterns[place],
             colours: Colours::Pattern,
             range: -1.0..=1.0,
-            mode: state.look.mode,
+            mode: shared.look.mode,
         },
         Side {
             title: "Sensitivity of each node",
@@ -55,10 +90,13 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             mode: ViewMode::Top,
         },
     ];
+    let mut pointed = (shown.axis, shown.node);
     for (number, side) in sides.iter().enumerate() {
         let left = upper.left() + (width + gap) * number as f32;
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
-        card_ui(ui, card, |ui| side.show_ui(ui, state, analysis, &mut actions));
+        card_ui(ui, card, |ui| {
+            side.show_ui(ui, shared.look, analysis, &mut pointed, effects)
+        });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
@@ -74,7 +112,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         });
     });
     ui.allocate_rect(whole, Sense::hover());
-    actions
+    (shown.axis, shown.node) = pointed;
 }
 
 /// From no sensitivity to the largest of any axis.
@@ -95,7 +133,15 @@ struct Side<'a> {
 }
 
 impl Side<'_> {
-    fn show_ui(&self, ui: &mut Ui, state: &State, analysis: &Analysis, actions: &mut Vec<Action>) {
+    /// `axis` is the one on show, `node` the one marked on both pictures.
+    fn show_ui(
+        &self,
+        ui: &mut Ui,
+        look: Look,
+        analysis: &Analysis,
+        (axis, node): &mut (usize, Option<usize>),
+        effects: &mut Vec<Effect>,
+    ) {
         let theme = Theme::of(ui);
         ui.horizontal(|ui| {
             ui.set_min_height(space(7));
@@ -103,10 +149,10 @@ impl Side<'_> {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| match self.colours {
                 Colours::Pattern => {
                     let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                    let picked = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false);
-                    actions.extend(picked.map(Action::SetViewMode));
+                    let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
                 }
-                _ => axes_ui(ui, &state.identifiability, analysis, actions),
+                _ => axes_ui(ui, axis, analysis),
             });
         });
         let space_left = ui.available_rect_before_wrap();
@@ -120,15 +166,17 @@ impl Side<'_> {
             range_mm: self.range.clone(),
             colours: self.colours,
             mode: self.mode,
-            highlight: state.look.node,
+            highlight: *node,
             theme,
         };
-        let shown = view.show(&mut slot, state.look.camera);
-        if shown.camera != state.look.camera {
-            actions.push(Action::MoveCamera(shown.camera));
+        let shown = view.show(&mut slot, look.camera);
+        if shown.camera != look.camera {
+            let camera = shown.camera;
+            effects.push(Effect::Look(Look { camera, ..look }));
         }
-        if shown.response.contains_pointer() && shown.hovered_node != state.look.node {
-            actions.push(Action::HoverNode(shown.hovered_node));
+        if shown.response.contains_pointer() && shown.hovered_node != *node {
+            *node = shown.hovered_node;
+            ui.ctx().request_repaint();
         }
         shown.node_tooltip_ui(|ui, node| self.node_ui(ui, analysis, node));
         let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
@@ -158,18 +206,17 @@ impl Side<'_> {
 }
 
 /// Which coordinate is shown, where several are unknown.
-fn axes_ui(ui: &mut Ui, shown: &IdentifiabilityState, analysis: &Analysis, actions: &mut Vec<Action>) {
+fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     let axes = analysis.question.scene.movement.axes().indices();
     if axes.len() < 2 {
         return;
     }
     let options = [(0, "x"), (1, "y"), (2, "z")];
-    let picked = segmented_ui(ui, "Axis on show", &options, shown.axis, false);
-    actions.extend(picked.map(IdentifiabilityAction::ShowAxis).map(Action::from));
+    *axis = segmented_ui(ui, "Axis on show", &options, *axis, false).unwrap_or(*axis);
 }
 
 /// What is looked at, in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, shown: &IdentifiabilityState) {
+fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&shown.problem, &shown.analysis) {
         _ if shown.is_pending => (palette.accent, "Computing".to_owned()),

@@ -2,28 +2,28 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
+use super::{drawn::Frames, state::TrainView};
 use crate::{
     app::{
-        shared::{RightCard, State},
-        surface_view::{ColourBar, Colours, SurfaceView, SurfaceViewResponse, ViewMode},
+        shared::{Effect, Look, RightCard, Shared},
+        surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
         test_view::{Frame, TestView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, segmented_ui},
-        window::Action,
     },
     export::format_number,
 };
 
 /// Both surfaces side by side, and the scale of their colours.
-pub fn surfaces_ui(ui: &mut Ui, rect: Rect, state: &State, actions: &mut Vec<Action>) {
+pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let gap = space(2);
     let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let width = 0.5 * (cards.width() - gap);
     let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
     let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
-    card_ui(ui, left, |ui| actual_card_ui(ui, state, actions));
-    card_ui(ui, right, |ui| right_card_ui(ui, state, actions));
-    colour_scales_ui(ui, scales, state);
+    card_ui(ui, left, |ui| actual_card_ui(ui, view, shared, effects));
+    card_ui(ui, right, |ui| right_card_ui(ui, view, shared, effects));
+    colour_scales_ui(ui, scales, view, shared);
 }
 
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.
@@ -38,46 +38,45 @@ fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
 }
 
-fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn actual_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Actual", space(29));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-            if let Some(mode) = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false) {
-                actions.push(Action::SetViewMode(mode));
-            }
+            let look = shared.look;
+            let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+            effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
         });
     });
-    let Some(test) = state.test() else { return };
+    let Some(test) = shared.test() else { return };
     let card = Card {
         label: "Actual surface",
-        frame: &state.frames.actual,
+        frame: &view.drawn.frames.actual,
         colours: Colours::Height,
         range_mm: test.z_range_mm(),
     };
-    card.show_ui(ui, state, test, actions);
+    card.show_ui(ui, (test, &view.drawn.frames), &mut view.node, shared.look, effects);
 }
 
-fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn right_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Network", space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
-            if let Some(right) = segmented_ui(ui, "What the network's card shows", &options, state.look.right, false) {
-                actions.push(Action::SetRightCard(right));
-            }
+            let picked = segmented_ui(ui, "What the network's card shows", &options, view.right, false);
+            view.right = picked.unwrap_or(view.right);
         });
     });
-    let (Some(test), Some((decoupled, error))) = (state.test(), &state.frames.decoupled) else {
+    let (Some(test), Some((decoupled, error))) = (shared.test(), &view.drawn.frames.decoupled) else {
         placeholder_ui(
             ui,
             "Press Train: the surface that the network decouples takes shape here while it learns.",
         );
         return;
     };
-    let card = match state.look.right {
+    let card = match view.right {
         RightCard::Decoupled => Card {
             label: "Decoupled surface",
             frame: decoupled,
@@ -88,15 +87,15 @@ fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             label: "Error surface",
             frame: error,
             colours: Colours::Error,
-            range_mm: symmetric_range_mm(error),
+            range_mm: error.symmetric_range_mm(),
         },
     };
-    card.show_ui(ui, state, test, actions);
+    card.show_ui(ui, (test, &view.drawn.frames), &mut view.node, shared.look, effects);
 }
 
 /// The scale that both surfaces share; beside it that of the errors while they are shown.
-fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
-    let Some(test) = state.test() else { return };
+fn colour_scales_ui(ui: &mut Ui, rect: Rect, view: &TrainView, shared: &Shared) {
+    let Some(test) = shared.test() else { return };
     let theme = Theme::of(ui);
     let height = |range| ColourBar {
         title: Colours::Height.title(),
@@ -105,11 +104,11 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
         theme,
     };
     let mut scales = vec![height(test.z_range_mm())];
-    if let (RightCard::Error, Some((_, error))) = (state.look.right, &state.frames.decoupled) {
+    if let (RightCard::Error, Some((_, error))) = (view.right, &view.drawn.frames.decoupled) {
         let colours = Colours::Error;
         scales.push(ColourBar {
             title: colours.title(),
-            range: symmetric_range_mm(error),
+            range: error.symmetric_range_mm(),
             colours,
             theme,
         });
@@ -123,19 +122,6 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
     }
 }
 
-/// ± the largest error of a node, so that zero keeps its colour.
-pub fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
-    let largest = error
-        .nodes_mm
-        .iter()
-        .map(|node| node.z.abs())
-        .filter(|z| z.is_finite())
-        .fold(0.0, f64::max);
-    // Nothing finer than a nanometre is told apart.
-    let largest = largest.max(1e-6);
-    -largest..=largest
-}
-
 struct Card<'a> {
     label: &'static str,
     frame: &'a Frame,
@@ -144,7 +130,15 @@ struct Card<'a> {
 }
 
 impl Card<'_> {
-    fn show_ui(self, ui: &mut Ui, state: &State, test: &TestView, actions: &mut Vec<Action>) {
+    /// `node` is the one marked on every picture.
+    fn show_ui(
+        self,
+        ui: &mut Ui,
+        (test, frames): (&TestView, &Frames),
+        node: &mut Option<usize>,
+        look: Look,
+        effects: &mut Vec<Effect>,
+    ) {
         let theme = Theme::of(ui);
         let view = SurfaceView {
             label: self.label,
@@ -153,29 +147,27 @@ impl Card<'_> {
             nodes_mm: &self.frame.nodes_mm,
             range_mm: self.range_mm,
             colours: self.colours,
-            mode: state.look.mode,
-            highlight: state.look.node,
+            mode: look.mode,
+            highlight: *node,
             theme,
         };
-        let shown = view.show(ui, state.look.camera);
-        answer(&shown, state, actions);
-        shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
-    }
-}
-
-fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>) {
-    if shown.camera != state.look.camera {
-        actions.push(Action::MoveCamera(shown.camera));
-    }
-    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
-    if shown.response.contains_pointer() && shown.hovered_node != state.look.node {
-        actions.push(Action::HoverNode(shown.hovered_node));
+        let shown = view.show(ui, look.camera);
+        if shown.camera != look.camera {
+            let camera = shown.camera;
+            effects.push(Effect::Look(Look { camera, ..look }));
+        }
+        // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
+        if shown.response.contains_pointer() && shown.hovered_node != *node {
+            *node = shown.hovered_node;
+            ui.ctx().request_repaint();
+        }
+        shown.node_tooltip_ui(|ui, node| node_values_ui(ui, frames, test, node));
     }
 }
 
 /// The node under the pointer and its values, in two lines that hide little.
-fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
-    let Some(actual) = state.frames.actual.nodes_mm.get(node) else {
+fn node_values_ui(ui: &mut Ui, frames: &Frames, test: &TestView, node: usize) {
+    let Some(actual) = frames.actual.nodes_mm.get(node) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 0.0;
@@ -189,7 +181,7 @@ fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
         ui.label(place.color(Theme::of(ui).palette.dim));
     });
     let mut text = format!("z {} mm", format_number(actual.z));
-    if let Some((decoupled, error)) = &state.frames.decoupled
+    if let Some((decoupled, error)) = &frames.decoupled
         && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
     {
         let [decoupled, error] = [decoupled.z, error.z].map(format_number);

@@ -4,7 +4,11 @@ use std::sync::Arc;
 
 use super::{DecoderResult, DecodersState};
 use crate::{
-    app::job::{Job, JobError, Report, Wake},
+    app::{
+        job::{Job, JobError, Report, Wake},
+        shared::{Phase, Shared},
+        training_worker::RunId,
+    },
     dataset::Dataset,
     evaluation::{DecoderReport, DecoderSet, SimulatedSettings},
     network::Networks,
@@ -22,8 +26,8 @@ enum News {
 #[derive(Debug)]
 pub struct DecoderMeasuring {
     job: Job<News>,
-    /// Tells networks apart that are measured one after the other.
-    number: u64,
+    /// The training whose networks are measured, and how many epochs had been run.
+    of: Option<(RunId, usize)>,
 }
 
 impl DecoderMeasuring {
@@ -31,31 +35,38 @@ impl DecoderMeasuring {
     pub fn new(wake: Wake) -> Self {
         Self {
             job: Job::new("decoders", wake),
-            number: 0,
+            of: None,
         }
     }
 
-    /// All decoders are to be measured once the networks of this number are there.
-    pub fn expect(&mut self, state: &mut DecodersState) -> u64 {
-        self.forget(state);
-        state.measured = Some(DecoderResult::pending());
-        self.number
+    /// Takes news, forgets what is of a network that is another one by now, and measures the networks on show once they
+    /// stand still and their table is unfolded.
+    pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
+        self.take_news(state);
+        let standing = shared.run.as_ref().and_then(|run| {
+            let result = run.result.as_ref()?;
+            Some((run, (run.id, result.epochs_run), result.networks.as_ref()?))
+        });
+        let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
+        if is_other || shared.phase == Phase::Training {
+            self.forget(state);
+        }
+        let is_wanted = state.is_open && state.measured.is_none();
+        if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
+        {
+            self.of = Some(of);
+            state.measured = Some(DecoderResult::pending());
+            self.begin(run.settings, (**networks).clone(), Arc::clone(&run.test.set));
+        }
     }
 
-    /// Whether networks of this number are still those to be measured.
-    pub fn awaits(&self, number: u64) -> bool {
-        self.number == number
-    }
-
-    /// Forgets what was measured, and what is still to come: the network is another one from now on.
-    pub fn forget(&mut self, state: &mut DecodersState) {
-        self.number += 1;
+    fn forget(&mut self, state: &mut DecodersState) {
         self.job.abandon();
-        state.measured = None;
+        (self.of, state.measured) = (None, None);
     }
 
     /// Measures all decoders of `settings` with their trained `networks` on `test`.
-    pub fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) {
+    fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) {
         self.job.start(
             move |report| measure_all(settings, networks, &test, report),
             News::Ended,
@@ -63,7 +74,7 @@ impl DecoderMeasuring {
     }
 
     /// Takes what the thread has to tell.
-    pub fn take_news(&mut self, state: &mut DecodersState) {
+    fn take_news(&mut self, state: &mut DecodersState) {
         while let Some(news) = self.job.next_event() {
             match news {
                 News::Measured(place, report) => state.take(place, report),
@@ -93,7 +104,7 @@ fn measure_all(settings: SimulatedSettings, networks: Networks, test: &Dataset, 
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::sync::mpsc::channel;
 
     use super::*;
     use crate::evaluation::{Run, Simulation};
@@ -112,20 +123,24 @@ mod tests {
         };
         settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
         let run = Run::prepare(settings).unwrap();
-        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(|| ())), DecodersState::default());
-        let number = measuring.expect(&mut state);
-        assert!(measuring.awaits(number) && state.is_measuring());
+        let (waking, woken) = channel();
+        let wake = move || waking.send(()).unwrap_or(());
+        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
+        state.measured = Some(DecoderResult::pending());
+        assert!(state.is_measuring());
         let mut impossible = settings;
         impossible.source.samples = 0;
         measuring.begin(impossible, run.network(), Arc::clone(run.test()));
-        measuring.job.wait(Duration::from_secs(60));
-        measuring.take_news(&mut state);
+        while state.is_measuring() {
+            woken.recv().unwrap();
+            measuring.take_news(&mut state);
+        }
         assert!(!state.is_measuring());
         for result in state.measured.iter().flatten() {
             let reason = result.report.clone().unwrap().unwrap_err();
             assert!(reason.contains("training samples"), "{reason}");
         }
         measuring.forget(&mut state);
-        assert!(state.measured.is_none() && !measuring.awaits(number));
+        assert!(state.measured.is_none());
     }
 }

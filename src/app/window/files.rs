@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use super::job::{Job, JobError, Wake};
+use crate::app::job::{Job, JobError, Wake};
 
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);

@@ -1,18 +1,17 @@
 //! Native file dialogs, waited for on a thread of their own.
 
 use std::{
-    path::{Path, PathBuf},
+    path::PathBuf,
     pin::Pin,
     time::{Duration, Instant},
 };
 
 use rfd::FileHandle;
 
-use super::{
-    file_task::FileTask,
+use crate::app::{
     job::{Job, Wake},
+    shared::FileTask,
 };
-use crate::export::figures::PictureFormat;
 
 /// An answer sooner than this was no person's: the desktop has no dialog to show.
 const NO_PERSON: Duration = Duration::from_millis(250);
@@ -55,11 +54,11 @@ impl Dialogs {
 
     /// Asks for the path of a file; returns whether there is a dialog to ask with. `wake` is called when the answer is
     /// there. Must run on the window's thread, which some desktops require.
-    pub fn ask(&mut self, task: FileTask, suggestion: &Path, wake: Wake) -> bool {
+    pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
         if self.kind == DialogKind::None {
             return false;
         }
-        let choice = choice(task, suggestion);
+        let choice = choice(task);
         let asked = Instant::now();
         let mut job = Job::new("file dialog", wake);
         job.start(
@@ -70,7 +69,7 @@ impl Dialogs {
             },
             |answer| answer.unwrap_or(Answer::NoDialog),
         );
-        self.asked.push((task, job));
+        self.asked.push((task.clone(), job));
         true
     }
 
@@ -89,25 +88,22 @@ impl Dialogs {
 }
 
 /// Shows the dialog.
-fn choice(task: FileTask, suggestion: &Path) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
-    let extension = task.extension();
-    let mut dialog = rfd::AsyncFileDialog::new()
-        .set_title(format!("{} {}", task.verb(), task.file_kind()))
-        .add_filter(extension.to_uppercase(), &[extension]);
+fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
+    let suggestion = task.suggested_path();
+    let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+    for extension in task.words.extensions {
+        dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
+    }
     if let Some(folder) = suggestion.parent() {
         dialog = dialog.set_directory(folder);
     }
-    if let FileTask::SavePicture(_) = task {
-        dialog = dialog.add_filter("SVG", &[PictureFormat::Svg.extension()]);
-    }
-    match task {
-        FileTask::Save(_) | FileTask::SaveExperiment(..) | FileTask::SaveTrade(_) | FileTask::SavePicture(_) => {
-            if let Some(name) = suggestion.file_name() {
-                dialog = dialog.set_file_name(name.to_string_lossy());
-            }
-            Box::pin(dialog.save_file())
-        }
+    if task.is_read() {
         // The terminal gives checkpoints any name.
-        FileTask::OpenCheckpoint => Box::pin(dialog.add_filter("All files", &["*"]).pick_file()),
+        Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
+    } else {
+        if let Some(name) = suggestion.file_name() {
+            dialog = dialog.set_file_name(name.to_string_lossy());
+        }
+        Box::pin(dialog.save_file())
     }
 }
