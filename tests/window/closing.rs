@@ -160,7 +160,7 @@ fn a_file_under_way_is_finished_before_the_window_closes() {
     driver.click_button("Save");
     assert!(!close(&mut driver));
     driver.harness().step();
-    assert!(driver.has("Finishing files") && driver.says("pipe is still being written"));
+    assert!(driver.has("Finishing files") && driver.says("pipe. The window closes by itself"));
     driver.click_button("Stay");
     assert!(!driver.has("Finishing files"));
     assert!(!close(&mut driver));

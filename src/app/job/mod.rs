@@ -45,6 +45,8 @@ pub enum JobError {
 pub(super) struct Job<E> {
     name: &'static str,
     wake: Wake,
+    /// Whether the work computes for long, and so yields to the window.
+    yields: bool,
     newest: Option<Piece<E>>,
 }
 
@@ -55,13 +57,21 @@ struct Piece<E> {
 }
 
 impl<E: Send + 'static> Job<E> {
-    /// No work yet. `name` is the thread's; `wake` is called after each event.
+    /// No work yet. `name` is the thread's; `wake` is called after each event. The work yields to the window.
     pub(super) fn new(name: &'static str, wake: Wake) -> Self {
         Self {
             name,
             wake,
+            yields: true,
             newest: None,
         }
+    }
+
+    /// As [`Self::new`], for work that the user waits for: it yields to nothing.
+    pub(super) fn prompt(name: &'static str, wake: Wake) -> Self {
+        let mut job = Self::new(name, wake);
+        job.yields = false;
+        job
     }
 
     /// Starts `work`, whose result becomes the last event by `last`, also where it panics or no thread can be started.
@@ -74,12 +84,14 @@ impl<E: Send + 'static> Job<E> {
         last: fn(Result<T, JobError>) -> E,
     ) {
         self.cancel();
-        let name = self.name;
+        let (name, yields) = (self.name, self.yields);
         let before = self.newest.take().map(|piece| piece.mailbox);
         let mailbox = Arc::new(Mailbox::new());
         let report = Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
         let run = move || {
-            yield_to_window();
+            if yields {
+                yield_to_window();
+            }
             if let Some(before) = before {
                 before.wait_for_end(None);
             }

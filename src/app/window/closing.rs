@@ -27,8 +27,6 @@ impl DecouplerWindow {
         let is_requested = self.ctx.input(|input| input.viewport().close_requested());
         if is_requested && self.closing.is_none() {
             self.closing = Some(Closing::Asking);
-            // The question must be seen.
-            self.ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
         }
         match self.closing {
             Some(Closing::Asking) if !self.has_unfinished_training() => {
@@ -53,6 +51,8 @@ impl DecouplerWindow {
         }
         if is_requested && !may_close {
             self.ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            // The question must be seen.
+            self.ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
         }
     }
 
@@ -80,10 +80,10 @@ impl DecouplerWindow {
             Some(Closing::Finishing) => {
                 let names = self.files.paths().map(|path| path.display().to_string());
                 let text = format!(
-                    "{} is still being written. The window closes by itself after that.",
+                    "Still being written: {}. The window closes by itself after that.",
                     names.collect::<Vec<_>>().join(", ")
                 );
-                let buttons = &[("Close without the file", Some(Closing::Now)), ("Stay", None)];
+                let buttons = &[("Stay", None), ("Close without them", Some(Closing::Now))];
                 ("Finishing files", text, buttons)
             }
             Some(Closing::ChoosingPath | Closing::Now) | None => return,

@@ -13,8 +13,9 @@ use crate::app::{
     shared::FileTask,
 };
 
-/// An answer sooner than this was no person's: the desktop has no dialog to show.
-const NO_PERSON: Duration = Duration::from_millis(250);
+/// An answer sooner than this was no person's: the desktop has no dialog to show. On a busy machine that takes a while to
+/// be found out; a person who cancels as fast is asked in the window.
+const NO_PERSON: Duration = Duration::from_secs(1);
 
 /// What became of a question for a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,7 +61,7 @@ impl Dialogs {
         }
         let choice = choice(task);
         let asked = Instant::now();
-        let mut job = Job::new("file dialog", wake);
+        let mut job = Job::prompt("file dialog", wake);
         job.start(
             move |_| match pollster::block_on(choice) {
                 Some(file) => Answer::Chosen(file.path().to_owned()),

@@ -29,7 +29,7 @@ impl Files {
 
     /// Writes the file `path` in the background.
     pub fn write<X: Display>(&mut self, path: PathBuf, write: impl FnOnce(&Path) -> Result<(), X> + Send + 'static) {
-        let mut job = Job::new("file", Arc::clone(&self.wake));
+        let mut job = Job::prompt("file", Arc::clone(&self.wake));
         let target = path.clone();
         job.start(
             move |_| write(&target).map_err(|error| error.to_string()),
