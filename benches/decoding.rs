@@ -169,10 +169,9 @@ fn print_scale(scale: ArrayScale) {
         }
     }
     let first = CompiledNetworks::<f64>::new(&networks(&training, InputChoice::BEST, 12), scale.rows());
-    let exact = Posterior::new(&model, &scene, &rows, &mut rng).unwrap();
     decoders.push((
         "polish, 1 step".into(),
-        Box::new(PolishedDecoder::new(Box::new(first), exact, &model, &scene, &rows, 1)),
+        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1, &mut rng).unwrap()),
     ));
     decoders.push((
         "newton".into(),

@@ -60,7 +60,29 @@ fn training_reports_decoders_reference_and_size_of_the_scene() {
         (&log["networks"], &log["inputs"]["scaling"]),
         (&1.into(), &"whitening".into())
     );
-    assert_eq!(log["reference"]["z_mm"], 0.0);
+    assert!(log["reference"]["z_mm"].as_f64().unwrap() < 1e-10);
+}
+
+/// Twelve readings determine four nodes to rounding, in proportion to which other errors say nothing; three leave them open.
+#[test]
+fn ratios_are_to_a_reference_that_is_more_than_rounding() {
+    let folder = tempfile::tempdir().unwrap();
+    let ratio = |array: &str| {
+        let call = format!("train {SMALL} --array {array} --preset best --epochs 1 --decoder newton");
+        let text = success(
+            &call
+                .replacen("--array 3x4_2x12 ", "", 1)
+                .replacen("--epochs 20 ", "", 1),
+            folder.path(),
+        );
+        let line = text.lines().find(|line| line.starts_with("newton")).unwrap();
+        let ratio = line.split_whitespace().nth(3).unwrap().parse::<f64>().ok();
+        assert_eq!(text.contains("nothing but rounding"), ratio.is_none(), "{text}");
+        ratio
+    };
+    assert_eq!(ratio("3x4_2x12"), None);
+    let open = ratio("3x4_2x3").unwrap();
+    assert!((0.9..1.2).contains(&open), "{open}");
 }
 
 #[test]

@@ -4,7 +4,9 @@ mod training_problems;
 
 use decoupler::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings},
+    training::{
+        Examples, MachineMemory, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings,
+    },
 };
 use ndarray::Array2;
 use training_problems::wave;
@@ -79,19 +81,31 @@ fn a_wide_network_is_resumed_with_the_same_bits() {
     assert_eq!(whole.present(), resumed.present());
 }
 
-/// Its equations would have 23 205 rows: 4 GB, and their inverse as much.
+/// Its equations would have 2 million rows: 32 TB, and their inverse as much.
 #[test]
 fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
+    let shape = Shape {
+        inputs: 2000,
+        hidden: 1000,
+        outputs: 3,
+    };
+    let refused = begin("br", shape, 8).err().unwrap();
+    assert!(
+        matches!(refused, TrainingError::TooWide { trainings: 1, memory, .. } if memory == MachineMemory::of_this_machine()),
+        "{refused:?}"
+    );
+    assert!(
+        refused
+            .to_string()
+            .contains(&MachineMemory::of_this_machine().to_string()),
+        "{refused}"
+    );
+    // 23 205 rows, were they written out: 4 GB.
     let shape = Shape {
         inputs: 220,
         hidden: 105,
         outputs: 3,
     };
-    let refused = begin("br", shape, 8).err();
-    assert!(
-        matches!(refused, Some(TrainingError::TooWide { bytes }) if bytes > 8_000_000_000),
-        "{refused:?}"
-    );
     let mut trainer = begin("lm", shape, 8).unwrap();
     let start = trainer.latest().training_mse;
     trainer.step();

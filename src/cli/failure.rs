@@ -136,7 +136,6 @@ fn comes_of_arguments(error: &RunError) -> bool {
             | RunError::Scene(_)
             | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
             | RunError::Training(_)
-            | RunError::TooManyTrainings { .. }
             | RunError::Memory { .. }
     )
 }

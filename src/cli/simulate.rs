@@ -14,7 +14,7 @@ use super::{
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
-    evaluation::{DecoderSet, Run, RunError, SimulatedSettings, Simulation},
+    evaluation::{DecoderSet, Run, RunError, SimulatedSettings, Simulation, error_remarks},
     export::{AtomicFile, WriteError, write_samples, write_samples_header},
     sensor::{ArrayScale, SensorModel},
 };
@@ -99,9 +99,15 @@ impl Simulate {
             announce(settings)?;
             let mut run = Run::prepare(*settings)?;
             while run.step().is_none() {}
-            let errors = run.node_scores().map(|scores| scores.network);
-            if let Some(flaw) = errors.and_then(|errors| run.flaw(&errors)) {
-                eprintln!("Warning: {flaw}");
+            let scores = run.node_scores();
+            let remarks =
+                scores.map(|scores| error_remarks(settings, &scores.network, &scores.baselines, run.stop_reason()));
+            let remarks = remarks.into_iter().flatten();
+            let of_network = remarks
+                .filter(|(row, _)| *row == "network")
+                .map(|(_, remark)| remark.to_string());
+            for warning in run.flaw().map(|flaw| flaw.to_string()).into_iter().chain(of_network) {
+                eprintln!("Warning: {warning}");
             }
             Some(run.network())
         } else {

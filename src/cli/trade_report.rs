@@ -196,6 +196,9 @@ fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::
     if let Some(reference) = level.points.first().and_then(|point| point.reference) {
         let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));
         write!(out, ", reference {percent} % ({mm} mm)")?;
+        if reference.is_rounding() {
+            write!(out, ", nothing but rounding")?;
+        }
     }
     writeln!(
         out,

@@ -78,7 +78,7 @@ impl Train {
         } else {
             self.measure_decoders(&file, &run)
         };
-        let flaw = run.flaw(&file.errors);
+        let flaw = run.flaw();
         let measured = decoders.as_deref().unwrap_or_default();
         if self.json {
             print_json(&file, flaw.as_ref(), measured)?;

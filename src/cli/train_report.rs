@@ -148,7 +148,7 @@ pub(super) fn print_json(
             .into_iter()
             .chain(flaw.map(ToString::to_string))
             .collect(),
-        remarks: remarks(file, flaw),
+        remarks: remarks(file),
         decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
         reference: file.baselines.reference.as_ref().map(|errors| Reference {
             z_percent: errors.z_percent,
@@ -178,11 +178,11 @@ fn decoder(report: &DecoderReport) -> Decoder {
     }
 }
 
-/// Remarks on the rows of the error table, but for the network if its `flaw` is told.
-fn remarks(file: &NetworkFile, flaw: Option<&RunFlaw>) -> Vec<String> {
-    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines);
-    let told = remarks.iter().filter(|(row, _)| flaw.is_none() || *row != "network");
-    let told = told.map(|(row, remark)| format!("{row}: {remark}"));
+/// Remarks on the rows of the error table.
+fn remarks(file: &NetworkFile) -> Vec<String> {
+    let reason = file.training.stop_reason;
+    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines, reason);
+    let told = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
     told.chain(ReferenceNote::of(&file.baselines).map(|note| note.to_string()))
         .collect()
 }
@@ -257,10 +257,17 @@ fn write_text(
     }
     let published = settings.published();
     write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
-    for remark in remarks(file, flaw) {
+    for remark in remarks(file) {
         writeln!(out, "Warning: {remark}")?;
     }
-    write_decoders(decoders, file.baselines.reference.as_ref(), out)?;
+    let reference = file.baselines.reference.as_ref();
+    if reference.is_some_and(Errors::is_rounding) {
+        writeln!(
+            out,
+            "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is given."
+        )?;
+    }
+    write_decoders(decoders, reference, out)?;
     writeln!(
         out,
         "\nErrors in % are means of the coordinate, as in the paper; of the stroke where said so."
@@ -334,9 +341,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     writeln!(out)?;
     for report in decoders {
         write!(out, "{:<14}", report.name())?;
-        let ratio = reference
-            .filter(|limit| limit.z_mm > 0.0)
-            .map(|limit| report.errors.z_mm / limit.z_mm);
+        let ratio = reference.and_then(|reference| report.errors.times(reference));
         let values = [
             report.errors.z_percent,
             Some(report.errors.z_mm),

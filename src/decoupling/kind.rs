@@ -15,7 +15,7 @@ pub enum DecoderKind {
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
     Fuzzy,
-    /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise.
+    /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise or the equations leave the answer open.
     Newton,
     /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
     Polish,
@@ -131,7 +131,7 @@ impl DecoderKind {
             Self::Newton => Entry {
                 word: "newton",
                 name: "Newton",
-                meaning: "Newton's method on Eq. (2) from mid-stroke, and other starts where that fails; with noise and prior where the scene has noise",
+                meaning: "Newton's method on Eq. (2) from mid-stroke, and other starts where that fails; with noise and prior where the scene has noise or the readings leave the answer open",
                 colour: ColourKey::Red,
                 needs: Needs::Sensor,
             },

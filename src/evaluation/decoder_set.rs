@@ -9,9 +9,9 @@ use super::{
 use crate::{
     dataset::{Dataset, PerRow, Stream},
     decoupling::{
-        AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior,
-        PosteriorDecoder, Precision, RadialBasisNetwork, RadialBasisSettings, SolvedRows, TakagiSugeno, TrainingMean,
-        decode_set, resistance_residual,
+        AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, PolishedDecoder, Posterior, PosteriorDecoder,
+        Precision, RadialBasisNetwork, RadialBasisSettings, SolvedRows, TakagiSugeno, TrainingMean, decode_set,
+        resistance_residual,
     },
     network::Networks,
     scene::RowModel,
@@ -137,17 +137,16 @@ impl DecoderSet {
                     return Ok(None);
                 };
                 let (sensor, scene) = (&simulation.sensor, &simulation.scene);
-                let mut posterior = || Posterior::new(sensor, scene, rows, &mut rng);
                 if kind == DecoderKind::Polish {
                     let Some(first) = self.network(Precision::Double) else {
                         return Ok(None);
                     };
                     let steps = DecoderKind::POLISH_STEPS;
-                    Box::new(PolishedDecoder::new(first, posterior()?, sensor, scene, rows, steps))
+                    Box::new(PolishedDecoder::new(first, sensor, scene, rows, steps, &mut rng)?)
                 } else {
-                    let posterior = posterior()?;
-                    if posterior.is_decided_by_equations() {
-                        Box::new(NewtonDecoder::new(sensor, scene, rows, NewtonRules::default())?)
+                    let posterior = Posterior::new(sensor, scene, rows, &mut rng)?;
+                    if scene.noise.in_test().is_none() {
+                        Box::new(NewtonDecoder::with_posterior(posterior, sensor, scene, rows)?)
                     } else {
                         Box::new(PosteriorDecoder::new(posterior, sensor, scene, rows)?)
                     }

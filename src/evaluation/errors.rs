@@ -80,6 +80,19 @@ impl Errors {
             worst_node,
         }
     }
+
+    /// Returns the mean |decoupled z − z| in proportion to that of the Bayesian `reference`; `None` where that is nothing
+    /// but [rounding](Self::is_rounding).
+    pub fn times(&self, reference: &Self) -> Option<f64> {
+        (!reference.is_rounding()).then(|| self.z_mm / reference.z_mm)
+    }
+
+    /// Returns `true` if errors of z are at most 1e-9 of the stroke, a hundredth of an atom for a stroke of a millimetre: a
+    /// Bayesian reference that small says that the readings determine the deformation to their rounding, and other errors
+    /// in proportion to it say nothing.
+    pub fn is_rounding(&self) -> bool {
+        self.z_full_scale_percent <= 1e-7
+    }
 }
 
 #[cfg(test)]
@@ -118,6 +131,17 @@ mod tests {
                 node: 2
             }
         );
+    }
+
+    #[test]
+    fn nothing_is_measured_in_units_of_rounding() {
+        let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
+        let off = |by_mm: f64| Errors::measure(&truth, &truth.targets().mapv(|value| value + by_mm), 1.0);
+        for rounding_mm in [0.0, 1e-13, 1e-10] {
+            assert_eq!(off(0.1).times(&off(rounding_mm)), None, "{rounding_mm}");
+        }
+        let times = off(0.1).times(&off(1e-4)).unwrap();
+        assert!((times - 1000.0).abs() < 1e-6, "{times}");
     }
 
     #[test]

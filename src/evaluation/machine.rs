@@ -1,6 +1,6 @@
-//! What the machine can do: its memory and its speed.
+//! Speed of the machine.
 
-use std::{fs, hint::black_box, sync::OnceLock, time::Instant};
+use std::{hint::black_box, sync::OnceLock, time::Instant};
 
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 use glam::DVec3;
@@ -67,32 +67,4 @@ fn node_pairs_per_second() -> f64 {
 pub(super) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
     let scale = sensor.scale;
     scale.nodes_per_row() as f64 * scale.nodes_per_column() as f64 * scale.columns() as f64
-}
-
-/// Memory of the machine in bytes, or what a container leaves of it; `None` where the system does not tell.
-pub(super) fn memory_bytes() -> Option<u64> {
-    let total = fs::read_to_string("/proc/meminfo")
-        .ok()
-        .and_then(|text| total_bytes(&text));
-    let limit = fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-    let limit = limit.and_then(|text| text.trim().parse().ok());
-    [total, limit].into_iter().flatten().min()
-}
-
-fn total_bytes(meminfo: &str) -> Option<u64> {
-    let total = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kibibytes: u64 = total.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_memory_of_the_machine_is_read() {
-        let text = "MemTotal:       24683956 kB\nMemFree:        24097000 kB\n";
-        assert_eq!(total_bytes(text), Some(24_683_956 * 1024));
-        assert_eq!(total_bytes("MemFree: 5 kB\n"), None);
-    }
 }

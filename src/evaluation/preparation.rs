@@ -13,12 +13,9 @@ use super::{
 use crate::{
     dataset::{Dataset, Split, Stream},
     decoupling::decode_set,
-    network::{Shape, nguyen_widrow},
-    training::{Method, ResumeError, Trainer, TrainerState},
+    network::nguyen_widrow,
+    training::{ResumeError, Trainer, TrainerState, check_width},
 };
-
-/// Largest memory for the equations of all restarts together.
-const LARGEST_EQUATIONS_BYTES: usize = 8_000_000_000;
 
 impl Run {
     /// Draws and scales the sets, initialises the networks and measures the baselines.
@@ -131,7 +128,7 @@ impl Run {
         let first = tasks.at(0);
         let samples = first.problem.training.samples();
         let trainings = settings.starts * tasks.values().len();
-        check_memory(&settings.training.method, first.shape, samples, trainings)?;
+        check_width(&settings.training.method, first.shape, samples, trainings)?;
         if is_cancelled() {
             return Ok(None);
         }
@@ -201,15 +198,6 @@ pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);
     Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
-}
-
-/// Checks that the equations of all restarts fit into memory together; a single one is checked by the trainer.
-pub(super) fn check_memory(method: &Method, shape: Shape, samples: usize, trainings: usize) -> Result<(), RunError> {
-    let bytes = method.equations_bytes(shape, samples).saturating_mul(trainings);
-    if trainings > 1 && bytes > LARGEST_EQUATIONS_BYTES {
-        return Err(RunError::TooManyTrainings { trainings, bytes });
-    }
-    Ok(())
 }
 
 #[cfg(test)]

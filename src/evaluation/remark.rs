@@ -2,8 +2,9 @@ use std::fmt;
 
 use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors};
 use crate::{
-    decoupling::{DecoderKind, SolvedRows},
+    decoupling::{DecoderKind, Precision, SolvedRows},
     scene::{Noise, NoisySets},
+    training::{Method, StopReason},
 };
 
 /// Remark on a decoder's result that is not to be trusted, with cause and cure. Printed beside its errors.
@@ -40,6 +41,13 @@ pub enum Cause {
     },
     /// The network has not learned what other samples have in common with those of the training set.
     Training,
+    /// The way the training of the network ended.
+    End {
+        /// Reason why it ended.
+        reason: StopReason,
+        /// Its method.
+        method: Method,
+    },
     /// The noise of the readings.
     Noise,
     /// Nothing known: the decoder does not suit these data.
@@ -78,6 +86,7 @@ impl fmt::Display for Cause {
                 "the network has learned too little, or its samples by heart; train it for more epochs, with other \
                  hidden nodes, or on more samples",
             ),
+            Self::End { reason, method } => f.write_str(&reason.remedy(method)),
             Self::Noise => f.write_str("the noise of the readings hides it; reduce the noise, or give more samples"),
             Self::Unknown => {
                 f.write_str("this decoder does not suit these data; use another one, or give more samples")
@@ -149,8 +158,8 @@ impl Remark {
         };
         let z = Pair {
             target: "z".to_owned(),
-            error: errors.z_mm,
-            of_mean: mean.z_mm,
+            error: errors.z_full_scale_percent,
+            of_mean: mean.z_full_scale_percent,
         };
         let others = [
             percent("x", errors.x_percent, mean.x_percent),
@@ -175,6 +184,15 @@ impl Remark {
         Self::on(pairs, Cause::of(kind, settings, samples, readings))
     }
 
+    /// Names how the training of the network ended as the cause, unless it could not know of the noise.
+    fn tell_end(&mut self, reason: Option<StopReason>, method: Method) {
+        if let (Self::WorseThanMean { cause, .. }, Some(reason)) = (self, reason)
+            && *cause != Cause::UnseenNoise
+        {
+            *cause = Cause::End { reason, method };
+        }
+    }
+
     fn on(pairs: impl Iterator<Item = Pair>, cause: Cause) -> Vec<Self> {
         let worse = pairs.filter(Pair::is_worse).map(|pair| Self::WorseThanMean {
             times: pair.error / pair.of_mean,
@@ -185,22 +203,30 @@ impl Remark {
     }
 }
 
-/// Remarks on the rows of an error table by their names: on the network, and on the linear map.
+/// Remarks on the rows of an error table by their names: on the network, whose training ended for `reason`, and on the
+/// linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
     network: &Errors,
     baselines: &Baselines,
+    reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;
     let readings = simulation.sensor.scale.columns();
     let networks = simulation.model_size().map_or(1, |size| size.networks);
+    let method = settings.training.method;
     let settings = RunSettings::from(*settings);
     let rows = [
         ("linear map", DecoderKind::Ridge, &baselines.linear, simulation.samples),
         ("network", DecoderKind::Network, network, simulation.samples / networks),
     ];
     let of_row = |(name, kind, errors, samples)| {
-        let remarks = Remark::on_nodes(kind, (errors, &baselines.mean), &settings, (samples, readings));
+        let mut remarks = Remark::on_nodes(kind, (errors, &baselines.mean), &settings, (samples, readings));
+        for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
+            remark.tell_end(reason, method);
+        }
+        // All answers have a residual where figures are all that is asked for.
+        remarks.extend(MissingFigures::of(Precision::Double, errors, 0.0).map(Remark::Missing));
         remarks.into_iter().map(move |remark| (name, remark))
     };
     rows.into_iter().flat_map(of_row).collect()

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::{
     Baselines, Errors, RunError, RunFlaw, RunSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
-    preparation::check_memory, starts::lowest,
+    starts::lowest,
 };
 use crate::{
     dataset::{Dataset, PerRow},
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
-    training::{Method, SettingError, StopReason, StoppingRules, TrainerState},
+    training::{Method, SettingError, StopReason, StoppingRules, TrainerState, check_width},
 };
 
 /// A run: its sets of samples, one training per restart, and the errors of the best network.
@@ -75,10 +75,9 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Finds the defect of the leader, once its trainings have ended, given [`Self::errors_of`] its answers; `None` for a
-    /// sound or a measured run.
-    pub fn flaw(&self, network: &Errors) -> Option<RunFlaw> {
-        RunFlaw::of(self.leader(), network, &self.baselines.as_ref()?.mean)
+    /// Finds the defect of the leader, once its trainings have ended; `None` for a sound run.
+    pub fn flaw(&self) -> Option<RunFlaw> {
+        RunFlaw::of(self.leader())
     }
 
     /// Continues every restart from its present weights with another method: [`Trainer::continue_with`].
@@ -89,7 +88,7 @@ impl Run {
         let rows = self.leader().rows();
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
-        check_memory(&method, rows[0].present().shape(), samples, trainings)?;
+        check_width(&method, rows[0].present().shape(), samples, trainings)?;
         // Restarts have the same shapes, so either the first is refused or none.
         for start in &mut self.starts {
             start.continue_with(method)?;

@@ -7,7 +7,7 @@ use crate::{
     network::ScalingError,
     scene::SceneError,
     sensor::SensorError,
-    training::{ResumeError, TrainingError},
+    training::{MachineMemory, ResumeError, TrainingError},
 };
 
 /// Error in preparing a run.
@@ -78,30 +78,17 @@ pub enum RunError {
     /// A training cannot begin.
     #[error(transparent)]
     Training(#[from] TrainingError),
-    /// The equations of all restarts would take too much memory.
-    #[error(
-        "{trainings} trainings at once, starts times networks, would take {:.1} GB with this method: use fewer starts, \
-         fewer hidden nodes, or the scaled conjugate gradient (scg)",
-        *.bytes as f64 * 1e-9
-    )]
-    TooManyTrainings {
-        /// Number of restarts times networks.
-        trainings: usize,
-        /// Memory needed, in bytes.
-        bytes: usize,
-    },
     /// The run would take more memory than the machine has.
     #[error(
-        "this would take about {:.1} GB of memory, and the machine has {:.1} GB: use fewer samples, hidden nodes or starts, \
-         or the scaled conjugate gradient (scg)",
-        *.bytes as f64 * 1e-9,
-        *.machine_bytes as f64 * 1e-9
+        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or starts, or the scaled \
+         conjugate gradient (scg)",
+        *.bytes as f64 * 1e-9
     )]
     Memory {
         /// Memory needed, in bytes.
         bytes: u64,
-        /// Memory of the machine, in bytes.
-        machine_bytes: u64,
+        /// Memory that there is.
+        memory: MachineMemory,
     },
     /// A saved training cannot be resumed.
     #[error("start {}: {source}", .start + 1)]

@@ -27,10 +27,9 @@ impl TradePoint {
         self.report.kind.needs_network().then_some(self.settings.hidden)
     }
 
-    /// Its error in proportion to the reference; `None` without a reference, or without noise, where it is 0.
+    /// Its error in proportion to the reference: [`Errors::times`]; `None` without a reference.
     pub fn to_reference(&self) -> Option<f64> {
-        let limit = self.reference?.z_mm;
-        (limit > 0.0).then(|| self.report.errors.z_mm / limit)
+        self.report.errors.times(self.reference.as_ref()?)
     }
 
     /// Returns decoding time in microseconds and AveZerr in percent.

@@ -2,11 +2,12 @@ use std::time::Duration;
 
 use super::{
     RunError, SimulatedSettings,
-    machine::{Speed, memory_bytes, node_pairs_per_row},
+    machine::{Speed, node_pairs_per_row},
 };
 use crate::{
     network::Shape,
     scene::{Loading, Movement, Rows},
+    training::MachineMemory,
 };
 
 /// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
@@ -91,26 +92,19 @@ impl Workload {
         }
     }
 
-    /// Memory of this machine in bytes, where the system tells.
-    pub fn machine_bytes() -> Option<u64> {
-        memory_bytes()
-    }
-
-    /// Checks that the machine has the memory.
+    /// Checks that there is the memory.
     ///
     /// # Errors
     /// [`RunError::Memory`] if it has not.
     pub fn check_memory(&self) -> Result<(), RunError> {
-        if !self.is_large() {
-            return Ok(());
-        }
-        match memory_bytes() {
-            Some(machine_bytes) if self.bytes > machine_bytes => Err(RunError::Memory {
+        let memory = MachineMemory::of_this_machine();
+        if self.bytes > memory.bytes {
+            return Err(RunError::Memory {
                 bytes: self.bytes,
-                machine_bytes,
-            }),
-            _ => Ok(()),
+                memory,
+            });
         }
+        Ok(())
     }
 }
 
@@ -182,9 +176,10 @@ mod tests {
         settings.starts = 100;
         let workload = Workload::of(&settings).unwrap();
         assert!(workload.bytes > 500_000_000_000, "{workload:?}");
-        if Workload::machine_bytes().is_some_and(|bytes| bytes < workload.bytes) {
+        let memory = MachineMemory::of_this_machine();
+        if memory.bytes < workload.bytes {
             let message = workload.check_memory().unwrap_err().to_string();
-            assert!(message.contains("GB of memory, and the machine has"), "{message}");
+            assert!(message.contains(&format!("GB of memory, and {memory}")), "{message}");
         }
     }
 }

@@ -38,7 +38,10 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
             ));
         }
     }
-    let limit = level.points.first().and_then(|point| point.reference?.z_percent);
+    let limit = level.points.first().and_then(|point| point.reference);
+    let limit = limit
+        .filter(|limit| !limit.is_rounding())
+        .and_then(|limit| limit.z_percent);
     let costs = level
         .points
         .iter()
@@ -54,12 +57,7 @@ pub fn trade_plot(level: &TradeLevel, cost: TradeCost) -> Plot {
     });
     all.push(Series {
         is_dashed: true,
-        ..series(
-            "Bayesian reference".to_owned(),
-            Hue::Grey,
-            None,
-            ends.filter(|end| end.y > 0.0).collect(),
-        )
+        ..series("Bayesian reference".to_owned(), Hue::Grey, None, ends.collect())
     });
     all.retain(|series| !series.points.is_empty());
     Plot {

@@ -1,11 +1,19 @@
 use super::format_duration;
-use crate::evaluation::{Workload, WorkloadTime};
+use crate::{
+    evaluation::{Workload, WorkloadTime},
+    training::MachineMemory,
+};
 
 /// Tells how much memory and time a run will take on this machine. The first time its speed is measured, which takes
 /// some 20 ms.
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
-    let machine = Workload::machine_bytes().map_or_else(String::new, |bytes| format!(" of {}", gigabytes(bytes)));
+    let memory = MachineMemory::of_this_machine();
+    let machine = if memory.is_known {
+        format!(" of {}", gigabytes(memory.bytes))
+    } else {
+        String::new()
+    };
     let WorkloadTime {
         drawing,
         epoch,

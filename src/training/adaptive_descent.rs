@@ -3,82 +3,27 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, StopReason,
     algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
-    setting::LARGEST_MOMENTUM,
+    setting::{LARGEST_MOMENTUM, settings},
 };
 use crate::network::Mlp;
 
-/// Settings of gradient descent with momentum and an adaptive learning rate, with the field's usual defaults
-/// (`traingdx`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AdaptiveDescentSettings {
-    /// Initial learning rate.
-    pub learning_rate: f64,
-    /// The momentum constant mc.
-    pub momentum: f64,
-    /// Factor on the learning rate after a step that lowers the error.
-    pub rate_increase: f64,
-    /// Factor on the learning rate after a rejected step.
-    pub rate_decrease: f64,
-    /// A step that raises the error by more than this factor is rejected.
-    pub largest_error_increase: f64,
-}
-
-impl Default for AdaptiveDescentSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-            rate_increase: 1.05,
-            rate_decrease: 0.7,
-            largest_error_increase: 1.04,
-        }
-    }
-}
-
-impl AdaptiveDescentSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "learning rate",
-                meaning: "Initial step length relative to the length of the gradient; it adapts from there.",
-                default: default.learning_rate,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.learning_rate,
-            },
-            Setting {
-                name: "momentum",
-                meaning: "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
-                default: default.momentum,
-                range: 0.0..=LARGEST_MOMENTUM,
-                value: &mut self.momentum,
-            },
-            Setting {
-                name: "rate increase",
-                meaning: "Factor on the learning rate after a step that lowers the error.",
-                default: default.rate_increase,
-                range: 1.0..=1e3,
-                value: &mut self.rate_increase,
-            },
-            Setting {
-                name: "rate decrease",
-                meaning: "Factor on the learning rate after a rejected step.",
-                default: default.rate_decrease,
-                range: 1e-6..=0.999,
-                value: &mut self.rate_decrease,
-            },
-            Setting {
-                name: "largest error increase",
-                meaning: "A step that raises the error by more than this factor is rejected.",
-                default: default.largest_error_increase,
-                range: 1.0..=1e6,
-                value: &mut self.largest_error_increase,
-            },
-        ]
+settings! {
+    /// Settings of gradient descent with momentum and an adaptive learning rate, with the field's usual defaults
+    /// (`traingdx`).
+    pub struct AdaptiveDescentSettings {
+        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
+            "Initial step length relative to the length of the gradient; it adapts from there.";
+        momentum: "momentum" = 0.9, in 0.0..=LARGEST_MOMENTUM,
+            "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
+        rate_increase: "rate increase" = 1.05, in 1.0..=1e3,
+            "Factor on the learning rate after a step that lowers the error.";
+        rate_decrease: "rate decrease" = 0.7, in 1e-6..=0.999,
+            "Factor on the learning rate after a rejected step.";
+        largest_error_increase: "largest error increase" = 1.04, in 1.0..=1e6,
+            "A step that raises the error by more than this factor is rejected.";
     }
 }
 
@@ -132,10 +77,6 @@ impl Algorithm for AdaptiveDescent {
         parameter_name: "learning rate",
         cure: "lower the learning rate, run more epochs, or take another seed",
     };
-
-    fn list(settings: &mut AdaptiveDescentSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);

@@ -1,12 +1,12 @@
 //! The interface of a training method: each method's file implements it, and [`super::Method`] lists the methods.
 
-use super::{Evaluation, Examples, Setting, SettingError, StopReason};
+use super::{Evaluation, Examples, SettingError, StopReason, setting::Settings};
 use crate::network::{Mlp, Shape};
 
 /// A training method at work on one network.
 pub(super) trait Algorithm: Sized + Send + Sync {
     /// Settings, chosen before training.
-    type Settings: Default;
+    type Settings: Settings;
     /// Everything that is carried from epoch to epoch beside the weights.
     type State;
 
@@ -17,9 +17,6 @@ pub(super) trait Algorithm: Sized + Send + Sync {
     fn default_settings() -> Self::Settings {
         Self::Settings::default()
     }
-
-    /// The settings, to be shown and changed.
-    fn list(settings: &mut Self::Settings) -> Vec<Setting<'_>>;
 
     /// Checks settings against each other, each being in its own range.
     ///

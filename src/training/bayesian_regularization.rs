@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Damping, Evaluation, Examples, FactoredEquations, Setting, SettingError, StopReason,
+    Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
@@ -99,10 +99,6 @@ impl Algorithm for BayesianRegularization {
             mu: 0.005,
             ..Damping::default()
         }
-    }
-
-    fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
-        settings.list(Self::default_settings())
     }
 
     fn check(settings: &Damping) -> Result<(), SettingError> {

@@ -32,7 +32,7 @@ impl Trainer {
     /// Those of [`Self::continue_with`].
     pub fn check_method(&self, method: &Method) -> Result<(), TrainingError> {
         method.check()?;
-        check_width(method, self.mlp.shape(), self.problem.training.samples())
+        check_width(method, self.mlp.shape(), self.problem.training.samples(), 1)
     }
 
     /// Replaces the stopping rules. A training that the new rules would not have ended at its present epoch continues, for

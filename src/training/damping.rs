@@ -1,31 +1,21 @@
 //! The damping mu of the methods that take Levenberg-Marquardt steps.
 
-use serde::{Deserialize, Serialize};
+use super::{
+    SettingError, StopReason,
+    setting::{check_limit, settings},
+};
 
-use super::{Setting, SettingError, StopReason, setting::check_limit};
-
-/// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Damping {
-    /// Initial mu. A large mu gives short steps down the gradient, a small one full Gauss-Newton steps.
-    pub mu: f64,
-    /// Factor on mu after an accepted step.
-    pub mu_decrease: f64,
-    /// Factor on mu after a rejected step.
-    pub mu_increase: f64,
-    /// Training ends when mu exceeds this.
-    pub mu_max: f64,
-}
-
-impl Default for Damping {
-    fn default() -> Self {
-        Self {
-            mu: 1e-3,
-            mu_decrease: 0.1,
-            mu_increase: 10.0,
-            mu_max: 1e10,
-        }
+settings! {
+    /// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
+    pub struct Damping {
+        mu: "mu" = 1e-3, in SMALLEST_MU..=1e300,
+            "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.";
+        mu_decrease: "mu decrease" = 0.1, in 1e-6..=0.999,
+            "Factor on mu after a step that lowers the error.";
+        mu_increase: "mu increase" = 10.0, in 1.001..=1e6,
+            "Factor on mu after a step that does not lower the error.";
+        mu_max: "largest mu" = 1e10, in SMALLEST_MU..=1e300,
+            "Training ends when mu exceeds this: no step lowers the error any more.";
     }
 }
 
@@ -33,40 +23,6 @@ impl Default for Damping {
 const SMALLEST_MU: f64 = 1e-20;
 
 impl Damping {
-    /// The settings, to be shown and changed, given their defaults.
-    pub(super) fn list(&mut self, default: Self) -> Vec<Setting<'_>> {
-        vec![
-            Setting {
-                name: "mu",
-                meaning: "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.",
-                default: default.mu,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu,
-            },
-            Setting {
-                name: "mu decrease",
-                meaning: "Factor on mu after a step that lowers the error.",
-                default: default.mu_decrease,
-                range: 1e-6..=0.999,
-                value: &mut self.mu_decrease,
-            },
-            Setting {
-                name: "mu increase",
-                meaning: "Factor on mu after a step that does not lower the error.",
-                default: default.mu_increase,
-                range: 1.001..=1e6,
-                value: &mut self.mu_increase,
-            },
-            Setting {
-                name: "largest mu",
-                meaning: "Training ends when mu exceeds this: no step lowers the error any more.",
-                default: default.mu_max,
-                range: SMALLEST_MU..=1e300,
-                value: &mut self.mu_max,
-            },
-        ]
-    }
-
     /// Checks that there is a damping to try.
     pub(super) fn check(&self) -> Result<(), SettingError> {
         check_limit(("mu", self.mu), ("largest mu", self.mu_max))

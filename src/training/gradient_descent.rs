@@ -1,37 +1,18 @@
 //! Conventional back-propagation (`traingd`).
 
-use serde::{Deserialize, Serialize};
-
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, StopReason,
     algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
+    setting::settings,
 };
 use crate::network::Mlp;
 
-/// Settings of gradient descent, with the field's usual default (`traingd`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GradientDescentSettings {
-    /// The learning rate.
-    pub learning_rate: f64,
-}
-
-impl Default for GradientDescentSettings {
-    fn default() -> Self {
-        Self { learning_rate: 0.01 }
-    }
-}
-
-impl GradientDescentSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting {
-            name: "learning rate",
-            meaning: "Step length relative to the length of the gradient.",
-            default: Self::default().learning_rate,
-            range: f64::MIN_POSITIVE..=1e300,
-            value: &mut self.learning_rate,
-        }]
+settings! {
+    /// Settings of gradient descent, with the field's usual default (`traingd`).
+    pub struct GradientDescentSettings {
+        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
+            "Step length relative to the length of the gradient.";
     }
 }
 
@@ -54,10 +35,6 @@ impl Algorithm for GradientDescent {
         parameter_name: "learning rate",
         cure: "change the learning rate, run more epochs, or take another method",
     };
-
-    fn list(settings: &mut GradientDescentSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn new(settings: GradientDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);

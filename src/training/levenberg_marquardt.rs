@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Damping, Evaluation, Examples, NormalEquations, Setting, SettingError, StopReason,
+    Damping, Evaluation, Examples, NormalEquations, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
@@ -42,10 +42,6 @@ impl Algorithm for LevenbergMarquardt {
         parameter_name: "mu",
         cure: "take another seed, more samples, or fewer hidden nodes",
     };
-
-    fn list(settings: &mut Damping) -> Vec<Setting<'_>> {
-        settings.list(Self::default_settings())
-    }
 
     fn check(settings: &Damping) -> Result<(), SettingError> {
         settings.check()

@@ -18,6 +18,7 @@ use super::{
     momentum::Momentum,
     resilient::{Resilient, ResilientState},
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
+    setting::Settings as _,
     step_momentum::StepMomentum,
     variable_projection::{ProjectionState, VariableProjection},
 };
@@ -71,7 +72,7 @@ macro_rules! methods {
             /// The settings of this method, to be shown and changed.
             pub fn settings(&mut self) -> Vec<Setting<'_>> {
                 match self {
-                    $(Self::$name(settings) => $name::list(settings),)*
+                    $(Self::$name(settings) => settings.list($name::default_settings()),)*
                 }
             }
 

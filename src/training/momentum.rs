@@ -1,52 +1,20 @@
 //! Gradient descent with momentum of gradients, Eq. (11) of the paper.
 
-use serde::{Deserialize, Serialize};
-
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, StopReason,
     algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
+    setting::settings,
 };
 use crate::network::Mlp;
 
-/// Settings of gradient descent with momentum, with the field's usual defaults.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MomentumSettings {
-    /// α, the learning rate.
-    pub learning_rate: f64,
-    /// η, the momentum factor.
-    pub momentum: f64,
-}
-
-impl Default for MomentumSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-        }
-    }
-}
-
-impl MomentumSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "learning rate",
-                meaning: "Step length relative to the length of the gradient (alpha).",
-                default: default.learning_rate,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.learning_rate,
-            },
-            Setting {
-                name: "momentum",
-                meaning: "Share of the previous gradient in each step (eta), from 0 to 1.",
-                default: default.momentum,
-                range: 0.0..=1.0,
-                value: &mut self.momentum,
-            },
-        ]
+settings! {
+    /// Settings of gradient descent with momentum, with the field's usual defaults.
+    pub struct MomentumSettings {
+        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
+            "Step length relative to the length of the gradient (alpha).";
+        momentum: "momentum" = 0.9, in 0.0..=1.0,
+            "Share of the previous gradient in each step (eta), from 0 to 1.";
     }
 }
 
@@ -71,10 +39,6 @@ impl Algorithm for Momentum {
         parameter_name: "learning rate",
         cure: "change the learning rate, run more epochs, or take another method",
     };
-
-    fn list(settings: &mut MomentumSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);

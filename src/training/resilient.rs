@@ -3,71 +3,24 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, Setting, SettingError, StopReason,
+    Evaluation, Examples, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
-    setting::check_limit,
+    setting::{check_limit, settings},
 };
 use crate::network::Mlp;
 
-/// Settings of resilient back-propagation, with the field's usual defaults (`trainrp`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ResilientSettings {
-    /// Initial step length of every weight.
-    pub first_length: f64,
-    /// Factor on a weight's step length while its slope keeps its sign.
-    pub length_increase: f64,
-    /// Factor on a weight's step length when its slope changes sign.
-    pub length_decrease: f64,
-    /// Largest step length.
-    pub largest_length: f64,
-}
-
-impl Default for ResilientSettings {
-    fn default() -> Self {
-        Self {
-            first_length: 0.07,
-            length_increase: 1.2,
-            length_decrease: 0.5,
-            largest_length: 50.0,
-        }
-    }
-}
-
-impl ResilientSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "first step length",
-                meaning: "Step length of every weight in the first epoch (delta0).",
-                default: default.first_length,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.first_length,
-            },
-            Setting {
-                name: "length increase",
-                meaning: "Factor on a weight's step length while its slope keeps its sign.",
-                default: default.length_increase,
-                range: 1.0..=1e3,
-                value: &mut self.length_increase,
-            },
-            Setting {
-                name: "length decrease",
-                meaning: "Factor on a weight's step length when its slope changes sign.",
-                default: default.length_decrease,
-                range: 1e-6..=0.999,
-                value: &mut self.length_decrease,
-            },
-            Setting {
-                name: "largest step length",
-                meaning: "Largest step of a weight in one epoch (deltamax).",
-                default: default.largest_length,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.largest_length,
-            },
-        ]
+settings! {
+    /// Settings of resilient back-propagation, with the field's usual defaults (`trainrp`).
+    pub struct ResilientSettings {
+        first_length: "first step length" = 0.07, in f64::MIN_POSITIVE..=1e300,
+            "Step length of every weight in the first epoch (delta0).";
+        length_increase: "length increase" = 1.2, in 1.0..=1e3,
+            "Factor on a weight's step length while its slope keeps its sign.";
+        length_decrease: "length decrease" = 0.5, in 1e-6..=0.999,
+            "Factor on a weight's step length when its slope changes sign.";
+        largest_length: "largest step length" = 50.0, in f64::MIN_POSITIVE..=1e300,
+            "Largest step of a weight in one epoch (deltamax).";
     }
 }
 
@@ -106,10 +59,6 @@ impl Algorithm for Resilient {
         parameter_name: "mean step length",
         cure: "lower the first and the largest step length, or take another seed",
     };
-
-    fn list(settings: &mut ResilientSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn check(settings: &ResilientSettings) -> Result<(), SettingError> {
         check_limit(

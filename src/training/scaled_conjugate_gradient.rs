@@ -3,50 +3,20 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, StopReason,
     algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
+    setting::settings,
 };
 use crate::network::Mlp;
 
-/// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ScaledConjugateGradientSettings {
-    /// Length of the finite difference from which the curvature is estimated.
-    pub sigma: f64,
-    /// Initial scale of the curvature, which shortens the steps where the error is not convex.
-    pub lambda: f64,
-}
-
-impl Default for ScaledConjugateGradientSettings {
-    fn default() -> Self {
-        Self {
-            sigma: 5e-5,
-            lambda: 5e-7,
-        }
-    }
-}
-
-impl ScaledConjugateGradientSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "sigma",
-                meaning: "Length of the finite difference from which the curvature is estimated.",
-                default: default.sigma,
-                range: 1e-12..=1.0,
-                value: &mut self.sigma,
-            },
-            Setting {
-                name: "lambda",
-                meaning: "Initial scale of the curvature: it shortens steps where the error is not convex.",
-                default: default.lambda,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.lambda,
-            },
-        ]
+settings! {
+    /// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`).
+    pub struct ScaledConjugateGradientSettings {
+        sigma: "sigma" = 5e-5, in 1e-12..=1.0,
+            "Length of the finite difference from which the curvature is estimated.";
+        lambda: "lambda" = 5e-7, in f64::MIN_POSITIVE..=1e300,
+            "Initial scale of the curvature: it shortens steps where the error is not convex.";
     }
 }
 
@@ -135,10 +105,6 @@ impl Algorithm for ScaledConjugateGradient {
         parameter_name: "lambda",
         cure: "take another seed, or Levenberg-Marquardt (lm)",
     };
-
-    fn list(settings: &mut ScaledConjugateGradientSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);

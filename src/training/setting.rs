@@ -21,6 +21,49 @@ pub struct Setting<'a> {
     pub value: &'a mut f64,
 }
 
+/// The settings of a method, to be shown and changed.
+pub(super) trait Settings: Default {
+    /// Lists them, given the method's defaults.
+    fn list(&mut self, default: Self) -> Vec<Setting<'_>>;
+}
+
+/// Defines the settings of a method: for each number its field, its name, the field's usual default, the allowed values,
+/// and its meaning.
+macro_rules! settings {
+    (
+        $(#[$doc:meta])*
+        pub struct $Settings:ident {
+            $($field:ident: $name:literal = $default:expr, in $range:expr, $meaning:literal;)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $Settings {
+            $(#[doc = $meaning] pub $field: f64,)*
+        }
+
+        impl Default for $Settings {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl crate::training::setting::Settings for $Settings {
+            fn list(&mut self, default: Self) -> Vec<crate::training::Setting<'_>> {
+                vec![$(crate::training::Setting {
+                    name: $name,
+                    meaning: $meaning,
+                    default: default.$field,
+                    range: $range,
+                    value: &mut self.$field,
+                },)*]
+            }
+        }
+    };
+}
+pub(super) use settings;
+
 /// A setting with which no training can work.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]

@@ -1,53 +1,20 @@
 //! Gradient descent with momentum of steps (`traingdm`).
 
-use serde::{Deserialize, Serialize};
-
 use super::{
-    Evaluation, Examples, Setting, StopReason,
+    Evaluation, Examples, StopReason,
     algorithm::{Algorithm, Description},
     backpropagation::Backpropagation,
-    setting::LARGEST_MOMENTUM,
+    setting::{LARGEST_MOMENTUM, settings},
 };
 use crate::network::Mlp;
 
-/// Settings of gradient descent with momentum of steps, with the field's usual defaults (`traingdm`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StepMomentumSettings {
-    /// The learning rate lr.
-    pub learning_rate: f64,
-    /// The momentum constant mc.
-    pub momentum: f64,
-}
-
-impl Default for StepMomentumSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-        }
-    }
-}
-
-impl StepMomentumSettings {
-    fn list(&mut self) -> Vec<Setting<'_>> {
-        let default = Self::default();
-        vec![
-            Setting {
-                name: "learning rate",
-                meaning: "Step length relative to the length of the gradient.",
-                default: default.learning_rate,
-                range: f64::MIN_POSITIVE..=1e300,
-                value: &mut self.learning_rate,
-            },
-            Setting {
-                name: "momentum",
-                meaning: "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
-                default: default.momentum,
-                range: 0.0..=LARGEST_MOMENTUM,
-                value: &mut self.momentum,
-            },
-        ]
+settings! {
+    /// Settings of gradient descent with momentum of steps, with the field's usual defaults (`traingdm`).
+    pub struct StepMomentumSettings {
+        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
+            "Step length relative to the length of the gradient.";
+        momentum: "momentum" = 0.9, in 0.0..=LARGEST_MOMENTUM,
+            "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
     }
 }
 
@@ -71,10 +38,6 @@ impl Algorithm for StepMomentum {
         parameter_name: "learning rate",
         cure: "change the learning rate, run more epochs, or take another method",
     };
-
-    fn list(settings: &mut StepMomentumSettings) -> Vec<Setting<'_>> {
-        settings.list()
-    }
 
     fn new(settings: StepMomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, Method, SettingError, Stage, StopReason, StoppingRules,
+    EpochRecord, Evaluation, Examples, MachineMemory, Method, SettingError, Stage, StopReason, StoppingRules,
     activations::Activations, method::Running,
 };
 use crate::network::{Mlp, Shape};
@@ -56,26 +56,45 @@ pub enum TrainingError {
     /// The network has no hidden nodes.
     #[error("the network has no hidden nodes: give at least 1")]
     NoHiddenNodes,
-    /// The method's equations would take too much memory.
+    /// The method's equations would take more memory than there is.
     #[error(
-        "the network is too wide for this method: its equations would take {:.1} GB; use the scaled conjugate gradient \
-         (scg) or fewer hidden nodes",
-        *.bytes as f64 * 1e-9
+        "the network is too wide for this method: the equations of {} would take {:.1} GB, and {memory}; use the scaled \
+         conjugate gradient (scg), fewer hidden nodes, or fewer starts",
+        counted(*.trainings), *.bytes as f64 * 1e-9
     )]
     TooWide {
+        /// Number of trainings at once.
+        trainings: usize,
         /// Bytes that they would take.
-        bytes: usize,
+        bytes: u64,
+        /// Memory that there is.
+        memory: MachineMemory,
     },
 }
 
-/// Most memory that the equations of a method may take.
-const LARGEST_EQUATIONS_BYTES: usize = 8_000_000_000;
+/// `1 training`, `2 trainings at once`.
+fn counted(count: usize) -> String {
+    match count {
+        1 => "1 training".to_owned(),
+        _ => format!("{count} trainings at once"),
+    }
+}
 
-/// Refuses a method whose equations would not fit into memory.
-pub(super) fn check_width(method: &Method, shape: Shape, samples: usize) -> Result<(), TrainingError> {
-    let bytes = method.equations_bytes(shape, samples);
-    if bytes > LARGEST_EQUATIONS_BYTES {
-        return Err(TrainingError::TooWide { bytes });
+/// Refuses a method whose equations would not fit into memory, with so many trainings of this shape at once.
+pub(crate) fn check_width(
+    method: &Method,
+    shape: Shape,
+    samples: usize,
+    trainings: usize,
+) -> Result<(), TrainingError> {
+    let memory = MachineMemory::of_this_machine();
+    let bytes = (method.equations_bytes(shape, samples) as u64).saturating_mul(trainings as u64);
+    if bytes > memory.bytes {
+        return Err(TrainingError::TooWide {
+            trainings,
+            bytes,
+            memory,
+        });
     }
     Ok(())
 }
@@ -117,7 +136,7 @@ impl Trainer {
         if start.shape().hidden == 0 {
             return Err(TrainingError::NoHiddenNodes);
         }
-        check_width(&settings.method, start.shape(), problem.training.samples())?;
+        check_width(&settings.method, start.shape(), problem.training.samples(), 1)?;
         let begun = Instant::now();
         let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {
@@ -280,5 +299,26 @@ impl Trainer {
     /// Time spent in training, pauses not counted.
     pub fn elapsed(&self) -> Duration {
         self.elapsed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trainings_at_once_share_the_memory() {
+        let shape = Shape {
+            inputs: 30,
+            hidden: 12,
+            outputs: 30,
+        };
+        let check = |trainings| check_width(&Method::default(), shape, 1000, trainings);
+        assert_eq!(check(1), Ok(()));
+        let refused = check(1_000_000_000).unwrap_err().to_string();
+        assert!(
+            refused.contains("of 1000000000 trainings at once would take"),
+            "{refused}"
+        );
     }
 }

@@ -59,7 +59,6 @@ struct Measured {
 fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
     let mut run = Run::prepare(*settings).map_err(|error| refused(&error))?;
     while run.step().is_none() {}
-    let scores = run.node_scores().expect("the run is simulated");
     let set = DecoderSet::new(settings, Some(run.network())).map_err(|error| refused(&error))?;
     let training = settings.draw().map_err(|error| refused(&error))?.0.training;
     let mut answers = run.test().targets().to_owned();
@@ -72,7 +71,7 @@ fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
     }
     Ok(Measured {
         mean_mm: z_mm(run.test(), &answers),
-        flaw: run.flaw(&scores.network),
+        flaw: run.flaw(),
         outlook: Outlook::of(&settings.source).ok(),
         run,
         set,

@@ -46,7 +46,7 @@ fn table(driver: &Driver) -> Vec<String> {
 /// The same from the library.
 fn table_of(run: &Run) -> Vec<String> {
     let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
-    let limit = run.baselines().unwrap().reference.filter(|limit| limit.z_mm > 0.0);
+    let limit = run.baselines().unwrap().reference.filter(|limit| !limit.is_rounding());
     let of_decoder = |(wanted, name): (DecoderResult, &str)| {
         let report = set.measure(wanted.kind, wanted.precision, run.test()).unwrap().unwrap();
         let ratio = limit.map(|limit| report.errors.z_mm / limit.z_mm);

@@ -220,7 +220,7 @@ impl<'a> Labour<'a> {
                 decoupled_mm: Arc::new(decoupled_mm),
                 errors,
                 best_epoch: trainer.best_epoch(),
-                flaw: run.flaw(&errors),
+                flaw: run.flaw(),
                 epochs_run: furthest_epoch(run),
                 starts_ended: run
                     .trainers()

@@ -227,7 +227,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        app::shared::{FileTask, FileWords, Phase, Purpose},
+        app::{
+            shared::{FileTask, FileWords, Phase, Purpose},
+            test_view::TestView,
+        },
         evaluation::Run,
         export::NetworkFile,
     };
@@ -319,6 +322,15 @@ mod tests {
                 .as_ref()
                 .is_some_and(|preview| preview.baselines.is_some())
         });
+    }
+
+    #[test]
+    fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
+        let mut window = window();
+        let settings = window.shared.draft;
+        let drawn = TestView::draw(&settings);
+        window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
+        assert!(window.shared.preview.is_none() && window.shared.result().is_some());
     }
 
     #[test]

@@ -61,20 +61,24 @@ impl DecouplerWindow {
         });
     }
 
-    fn take_preview(&mut self, event: PreviewEvent) {
+    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
         let shared = &mut self.shared;
         match event {
             // Settings that have moved on meanwhile have asked for another test set, or need none.
             PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
+            // A training has begun meanwhile, and shows the same.
+            PreviewEvent::Drawn(settings, _)
+                if shared
+                    .run
+                    .as_ref()
+                    .is_some_and(|run| have_same_test_set(&run.settings, &settings)) => {}
             PreviewEvent::Drawn(settings, Ok(test)) => {
-                if !shared.phase.is_busy() {
-                    shared.preview = Some(Preview {
-                        settings: *settings,
-                        test,
-                        baselines: None,
-                    });
-                    self.ask_for_what_is_missing();
-                }
+                shared.preview = Some(Preview {
+                    settings: *settings,
+                    test,
+                    baselines: None,
+                });
+                self.ask_for_what_is_missing();
             }
             PreviewEvent::Drawn(_, Err(error)) => self.notice = Some(Notice::Failed(error.to_string())),
             PreviewEvent::Compared(settings, baselines) => {

@@ -1,9 +1,11 @@
+use ndarray::Array2;
+
 use super::*;
 use crate::{
-    dataset::PerRow,
-    dataset::{Dataset, Seed, Stream},
-    decoupling::{TrainingMean, decode_set},
-    scene::{Noise, Rows},
+    dataset::{Dataset, PerRow, Seed, Stream},
+    decoupling::{Decoder, NewtonRules, Posterior, SolvedRows, TrainingMean, decode_set},
+    scene::{Noise, Rows, Scene},
+    sensor::SensorModel,
 };
 
 fn solved(mut decoder: impl Decoder, set: &Dataset) -> SolvedRows {
@@ -16,8 +18,8 @@ fn solved(mut decoder: impl Decoder, set: &Dataset) -> SolvedRows {
 fn polish(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
     let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
     let rows = Vec::from_iter(0..model.scale.rows());
-    let posterior = Posterior::new(model, scene, &rows, &mut Seed(0).rng(Stream::Expectation)).unwrap();
-    PolishedDecoder::new(first, posterior, model, scene, &rows, steps)
+    let mut rng = Seed(0).rng(Stream::Expectation);
+    PolishedDecoder::new(first, model, scene, &rows, steps, &mut rng).unwrap()
 }
 
 #[test]
@@ -65,5 +67,36 @@ fn rows_that_mirror_each_other_are_flagged_unless_they_are_known() {
         let newton = NewtonDecoder::new(&model, &scene, &[0, 1, 2], NewtonRules::default()).unwrap();
         let solved = solved(newton, &set);
         assert_eq!((solved.rows, solved.unsolved, solved.undetermined), (30, 0, expected));
+    }
+}
+
+/// Four electrodes for six nodes leave every row open, and 18 none.
+#[test]
+fn rows_that_the_equations_leave_open_are_answered_by_the_posterior_and_no_others() {
+    for (array, is_open) in [("2x6_3x4", true), ("2x6_3x18", false)] {
+        let model = SensorModel::new(array.parse().unwrap());
+        let scene = Scene {
+            rows: Rows::Known,
+            ..Scene::default()
+        };
+        let set = Dataset::simulate(&model, &scene, 20, &mut Seed(0).rng(Stream::Test)).unwrap();
+        let posterior = || Posterior::new(&model, &scene, &[0, 1], &mut Seed(0).rng(Stream::Expectation)).unwrap();
+        let mut both = NewtonDecoder::with_posterior(posterior(), &model, &scene, &[0, 1]).unwrap();
+        let answers = decode_set(&mut both, &set).unwrap();
+        let alike: Array2<f64> = if is_open {
+            decode_set(
+                &mut PosteriorDecoder::new(posterior(), &model, &scene, &[0, 1]).unwrap(),
+                &set,
+            )
+        } else {
+            decode_set(
+                &mut NewtonDecoder::new(&model, &scene, &[0, 1], NewtonRules::default()).unwrap(),
+                &set,
+            )
+        }
+        .unwrap();
+        assert_eq!(answers, alike, "{array}");
+        let undetermined = if is_open { 20 } else { 0 };
+        assert_eq!(both.take_solved_rows().undetermined, undetermined, "{array}");
     }
 }

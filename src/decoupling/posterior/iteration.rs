@@ -82,7 +82,7 @@ impl Posterior {
         PosteriorReport {
             steps,
             residual,
-            spread_mm: Some(variance.sqrt()),
+            spread_mm: variance.sqrt(),
             determined,
             converged,
         }

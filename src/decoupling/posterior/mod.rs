@@ -15,13 +15,11 @@ use rand::Rng;
 
 use super::{
     DecodeError,
-    newton::Newton,
-    newton_report::NewtonRules,
     row_problem::{Range, RowProblem, ranges},
 };
 use crate::{
     scene::Scene,
-    sensor::{Identifiability, SensorError, SensorModel},
+    sensor::{SensorError, SensorModel},
 };
 use likelihood::Likelihood;
 use linearised::Point;
@@ -31,9 +29,8 @@ use row_prior::RowPrior;
 /// unknown, and answers with its median, the answer of the least expected distance.
 ///
 /// With noise, the single best deformation is a poor answer: it lies in a corner of the possible ones. The posterior
-/// weighs all deformations that explain the readings. The same holds without noise where some deformation is seen so
-/// badly that rounding of the readings hides it; elsewhere the equations decide alone there, and Newton's method
-/// answers.
+/// weighs all deformations that explain the readings. Without noise the rounding of the readings takes its place: most
+/// sensors then leave next to nothing unknown, but some deformations are seen so badly that rounding hides them.
 #[derive(Clone, Debug)]
 pub struct Posterior {
     problem: RowProblem,
@@ -42,8 +39,6 @@ pub struct Posterior {
     rows: Vec<usize>,
     priors: Vec<RowPrior>,
     likelihood: Likelihood,
-    /// Answers where the equations decide alone.
-    newton: Option<Newton>,
 }
 
 /// Largest number of linearisations: two or three nearly always do, for conductance is nearly linear.
@@ -57,22 +52,14 @@ impl Posterior {
     /// A sensor without resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Result<Self, SensorError> {
         let ranges = ranges(model, scene);
-        let noise = scene.noise.in_test();
-        let equations_decide = noise.is_none() && !is_blurred_by_rounding(model, scene, rows);
         Ok(Self {
             problem: RowProblem::new(model, scene.movement.axes()),
             widths: ranges.iter().map(|range| range.width()).collect(),
             ranges,
             rows: rows.to_vec(),
             priors: RowPrior::of_rows(model, scene, rows, rng),
-            likelihood: Likelihood::new(noise.source(model)?),
-            newton: equations_decide.then(|| Newton::new(model, scene, NewtonRules::default())),
+            likelihood: Likelihood::new(scene.noise.in_test().source(model)?),
         })
-    }
-
-    /// True if the equations decide alone: without noise, and with every deformation seen well enough.
-    pub fn is_decided_by_equations(&self) -> bool {
-        self.newton.is_some()
     }
 
     /// Decodes one row-wire of those given, from its readings in ohm (M4); writes absolute coordinates (3·M2).
@@ -88,13 +75,6 @@ impl Posterior {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<PosteriorReport, DecodeError> {
-        if let Some(newton) = &mut self.newton {
-            return Ok(PosteriorReport::of_equations(newton.solve(
-                row,
-                readings_ohm,
-                coordinates_mm,
-            )?));
-        }
         DecodeError::check(readings_ohm)?;
         let middle = self.ranges.iter().map(|range| range.middle()).collect();
         Ok(self.iterate(row, readings_ohm, middle, STEPS, coordinates_mm))
@@ -115,15 +95,6 @@ impl Posterior {
         coordinates_mm: &mut [f64],
         steps: usize,
     ) -> Result<PosteriorReport, DecodeError> {
-        if let Some(newton) = &mut self.newton {
-            newton.set_rules(NewtonRules {
-                steps,
-                ..NewtonRules::default()
-            });
-            let report = newton.polish(row, readings_ohm, coordinates_mm);
-            newton.set_rules(NewtonRules::default());
-            return Ok(PosteriorReport::of_equations(report?));
-        }
         DecodeError::check(readings_ohm)?;
         let mut first = vec![0.0; self.ranges.len()];
         self.problem.read(row, readings_ohm);
@@ -142,9 +113,6 @@ impl Posterior {
     /// If `row` is none of the rows given.
     pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) -> bool {
         coordinates_mm.copy_from_slice(truth_mm);
-        if self.is_decided_by_equations() {
-            return true;
-        }
         self.problem.read(row, readings_ohm);
         let mut truth = Point {
             displacements_mm: vec![0.0; self.ranges.len()],
@@ -163,16 +131,6 @@ impl Posterior {
             _ => false,
         }
     }
-}
-
-/// True if some row sees some deformation so badly that rounding hides it.
-fn is_blurred_by_rounding(model: &SensorModel, scene: &Scene, rows: &[usize]) -> bool {
-    let half_way = glam::DVec3::Z * (0.5 * scene.stroke_mm(&model.geometry));
-    let displacements_mm = vec![half_way; model.scale.nodes_per_row()];
-    rows.iter().any(|&row| {
-        let seen = Identifiability::of_row(model, row, &displacements_mm, scene.movement.axes());
-        seen.is_ok_and(|seen| seen.condition() >= Identifiability::LARGEST_CONDITION)
-    })
 }
 
 #[cfg(test)]
@@ -228,7 +186,7 @@ mod tests {
             }
             let squares = case.deviations_mm.iter().map(|deviation| deviation * deviation);
             let spread_mm = (squares.sum::<f64>() / case.deviations_mm.len() as f64).sqrt();
-            assert!((report.spread_mm.unwrap() / spread_mm - 1.0).abs() < 0.02);
+            assert!((report.spread_mm / spread_mm - 1.0).abs() < 0.02);
         }
     }
 
@@ -314,17 +272,39 @@ mod tests {
         }
     }
 
+    /// From 1e-3 down to none at all, past the rounding of the readings, below which noise adds nothing.
     #[test]
-    fn without_noise_it_is_newtons_answer() {
+    fn noise_passes_into_rounding_without_a_step() {
         let model = SensorModel::new("2x4_2x12".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(1).rng(Stream::Test)).unwrap();
-        let mut rng = Seed(1).rng(Stream::Expectation);
-        let mut posterior = Posterior::new(&model, &Scene::default(), &[0, 1], &mut rng).unwrap();
-        let mut coordinates = vec![0.0; 12];
-        let report = posterior.solve(1, set.sample_readings(3), &mut coordinates).unwrap();
-        assert_eq!((report.spread_mm, report.converged), (None, true));
-        for (ours, truth) in coordinates.iter().zip(set.sample_targets(3)) {
-            assert!((ours - truth).abs() < 1e-9);
+        let solved = |noise| {
+            let noise = Noise::relative(noise);
+            let scene = Scene {
+                noise,
+                ..Scene::default()
+            };
+            let mut posterior = Posterior::new(&model, &scene, &[1], &mut Seed(1).rng(Stream::Expectation)).unwrap();
+            let mut coordinates = vec![0.0; 12];
+            let report = posterior.solve(1, set.sample_readings(3), &mut coordinates).unwrap();
+            assert!(report.converged, "{noise:?}: {report:?}");
+            let errors = coordinates
+                .iter()
+                .zip(set.sample_targets(3))
+                .map(|(a, b)| (a - b).abs());
+            (report, errors.fold(0.0, f64::max))
+        };
+        let mut last = f64::INFINITY;
+        for noise in [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-18] {
+            let (report, error_mm) = solved(noise);
+            assert!(report.spread_mm < last, "{noise}: {report:?} {last}");
+            assert!(error_mm < 10.0 * report.spread_mm, "{noise}: {error_mm} {report:?}");
+            last = report.spread_mm;
         }
+        let (report, error_mm) = solved(0.0);
+        assert!((report.spread_mm / last - 1.0).abs() < 1e-5, "{report:?} {last}");
+        assert!(
+            report.determined && report.spread_mm < 1e-10 && error_mm < 1e-10,
+            "{report:?} {error_mm}"
+        );
     }
 }

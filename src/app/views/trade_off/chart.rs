@@ -53,10 +53,10 @@ pub fn keys(level: &TradeLevel, palette: &Palette) -> Vec<Key> {
     keys
 }
 
-/// The error of the reference, where it has a place on a logarithmic axis.
+/// The error of the reference, unless it is nothing but rounding.
 fn limit(level: &TradeLevel) -> Option<f64> {
-    let percent = level.points.first()?.reference?.z_percent?;
-    (percent > 0.0).then_some(percent)
+    let reference = level.points.first()?.reference?;
+    reference.z_percent.filter(|_| !reference.is_rounding())
 }
 
 /// Where a point stands: decimal logarithms of cost and error; none where an error is exactly 0 or has no meaning.

@@ -60,8 +60,8 @@ pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, refe
 
 fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Errors>) {
     let palette = Theme::of(ui).palette;
-    // Without noise there is no limit, and nothing to be compared with it.
-    let limit = reference.filter(|limit| limit.z_mm > 0.0);
+    // Without noise there is no limit but rounding, and nothing to be compared with it.
+    let limit = reference.filter(|limit| !limit.is_rounding());
     let columns: Vec<Column> = COLUMNS
         .into_iter()
         .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
@@ -108,11 +108,12 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
 
 /// What the reference row is.
 pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
-                             loading, with Eq. (2) linearised at the truth. On average no decoder does better that knows no more of the loading than its range, or its mean and covariance.";
+                             loading, with Eq. (2) linearised at the truth. On average no decoder does better that knows no more of the loading than its range, or its mean and covariance. \
+                             Without noise only the rounding of the readings is left.";
 
 /// In the order of [`COLUMNS`], without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
-    let ratio = limit.map(|limit| Some(report.errors.z_mm / limit.z_mm));
+    let ratio = limit.map(|limit| report.errors.times(limit));
     let figures = [Some(report.errors.z_percent)].into_iter().chain([
         ratio,
         Some(Some(report.residual)),

@@ -15,7 +15,7 @@ use crate::{
         },
         widgets::{Column, Row, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
     },
-    evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_rows},
+    evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
 };
 
@@ -162,8 +162,12 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
     let baselines = &run.baselines;
+    let remarks = error_remarks(&run.settings, &result.errors, baselines, Some(reason));
+    let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(flaw) = &result.flaw {
         Some(sentence(&flaw.to_string()))
+    } else if let Some((row, remark)) = of_network {
+        Some(sentence(&format!("{row}: {remark}")))
     } else if result.errors.z_mm > baselines.linear.z_mm {
         let remedy = reason.remedy(&run.settings.training.method);
         Some(sentence(&format!(
@@ -176,11 +180,10 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
         note_ui(ui, &fault);
     } else if result.errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
-        let limit = baselines.reference.filter(|limit| limit.z_mm > 0.0);
-        let text = match limit {
+        let to_limit = baselines.reference.and_then(|limit| result.errors.times(&limit));
+        let text = match to_limit.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
-            Some(limit) => {
-                let ratio = format_number(result.errors.z_mm / limit.z_mm);
+            Some(ratio) => {
                 format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
             }
         };

@@ -1,0 +1,127 @@
+use super::{
+    PosteriorDecoder,
+    row_search::{EXPLAINED, RowSearch},
+};
+use crate::{
+    decoupling::{
+        DecodeError, Decoder, LARGEST_ERROR, Newton, NewtonReport, NewtonRules, Posterior, Solution, SolvedRows,
+    },
+    scene::Scene,
+    sensor::{SensorError, SensorModel},
+};
+
+/// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the one that fits the readings best
+/// is taken.
+#[derive(Clone, Debug)]
+pub struct NewtonDecoder {
+    newton: Newton,
+    search: RowSearch,
+    /// Rules that give each row-wire one start.
+    brief: NewtonRules,
+    rules: NewtonRules,
+    /// Answers the rows that the equations leave open.
+    of_open_rows: Option<PosteriorDecoder>,
+    solved: SolvedRows,
+}
+
+impl NewtonDecoder {
+    /// Creates a decoder for `rows` of `model` in `scene`.
+    ///
+    /// # Errors
+    /// If the sensor has no resistances at rest.
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rules: NewtonRules) -> Result<Self, SensorError> {
+        Ok(Self {
+            newton: Newton::new(model, scene, rules),
+            search: RowSearch::new(model, scene, rows)?,
+            brief: NewtonRules { starts: 1, ..rules },
+            rules,
+            of_open_rows: None,
+            solved: SolvedRows::default(),
+        })
+    }
+
+    /// As [`Self::new`], but `posterior` answers where the equations have no solution to within [`LARGEST_ERROR`]: of all
+    /// deformations that explain the readings to their rounding, its median has the least expected error. `rows` must be
+    /// among its rows.
+    ///
+    /// # Errors
+    /// If the sensor has no resistances at rest.
+    pub fn with_posterior(
+        posterior: Posterior,
+        model: &SensorModel,
+        scene: &Scene,
+        rows: &[usize],
+    ) -> Result<Self, SensorError> {
+        let of_open_rows = Some(PosteriorDecoder::new(posterior, model, scene, rows)?);
+        Ok(Self {
+            of_open_rows,
+            ..Self::new(model, scene, rows, NewtonRules::default())?
+        })
+    }
+
+    /// Solves one row by `rules`; returns the report on the row-wire that fits best.
+    fn solve(
+        &mut self,
+        rules: NewtonRules,
+        row_index: usize,
+        readings: &[f64],
+        targets: &mut [f64],
+    ) -> Result<Option<NewtonReport>, DecodeError> {
+        let newton = &mut self.newton;
+        newton.set_rules(rules);
+        let mut best: Option<NewtonReport> = None;
+        self.search
+            .solve(row_index, readings, targets, |row, readings, coordinates| {
+                let report = newton.solve(row, readings, coordinates)?;
+                if best.is_none_or(|best| report.residual < best.residual) {
+                    best = Some(report);
+                }
+                Ok(match report.solution {
+                    Solution::None => report.residual.max(EXPLAINED),
+                    Solution::Unique | Solution::Undetermined => report.residual.min(0.5 * EXPLAINED),
+                })
+            })?;
+        Ok(best)
+    }
+
+    /// Solves one row; returns the standing of the answer.
+    fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
+        let mut report = None;
+        if self.search.is_needed() {
+            // Most row-wires tried are not the right one, and no start helps them.
+            report = self.solve(self.brief, row_index, readings, targets)?;
+        }
+        if report.is_none_or(|report| report.solution == Solution::None) {
+            report = self.solve(self.rules, row_index, readings, targets)?;
+        }
+        let is_open = report.is_none_or(|report| report.largest_error > LARGEST_ERROR);
+        if let Some(posterior) = self.of_open_rows.as_mut().filter(|_| is_open) {
+            return posterior.answer(row_index, readings, targets);
+        }
+        let solution = report.map_or(Solution::None, |report| report.solution);
+        if solution == Solution::Unique && self.search.has_twin(targets) {
+            return Ok(Solution::Undetermined);
+        }
+        Ok(solution)
+    }
+}
+
+impl Decoder for NewtonDecoder {
+    fn channels(&self) -> usize {
+        self.search.channels()
+    }
+
+    fn outputs(&self) -> usize {
+        self.search.outputs()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let solution = self.answer(row_index, readings, targets)?;
+        self.solved.count(solution);
+        Ok(())
+    }
+
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        std::mem::take(&mut self.solved)
+    }
+}

@@ -1,0 +1,121 @@
+use rand::Rng;
+
+use crate::{
+    decoupling::{DecodeError, Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows},
+    scene::{NoiseSource, RowModel, Scene},
+    sensor::{SensorError, SensorModel},
+};
+
+/// Ratio of the misfit to the noise above which noise does not explain it.
+const NOISES: f64 = 6.0;
+
+/// Improves the answer of another decoder by a few Gauss-Newton steps, with noise and prior if the scene has noise.
+pub struct PolishedDecoder {
+    first: Box<dyn Decoder>,
+    model: SensorModel,
+    improvement: Improvement,
+    rows: Vec<usize>,
+    row_model: RowModel,
+    steps: usize,
+    solved: SolvedRows,
+}
+
+/// Method of improving an answer.
+enum Improvement {
+    /// Without noise.
+    Newton(Box<Newton>),
+    /// With noise: the posterior, and the noise by which the misfit is judged.
+    Posterior(Box<Posterior>, NoiseSource),
+}
+
+impl PolishedDecoder {
+    /// Creates a decoder that takes `steps` steps after `first`, for `rows` of `model` in `scene`. If rows are not known,
+    /// the row-wire nearest to the first answer is taken. `rng` draws the samples that estimate a prior without closed
+    /// form.
+    ///
+    /// # Errors
+    /// If the sensor has no resistances at rest.
+    pub fn new(
+        first: Box<dyn Decoder>,
+        model: &SensorModel,
+        scene: &Scene,
+        rows: &[usize],
+        steps: usize,
+        rng: &mut impl Rng,
+    ) -> Result<Self, SensorError> {
+        let noise = scene.noise.in_test();
+        let improvement = if noise.is_none() {
+            let rules = NewtonRules {
+                steps,
+                ..NewtonRules::default()
+            };
+            Improvement::Newton(Box::new(Newton::new(model, scene, rules)))
+        } else {
+            Improvement::Posterior(Box::new(Posterior::new(model, scene, rows, rng)?), noise.source(model)?)
+        };
+        Ok(Self {
+            first,
+            model: *model,
+            improvement,
+            rows: rows.to_vec(),
+            row_model: scene.rows.model(),
+            steps,
+            solved: SolvedRows::default(),
+        })
+    }
+
+    /// Improves the answer in `targets`; returns its standing.
+    fn improve(&mut self, row_wire: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
+        match &mut self.improvement {
+            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
+            Improvement::Posterior(posterior, noise) => {
+                let report = posterior.polish(row_wire, readings, targets, self.steps)?;
+                let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
+                let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
+                // Readings that noise explains are all that a posterior can ask for.
+                Ok(if report.residual <= NOISES * variance.sqrt() {
+                    Solution::Unique
+                } else {
+                    Solution::None
+                })
+            }
+        }
+    }
+
+    /// Returns the row-wire whose x is nearest to the mean x of the coordinates.
+    fn nearest_row(&self, coordinates_mm: &[f64]) -> usize {
+        let x_mm = coordinates_mm.iter().step_by(3).sum::<f64>() / (coordinates_mm.len() / 3) as f64;
+        let distance = |row: usize| (self.model.geometry.row_x_mm(row) - x_mm).abs();
+        let nearest = self
+            .rows
+            .iter()
+            .copied()
+            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        nearest.unwrap_or(0)
+    }
+}
+
+impl Decoder for PolishedDecoder {
+    fn channels(&self) -> usize {
+        self.first.channels()
+    }
+
+    fn outputs(&self) -> usize {
+        self.first.outputs()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        self.first.decode_row(row_index, readings, targets)?;
+        let row_wire = match self.row_model {
+            RowModel::Each => self.rows[row_index],
+            RowModel::Shared => self.nearest_row(targets),
+        };
+        let solution = self.improve(row_wire, readings, targets)?;
+        self.solved.count(solution);
+        Ok(())
+    }
+
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        std::mem::take(&mut self.solved)
+    }
+}

@@ -1,0 +1,84 @@
+use super::row_search::{EXPLAINED, RowSearch};
+use crate::{
+    decoupling::{DecodeError, Decoder, Posterior, PosteriorReport, Solution, SolvedRows},
+    scene::Scene,
+    sensor::{SensorError, SensorModel},
+};
+
+/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the one that
+/// fits the readings best is taken.
+#[derive(Clone, Debug)]
+pub struct PosteriorDecoder {
+    posterior: Posterior,
+    search: RowSearch,
+    /// Noise leaves every answer undetermined, which the reference tells.
+    is_noisy: bool,
+    solved: SolvedRows,
+}
+
+impl PosteriorDecoder {
+    /// Creates a decoder for `rows` of `model` in `scene`, which must be among the rows of `posterior`.
+    ///
+    /// # Errors
+    /// If the sensor has no resistances at rest.
+    pub fn new(posterior: Posterior, model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
+        Ok(Self {
+            posterior,
+            search: RowSearch::new(model, scene, rows)?,
+            is_noisy: !scene.noise.in_test().is_none(),
+            solved: SolvedRows::default(),
+        })
+    }
+
+    /// Solves one row; returns the standing of the answer.
+    pub(super) fn answer(
+        &mut self,
+        row_index: usize,
+        readings: &[f64],
+        targets: &mut [f64],
+    ) -> Result<Solution, DecodeError> {
+        let posterior = &mut self.posterior;
+        let mut best: Option<PosteriorReport> = None;
+        self.search
+            .solve(row_index, readings, targets, |row, readings, coordinates| {
+                let report = posterior.solve(row, readings, coordinates)?;
+                if best.is_none_or(|best| report.residual < best.residual) {
+                    best = Some(report);
+                }
+                Ok(report.residual)
+            })?;
+        Ok(match best {
+            Some(report) if report.converged => {
+                if self.is_noisy || report.determined && report.residual < EXPLAINED {
+                    Solution::Unique
+                } else if report.determined {
+                    // Readings that leave nothing open, and that the answer does not explain.
+                    Solution::None
+                } else {
+                    Solution::Undetermined
+                }
+            }
+            _ => Solution::None,
+        })
+    }
+}
+
+impl Decoder for PosteriorDecoder {
+    fn channels(&self) -> usize {
+        self.search.channels()
+    }
+
+    fn outputs(&self) -> usize {
+        self.search.outputs()
+    }
+
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let solution = self.answer(row_index, readings, targets)?;
+        self.solved.count(solution);
+        Ok(())
+    }
+
+    fn take_solved_rows(&mut self) -> SolvedRows {
+        std::mem::take(&mut self.solved)
+    }
+}

@@ -1,0 +1,107 @@
+use crate::{
+    decoupling::DecodeError,
+    scene::{RowModel, Scene},
+    sensor::{ArrayScale, SensorError, SensorModel},
+};
+
+/// Finds the row-wire of each row of a frame by trial, where the scene's decoders are not told.
+#[derive(Clone, Debug)]
+pub(super) struct RowSearch {
+    scale: ArrayScale,
+    /// Row-wires read.
+    rows: Vec<usize>,
+    /// Logarithms of the resistances of each of `rows` at rest; empty if rows are known.
+    rest: Vec<Vec<f64>>,
+    /// x of those of `rows` that another one equals in all readings; empty if rows are known.
+    twins_x_mm: Vec<f64>,
+    trial_mm: Vec<f64>,
+}
+
+/// Relative misfit (root mean square) below which a row-wire is accepted without trying the others.
+pub(super) const EXPLAINED: f64 = 1e-10;
+/// Difference of the logarithms of resistances at rest below which row-wires mirror each other.
+const SAME_AT_REST: f64 = 1e-13;
+
+impl RowSearch {
+    pub(super) fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
+        let at_rest = vec![glam::DVec3::ZERO; model.scale.nodes_per_row()];
+        let rest = |&row: &usize| {
+            let readings = model.row_resistances(row, &at_rest)?;
+            Ok(readings.into_iter().map(f64::ln).collect())
+        };
+        let searched = match scene.rows.model() {
+            RowModel::Each => &[],
+            RowModel::Shared => rows,
+        };
+        let rest = searched
+            .iter()
+            .map(rest)
+            .collect::<Result<Vec<Vec<f64>>, SensorError>>()?;
+        let is_same = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME_AT_REST);
+        let has_twin = |index: &usize| rest.iter().filter(|other| is_same(&rest[*index], other)).count() > 1;
+        let twins = (0..rest.len()).filter(has_twin);
+        Ok(Self {
+            scale: model.scale,
+            twins_x_mm: twins.map(|index| model.geometry.row_x_mm(rows[index])).collect(),
+            rest,
+            rows: rows.to_vec(),
+            trial_mm: vec![0.0; model.scale.coordinates_per_row()],
+        })
+    }
+
+    /// Number of readings per row.
+    pub(super) fn channels(&self) -> usize {
+        self.scale.columns()
+    }
+
+    /// Number of coordinates per row.
+    pub(super) fn outputs(&self) -> usize {
+        self.scale.coordinates_per_row()
+    }
+
+    /// Returns `true` if rows are not known.
+    pub(super) fn is_needed(&self) -> bool {
+        !self.rest.is_empty()
+    }
+
+    /// Returns `true` if another row-wire than the one of these coordinates may have the same readings: its mirror image,
+    /// or any at another height if all electrodes of a column-wire have the same x.
+    pub(super) fn has_twin(&self, coordinates_mm: &[f64]) -> bool {
+        self.rest.len() > 1 && self.scale.nodes_per_column() == 1 || self.twins_x_mm.contains(&coordinates_mm[0])
+    }
+
+    /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit.
+    ///
+    /// If rows are not known, row-wires are tried in the order of similarity of their readings at rest, and the one
+    /// that fits the readings best is taken; rows that mirror each other may then be confused.
+    pub(super) fn solve(
+        &mut self,
+        row_index: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<f64, DecodeError>,
+    ) -> Result<(), DecodeError> {
+        DecodeError::check(readings_ohm)?;
+        if self.rest.is_empty() {
+            return solve(self.rows[row_index], readings_ohm, coordinates_mm).map(drop);
+        }
+        let unlike = |rest: &Vec<f64>| -> f64 {
+            let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
+            differences.map(|difference| difference * difference).sum()
+        };
+        let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut least = f64::INFINITY;
+        for (_, row_wire) in order {
+            let residual = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
+            if residual < least {
+                least = residual;
+                coordinates_mm.copy_from_slice(&self.trial_mm);
+            }
+            if least < EXPLAINED {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
