@@ -174,6 +174,8 @@ impl DecouplerWindow {
             self.set_dark(!self.shared.look.is_dark);
         }
         self.ask_for_path(ui);
+        // What was begun in this frame must be finished too.
+        self.take_close_request();
         self.closing_ui(ui);
     }
 
