@@ -6,19 +6,20 @@
 //! | `widgets` | the few components that egui lacks |
 //! | `plotting` | what all charts have in common |
 //! | [`surface_view`] | the surface plot |
-//! | `threads` | background work |
-//! | `test_view` | a test set ready to be drawn |
+//! | `job` | background work |
+//! | `test_view`, `preview` | a test set ready to be drawn; what settings show before a training |
 //! | `training_worker` | the thread that trains |
 //! | `shared` | what all views read: settings, training on show, run list, look; and what a view may ask for |
 //! | `views` | one room each, none knows another |
 //! | `window` | lays the views out and applies what they ask for |
 
+mod job;
 mod plotting;
+mod preview;
 mod shared;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
-mod threads;
 mod training_worker;
 mod views;
 mod widgets;

@@ -14,6 +14,7 @@ mod machine;
 mod missing_figures;
 mod node_spread;
 mod outlook;
+mod preparation;
 mod preset;
 mod published;
 mod reference;

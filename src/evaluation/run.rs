@@ -7,20 +7,13 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, RunError, RunFlaw, RunSettings, SimulatedSettings, StartRecord, StartTrainer, TargetErrors,
-    TargetRow,
-    baselines::fit_baselines,
-    reference_errors,
-    sets::check_sets,
+    Baselines, Errors, RunError, RunFlaw, RunSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
     starts::lowest,
-    task::{Task, tasks},
-    workload::Workload,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Split, Stream},
-    decoupling::decode_set,
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, nguyen_widrow},
-    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState, check_width},
+    dataset::{Dataset, PerRow},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
+    training::{Method, SettingError, StopReason, StoppingRules, TrainerState, check_width},
 };
 
 /// A run: its sets of samples, one training per restart, and the errors of the best network.
@@ -29,16 +22,16 @@ use crate::{
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
 /// never decides.
 pub struct Run {
-    settings: RunSettings,
-    test: Arc<Dataset>,
-    scalings: PerRow<(Inputs, MinMax)>,
-    starts: Vec<StartTrainer>,
+    pub(super) settings: RunSettings,
+    pub(super) test: Arc<Dataset>,
+    pub(super) scalings: PerRow<(Inputs, MinMax)>,
+    pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
-    wall_time: Option<Duration>,
+    pub(super) wall_time: Option<Duration>,
     /// Errors of the training mean and of the linear map, target by target.
-    target_baselines: [TargetRow; 2],
+    pub(super) target_baselines: [TargetRow; 2],
     /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
-    baselines: Option<Baselines>,
+    pub(super) baselines: Option<Baselines>,
 }
 
 /// Errors of networks and baselines on the nodes of a test set.
@@ -51,128 +44,6 @@ pub struct NodeScores {
 }
 
 impl Run {
-    /// Draws and scales the sets, initialises the networks and measures the baselines.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
-        Workload::of(&settings)?.check_memory()?;
-        let (split, test) = settings.draw()?;
-        Self::on_sets(settings.into(), split, test)
-    }
-
-    /// Prepares a run on existing sets, measured or from a cross-validation; see [`Self::prepare`].
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the sets do not belong together.
-    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        Self::with_sets(settings, split, test, |tasks| {
-            let starts = (0..settings.starts).into_par_iter().map(|number| {
-                let mut rng = settings.seed.start_rng(number);
-                let begun: Vec<_> = tasks
-                    .iter()
-                    .map(|task| (task, nguyen_widrow(task.shape, &mut rng)))
-                    .collect();
-                let rows = begun
-                    .into_par_iter()
-                    .map(|(task, start)| Trainer::new(start, task.problem.clone(), settings.training));
-                Ok(StartTrainer::new(rows.collect::<Result<_, _>>()?))
-            });
-            starts.collect()
-        })
-    }
-
-    /// Resumes a run of these settings from the states of all its trainings.
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the states are damaged or from another run.
-    pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        settings.check_counts()?;
-        check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
-        let (split, test) = settings.draw()?;
-        Self::resume_on_sets(settings.into(), states, split, test)
-    }
-
-    /// Resumes a run on the sets it was started on; see [`Self::resume`].
-    ///
-    /// # Errors
-    /// As [`Self::on_sets`], or if the states are damaged or do not match these settings and sets.
-    pub fn resume_on_sets(
-        settings: RunSettings,
-        states: Vec<TrainerState>,
-        split: Split,
-        test: Dataset,
-    ) -> Result<Self, RunError> {
-        let mut run = Self::with_sets(settings, split, test, |tasks| {
-            let networks = tasks.len();
-            check_states(&states, settings.starts * networks)?;
-            let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
-                let (start, task) = (number / networks, &tasks[number % networks]);
-                let refused = |source| RunError::Resume { start, source };
-                let trainer = Trainer::resume(state, task.problem.clone()).map_err(refused)?;
-                if trainer.present().shape() != task.shape {
-                    return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
-                }
-                Ok(trainer)
-            });
-            let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
-            let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
-            Ok(starts.collect())
-        })?;
-        // Trainings side by side do not know how long they took together.
-        run.wall_time = match &run.starts[..] {
-            [only] if only.rows().len() == 1 => Some(only.elapsed()),
-            _ => None,
-        };
-        Ok(run)
-    }
-
-    fn with_sets(
-        settings: RunSettings,
-        split: Split,
-        test: Dataset,
-        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
-    ) -> Result<Self, RunError> {
-        settings.check_network()?;
-        check_sets(&settings, &split, &test)?;
-        let (mut mean, mut linear) = fit_baselines(&split.training, &settings)?;
-        let (mean, linear) = (decode_set(&mut mean, &test)?, decode_set(&mut linear, &test)?);
-        let baselines = match settings.simulated() {
-            Some(simulated) => {
-                let errors = |answers| Errors::measure(&test, answers, simulated.source.stroke_mm());
-                Some(Baselines {
-                    mean: errors(&mean),
-                    linear: errors(&linear),
-                    reference: reference(&simulated, &test)?,
-                })
-            }
-            None => None,
-        };
-        let target_baselines = [("training mean", &mean), ("linear map", &linear)].map(|(name, answers)| TargetRow {
-            name,
-            targets: TargetErrors::measure(test.targets(), answers.view()),
-        });
-        let tasks = tasks(&settings, &split, &test)?;
-        // The tasks hold the samples scaled; large sets need not be held twice.
-        drop(split);
-        let first = tasks.at(0);
-        let samples = first.problem.training.samples();
-        let trainings = settings.starts * tasks.values().len();
-        check_width(&settings.training.method, first.shape, samples, trainings)?;
-        let begun = Instant::now();
-        let starts = begin(tasks.values())?;
-        let wall_time = Some(begun.elapsed());
-        Ok(Self {
-            wall_time,
-            settings,
-            test: Arc::new(test),
-            scalings: tasks.map(|task| task.scaling.clone()),
-            starts,
-            target_baselines,
-            baselines,
-        })
-    }
-
     /// Settings of the run.
     pub fn settings(&self) -> &RunSettings {
         &self.settings
@@ -346,21 +217,4 @@ impl Run {
         });
         rows
     }
-}
-
-/// Checks the number of saved trainings.
-fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError> {
-    let found = states.len();
-    if found == expected {
-        Ok(())
-    } else {
-        Err(RunError::Starts { found, expected })
-    }
-}
-
-/// The errors of the Bayesian reference on `test`; `None` where a posterior did not converge.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
-    let SimulatedSettings { source, seed, .. } = settings;
-    let mut rng = seed.rng(Stream::Expectation);
-    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
 }

@@ -20,7 +20,7 @@ use egui_kittest::{
 use crate::support::rasterise::Rasteriser;
 
 /// Time after which something awaited counts as never coming.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
@@ -126,14 +126,20 @@ impl Driver {
                 self.harness.step();
                 return;
             }
-            let patience = latest.saturating_duration_since(Instant::now());
-            if self.asked.recv_timeout(patience).is_err() {
-                panic!("{what} never came; the window shows {:#?}", self.texts());
-            }
-            // One frame answers all that was asked before it.
-            while self.asked.try_recv().is_ok() {}
-            self.harness.step();
+            self.wait_for_frame(what, latest);
         }
+    }
+
+    /// Draws the next frame that the window asks for.
+    #[track_caller]
+    pub(crate) fn wait_for_frame(&mut self, what: &str, latest: Instant) {
+        let patience = latest.saturating_duration_since(Instant::now());
+        if self.asked.recv_timeout(patience).is_err() {
+            panic!("{what} never came; the window shows {:#?}", self.texts());
+        }
+        // One frame answers all that was asked before it.
+        self.asked.try_iter().for_each(drop);
+        self.harness.step();
     }
 
     /// Whether the window comes to draw no more frames: it asks for none, at no delay.

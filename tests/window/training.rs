@@ -3,7 +3,7 @@
 use std::fs;
 
 use decoupler::{
-    app::{Phase, surface_view::ViewMode},
+    app::{Effect, Phase, surface_view::ViewMode},
     evaluation::{Run, SimulatedSettings},
     training::{Method, MomentumSettings, StopReason},
 };
@@ -117,14 +117,14 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
 }
 
 /// A training that goes on for as long as one looks.
-fn endless() -> SimulatedSettings {
+pub(crate) fn endless() -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = 1_000_000;
     settings
 }
 
-fn start_endless(driver: &mut Driver) {
+pub(crate) fn start_endless(driver: &mut Driver) {
     driver.configure_small();
     choose_method(driver, "Momentum, Eq. (11)");
     driver.enter("Epochs", "1000000");
@@ -192,15 +192,24 @@ fn keys_hold_resume_and_stop_and_the_next_training_starts_afresh() {
 }
 
 #[test]
-fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
+fn stop_while_a_training_is_prepared_is_answered_at_once_and_the_one_before_stays() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.click("▶ Train");
-    driver.press_with(Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-    assert_eq!(driver.table().len(), 20);
-    assert!(driver.has("Decoupled surface"));
-    driver.settle();
+    for before in [Phase::Idle, Phase::Ended(StopReason::EpochsReached)] {
+        assert_eq!(driver.state().phase, before);
+        // So many that the training cannot have begun before it is stopped.
+        let mut many = small();
+        many.source.samples = 200_000;
+        driver.window_mut().apply(Effect::Configure(Box::new(many)));
+        driver.window_mut().apply(Effect::Train);
+        assert_eq!(driver.state().phase, Phase::Preparing);
+        driver.window_mut().apply(Effect::Stop);
+        assert_eq!(driver.state().phase, before);
+        driver.window_mut().apply(Effect::Configure(Box::new(small())));
+        driver.train();
+        assert_eq!(driver.table(), table_of(&trained(small())));
+        assert!(!driver.says("stopped by you"));
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 use crate::{
     app::{
         test_view::TestView,
-        training_worker::{Began, Progress, RunId, RunResult},
+        training_worker::{Began, Progress, RunId, RunResult, append_epochs},
     },
     evaluation::{Baselines, PublishedErrors, SimulatedSettings, StartRecord},
     training::{EpochRecord, Stage, StopReason},
@@ -35,6 +35,8 @@ pub struct RunView {
     pub result: Option<RunResult>,
     /// Why it ended, if it has.
     pub stop_reason: Option<StopReason>,
+    /// Whether it stands as in the checkpoint that it was opened from.
+    pub is_saved: bool,
 }
 
 impl RunView {
@@ -60,6 +62,7 @@ impl RunView {
             starts: Vec::new(),
             result: None,
             stop_reason: None,
+            is_saved: false,
         }
     }
 
@@ -73,11 +76,7 @@ impl RunView {
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
-        // Another start may lead now; then all its epochs come.
-        if let Some(first) = epochs.first() {
-            self.history.truncate(first.epoch);
-        }
-        self.history.extend(epochs);
+        append_epochs(&mut self.history, epochs);
         self.stages = stages;
         if let Some(starts) = starts {
             self.starts = starts;

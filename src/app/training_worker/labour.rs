@@ -1,8 +1,7 @@
 use std::{
-    collections::VecDeque,
-    path::Path,
     sync::{
         Arc,
+        atomic::{AtomicU64, Ordering},
         mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
@@ -14,12 +13,12 @@ use super::{
 };
 use crate::{
     app::{
+        job::Report,
         test_view::{TestView, TestViewError},
-        threads::Report,
     },
-    evaluation::{Baselines, Run, SimulatedSettings, network_frame_time},
+    evaluation::{Run, RunError, network_frame_time},
     export::{CheckpointFile, NetworkFile},
-    training::{GradientDescentSettings, Method, TrainingSettings},
+    training::TrainingSettings,
 };
 
 /// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
@@ -30,8 +29,12 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// The thread's own state.
-pub(super) struct Labour {
-    report: Report<Event>,
+pub(super) struct Labour<'a> {
+    report: &'a Report<Event>,
+    /// The last preparation that is cancelled.
+    cancelled: &'a AtomicU64,
+    /// Preparations so far.
+    preparations: u64,
     run: Option<Run>,
     /// Which training `run` is.
     id: Option<RunId>,
@@ -44,10 +47,12 @@ pub(super) struct Labour {
     next_starts: Instant,
 }
 
-impl Labour {
-    pub(super) fn new(report: Report<Event>) -> Self {
+impl<'a> Labour<'a> {
+    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64) -> Self {
         Self {
             report,
+            cancelled,
+            preparations: 0,
             run: None,
             id: None,
             is_paused: false,
@@ -60,24 +65,16 @@ impl Labour {
 
     /// Answers requests and trains until there is no window.
     pub(super) fn run(&mut self, requests: &Receiver<Request>) {
-        let mut queue = VecDeque::new();
-        loop {
-            if queue.is_empty() && !self.is_training() {
-                match requests.recv() {
-                    Ok(request) => enqueue(&mut queue, request),
-                    Err(_) => return,
-                }
-            }
-            let is_window_closed = loop {
-                match requests.try_recv() {
-                    Ok(request) => enqueue(&mut queue, request),
-                    Err(reason) => break reason == TryRecvError::Disconnected,
-                }
+        while !self.report.is_cancelled() {
+            let request = if self.is_training() {
+                requests.try_recv()
+            } else {
+                requests.recv().map_err(TryRecvError::from)
             };
-            match queue.pop_front() {
-                Some(request) => self.answer(request),
-                None if is_window_closed => return,
-                None => self.train_one_epoch(),
+            match request {
+                Ok(request) => self.answer(request),
+                Err(TryRecvError::Empty) => self.train_one_epoch(),
+                Err(TryRecvError::Disconnected) => return,
             }
         }
     }
@@ -89,28 +86,21 @@ impl Labour {
 
     fn answer(&mut self, request: Request) {
         match request {
-            Request::Preview(settings) => {
-                let drawn = TestView::draw(&settings);
-                self.report.send(Event::Previewed(settings, drawn));
+            Request::Train(settings) => {
+                let prepared = self.prepare(|is_cancelled| Run::prepare_unless(*settings, is_cancelled));
+                self.begin(prepared, false, Event::Began);
             }
-            Request::Baselines(settings) => {
-                let baselines = baselines(&settings);
-                self.report.send(Event::Compared(settings, baselines));
+            Request::Open(path) => {
+                let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
+                let prepared = prepared.and_then(|CheckpointFile { settings, starts, .. }| {
+                    let prepared = self.prepare(|is_cancelled| Run::resume_unless(settings, starts, is_cancelled));
+                    prepared.map_err(|error| format!("'{}': {error}", path.display()))
+                });
+                self.begin(prepared, true, Event::Opened);
             }
-            Request::Train(settings) => match Run::prepare(*settings).map_err(TestViewError::from).and_then(begun) {
-                Ok((run, began)) => self.begin(run, began.id, false, Event::Began(Ok(began))),
-                Err(error) => self.report.send(Event::Began(Err(error))),
-            },
-            Request::Open(path) => match opened(&path) {
-                Ok((run, began)) => self.begin(run, began.id, true, Event::Opened(Ok(began))),
-                Err(error) => self.report.send(Event::Opened(Err(error))),
-            },
             Request::TakeUp(settings, states) => {
-                let resumed = Run::resume(*settings, states).map_err(TestViewError::from);
-                match resumed.and_then(begun) {
-                    Ok((run, began)) => self.begin(run, began.id, true, Event::Opened(Ok(began))),
-                    Err(error) => self.report.send(Event::Opened(Err(error.to_string()))),
-                }
+                let prepared = self.prepare(|is_cancelled| Run::resume_unless(*settings, states, is_cancelled));
+                self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
             }
             Request::Continue(training) => self.go_on(training),
             Request::Pause => {
@@ -119,32 +109,55 @@ impl Labour {
             }
             Request::Resume => self.is_paused = false,
             Request::Stop => {
-                if let Some(run) = &mut self.run {
+                if let Some(run) = self.run.as_mut().filter(|run| run.stop_reason().is_none()) {
                     run.stop();
+                    self.report_progress();
                 }
-                self.report_progress();
             }
-            Request::Export(id, write, path) => {
+            Request::Export(id, write, path, answer) => {
                 let result = match &self.run {
-                    Some(run) if self.id == Some(id) => write(run, &path).map(|()| path),
+                    Some(run) if self.id == Some(id) => write(run, &path),
                     Some(_) => Err(REPLACED.to_owned()),
                     // The window offers no export before a training, so there was one.
                     None => Err(LOST.to_owned()),
                 };
-                self.report.send(Event::Exported(result));
+                // Who asked waits for it.
+                let _ = answer.send(result);
             }
         }
     }
 
+    /// Draws the sets of a run and starts its networks; `None` once that is cancelled.
+    fn prepare(
+        &mut self,
+        prepare: impl FnOnce(&dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
+    ) -> Result<Option<(Run, Box<Began>)>, TestViewError> {
+        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
+        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
+        let begun = prepare(&is_cancelled)?.map(begun).transpose()?;
+        Ok(begun.filter(|_| !is_cancelled()))
+    }
+
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
-    fn begin(&mut self, run: Run, id: RunId, is_paused: bool, event: Event) {
+    fn begin<X>(
+        &mut self,
+        prepared: Result<Option<(Run, Box<Began>)>, X>,
+        is_paused: bool,
+        event: fn(Result<Box<Began>, X>) -> Event,
+    ) {
+        self.preparations += 1;
+        let (run, began) = match prepared {
+            Ok(Some(prepared)) => prepared,
+            Ok(None) => return self.report.send(Event::Abandoned),
+            Err(error) => return self.report.send(event(Err(error))),
+        };
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
-        (self.run, self.id) = (Some(run), Some(id));
+        (self.run, self.id) = (Some(run), Some(began.id));
         self.is_paused = is_paused;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
-        self.report.send(event);
+        self.report.send(event(Ok(began)));
         self.report_progress();
     }
 
@@ -193,7 +206,7 @@ impl Labour {
             (leader, epochs) if leader == number => epochs,
             _ => 0,
         };
-        self.report.send(Event::Progressed(Box::new(Progress {
+        let progress = Box::new(Progress {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
             starts,
@@ -213,7 +226,12 @@ impl Labour {
                 networks: is_standing.then(|| Arc::new(run.network())),
             },
             stop_reason: run.stop_reason(),
-        })));
+        });
+        self.report.progress(Event::Progressed(progress), |older, newer| {
+            if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
+                newer.replace(*older);
+            }
+        });
         self.reported = (number, trainer.history().len());
         // A large test set takes long to decouple; let it take at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
@@ -236,7 +254,7 @@ impl Labour {
 }
 
 /// What the window says where the training it shows is not in the worker: only a worker that died lost it.
-const LOST: &str = "the network was lost when the training thread ended: train again";
+pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
 /// What the window says where a file was asked for before another training began.
 const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
@@ -255,46 +273,4 @@ fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
         baselines,
     };
     Ok((run, Box::new(began)))
-}
-
-fn opened(path: &Path) -> Result<(Run, Box<Began>), String> {
-    let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
-    let resumed = file.resume().map_err(TestViewError::from).and_then(begun);
-    resumed.map_err(|error| format!("'{}': {error}", path.display()))
-}
-
-/// Puts a request at the end of the queue. While a slider is dragged many pictures are asked for; only the newest
-/// counts.
-fn enqueue(queue: &mut VecDeque<Request>, request: Request) {
-    match request {
-        Request::Preview(_) => queue.retain(|older| !matches!(older, Request::Preview(_) | Request::Baselines(_))),
-        Request::Baselines(_) => queue.retain(|older| !matches!(older, Request::Baselines(_))),
-        _ => {}
-    }
-    queue.push_back(request);
-}
-
-/// What stands beside the network, without one; nothing where it would keep the next request waiting.
-fn baselines(settings: &SimulatedSettings) -> Option<Baselines> {
-    /// About a tenth of a second.
-    const MOST_TERMS: usize = 50_000_000;
-    let scale = settings.source.sensor.scale;
-    let samples = settings.source.samples + settings.source.validation_samples + settings.source.test_samples;
-    let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
-    let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
-    if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
-        return None;
-    }
-    // They depend on neither the network nor its method, so the cheapest ones do.
-    let training = TrainingSettings {
-        method: Method::GradientDescent(GradientDescentSettings::default()),
-        ..TrainingSettings::default()
-    };
-    let cheapest = SimulatedSettings {
-        hidden: 1,
-        starts: 1,
-        training,
-        ..*settings
-    };
-    Run::prepare(cheapest).ok()?.baselines().copied()
 }

@@ -3,6 +3,7 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
+        mpsc::Sender,
     },
     time::Duration,
 };
@@ -10,7 +11,10 @@ use std::{
 use ndarray::Array2;
 
 use crate::{
-    app::test_view::{TestView, TestViewError},
+    app::{
+        job::JobError,
+        test_view::{TestView, TestViewError},
+    },
     evaluation::{Baselines, Errors, Run, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
@@ -20,10 +24,6 @@ use crate::{
 /// What the window asks of the worker.
 #[derive(Debug)]
 pub enum Request {
-    /// Draw the test set of these settings, to be looked at before training. Only the newest one counts.
-    Preview(Box<SimulatedSettings>),
-    /// Measure what will stand beside the network of these settings. Only the newest one counts.
-    Baselines(Box<SimulatedSettings>),
     /// Begin a training; one in progress is dropped.
     Train(Box<SimulatedSettings>),
     /// Take up the training saved in this file and hold it; one in progress is dropped.
@@ -38,30 +38,27 @@ pub enum Request {
     Resume,
     /// End the training; its network stays.
     Stop,
-    /// Write a file about this training, so long as no other has taken its place.
-    Export(RunId, WriteRun, PathBuf),
+    /// Write a file about this training, so long as no other has taken its place, and tell here how that went.
+    Export(RunId, WriteRun, PathBuf, Sender<Result<(), String>>),
 }
 
 /// What the worker tells the window.
 #[derive(Debug)]
 pub enum Event {
-    /// The test set of these settings.
-    Previewed(Box<SimulatedSettings>, Result<TestView, TestViewError>),
-    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
-    /// training would explain.
-    Compared(Box<SimulatedSettings>, Option<Baselines>),
     /// A training has begun, or why it cannot.
     Began(Result<Box<Began>, TestViewError>),
     /// A saved training stands where it was saved, or why it cannot.
     Opened(Result<Box<Began>, String>),
+    /// A training that was cancelled while it was prepared has not begun.
+    Abandoned,
     /// The training goes on with these settings, or why it cannot.
     Continued(Result<Box<SimulatedSettings>, String>),
     /// News of the training.
     Progressed(Box<Progress>),
     /// The training on show has ended: what is to be kept of it, or why nothing can be.
     Finished(Result<Box<NetworkFile>, String>),
-    /// A file was written, or why not.
-    Exported(Result<PathBuf, String>),
+    /// The thread has ended, and why, unless it was to end.
+    Died(Option<JobError>),
 }
 
 /// Writes a file about a training, or says why not.
@@ -109,6 +106,23 @@ pub struct Progress {
     pub stop_reason: Option<StopReason>,
 }
 
+impl Progress {
+    /// Takes the place of an older one that nobody saw: its epochs, and how its starts stood, are not lost.
+    pub fn replace(&mut self, older: Self) {
+        let newer = std::mem::replace(&mut self.epochs, older.epochs);
+        append_epochs(&mut self.epochs, newer);
+        self.starts = self.starts.take().or(older.starts);
+    }
+}
+
+/// Adds newer epochs to a history, in the place of those that it had of another leader.
+pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
+    if let Some(first) = newer.first() {
+        history.retain(|record| record.epoch < first.epoch);
+    }
+    history.extend(newer);
+}
+
 /// What the best network so far makes of the test set, and what it cost.
 #[derive(Clone, Debug)]
 pub struct RunResult {
@@ -130,4 +144,50 @@ pub struct RunResult {
     pub frame_time: Option<Duration>,
     /// The networks; there when the training pauses or ends.
     pub networks: Option<Arc<Networks>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Epochs of the start with this error.
+    fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {
+        let record = |epoch| EpochRecord {
+            epoch,
+            training_mse: start,
+            validation_mse: None,
+            test_mse: None,
+            gradient_norm: 0.0,
+            parameter: 0.0,
+            effective_parameters: None,
+            validation_failures: 0,
+        };
+        numbers.map(record).collect()
+    }
+
+    #[test]
+    fn no_epoch_is_lost_where_progress_replaces_progress() {
+        let [a, b] = [1.0, 2.0];
+        let cases = [
+            ("the leader goes on", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
+            ("nothing is new", epochs(a, 0..3), epochs(a, 3..3), epochs(a, 0..3)),
+            ("another start leads", epochs(a, 0..3), epochs(b, 0..5), epochs(b, 0..5)),
+            (
+                "it has run fewer epochs",
+                epochs(a, 0..5),
+                epochs(b, 0..3),
+                epochs(b, 0..3),
+            ),
+            (
+                "the older starts later",
+                epochs(a, 7..9),
+                epochs(a, 9..12),
+                epochs(a, 7..12),
+            ),
+        ];
+        for (sentence, mut older, newer, expected) in cases {
+            append_epochs(&mut older, newer);
+            assert_eq!(older, expected, "{sentence}");
+        }
+    }
 }

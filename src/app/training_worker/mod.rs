@@ -1,4 +1,4 @@
-//! The worker: one named thread that draws sets, trains and writes files. Requests go in, events come out, and each
+//! The worker: one named thread that trains and writes files about the training. Requests go in, events come out, and each
 //! event wakes the window.
 
 mod continuation;
@@ -7,4 +7,5 @@ mod labour;
 mod message;
 
 pub use handle::Worker;
-pub use message::{Began, Event, Progress, Request, RunId, RunResult, WriteRun};
+pub use labour::LOST;
+pub use message::{Began, Event, Progress, Request, RunId, RunResult, WriteRun, append_epochs};

@@ -12,7 +12,7 @@ mod train;
 
 use std::sync::Arc;
 
-use super::{shared::View, threads::Wake};
+use super::{job::Wake, shared::View};
 
 pub use identifiability::{Analysis, Question};
 pub use trade_off::{TradeEnding, TradePlan};
@@ -22,6 +22,7 @@ use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, trade_off::TradeOffView,
     train::TrainView,
 };
+pub(super) use train::ExportKind;
 
 /// All views.
 #[derive(Debug)]

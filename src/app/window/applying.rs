@@ -1,11 +1,16 @@
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::PathBuf,
+    sync::{Arc, mpsc::channel},
+};
 
-use super::{DecouplerWindow, save_form::Saving};
+use super::{DecouplerWindow, closing::Closing, save_form::Saving};
 use crate::{
     app::{
-        shared::{Effect, FileTask, Notice, Phase, Purpose},
+        preview,
+        shared::{Effect, FileTask, Phase, Purpose},
         theme,
-        training_worker::{Request, Worker},
+        training_worker::{LOST, Request, Worker},
+        views::ExportKind,
     },
     evaluation::SimulatedSettings,
 };
@@ -30,7 +35,8 @@ impl DecouplerWindow {
             }
             Effect::Resume => {
                 // The settings on the left are always those that are trained with.
-                if let Some(run) = &shared.run {
+                if let Some(run) = &mut shared.run {
+                    run.is_saved = false;
                     shared.draft.training = run.asked.training;
                 }
                 shared.phase = Phase::Training;
@@ -42,9 +48,19 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Continue(shared.draft.training));
             }
             Effect::Continue => {}
-            Effect::Stop => self.worker.ask(Request::Stop),
+            Effect::Stop => {
+                self.worker.ask(Request::Stop);
+                // What was being prepared does not begin; the training before it stays.
+                if shared.phase == Phase::Preparing {
+                    shared.phase = shared.phase_at_rest();
+                }
+            }
             Effect::Look(look) => shared.look = look,
-            Effect::ChooseFile(task) => self.dialogs.ask(task, Arc::clone(&self.wake)),
+            Effect::ChooseFile(task) => {
+                if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
+                    self.type_path(task);
+                }
+            }
             Effect::TypePath(task) => self.type_path(task),
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
@@ -86,9 +102,18 @@ impl DecouplerWindow {
 
     /// Does with the file in `path` what it was asked for.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
+        let is_checkpoint = task.words == ExportKind::Checkpoint.words();
+        if is_checkpoint && self.closing == Some(Closing::ChoosingPath) {
+            self.closing = Some(Closing::Finishing);
+        }
         match task.purpose {
-            Purpose::SaveTraining(run, write) => self.worker.ask(Request::Export(run, write, path)),
-            Purpose::Save(contents) => self.files.write(contents, path),
+            Purpose::SaveTraining(run, write) => {
+                let (send, written) = channel();
+                self.worker.ask(Request::Export(run, write, path.clone(), send));
+                self.files
+                    .write(path, move |_| written.recv().unwrap_or_else(|_| Err(LOST.to_owned())));
+            }
+            Purpose::Save(contents) => self.files.write(path, move |path| contents.write(path)),
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
             Purpose::Open => self.prepare(Request::Open(path)),
@@ -97,15 +122,9 @@ impl DecouplerWindow {
 
     /// Starts the worker again after it died.
     pub(super) fn restart_worker(&mut self) {
-        match Worker::start(Arc::clone(&self.wake)) {
-            Ok(worker) => {
-                self.worker = worker;
-                self.shared.phase = self.shared.phase_at_rest();
-                self.notice = None;
-                self.ask_for_what_is_missing();
-            }
-            Err(error) => self.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
-        }
+        self.worker = Worker::start(Arc::clone(&self.wake));
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notice = None;
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
@@ -120,15 +139,15 @@ impl DecouplerWindow {
     }
 
     /// Asks for what the settings are to show before a training and the window does not know yet.
-    pub(super) fn ask_for_what_is_missing(&self) {
+    pub(super) fn ask_for_what_is_missing(&mut self) {
         let shared = &self.shared;
-        let draft = Box::new(shared.draft);
+        let draft = shared.draft;
         match (&shared.preview, &shared.run) {
             (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
-                self.worker.ask(Request::Baselines(draft));
+                preview::compare(&mut self.previews, draft);
             }
             (None, Some(run)) if have_same_test_set(&run.settings, &draft) => {}
-            _ => self.worker.ask(Request::Preview(draft)),
+            _ => preview::draw(&mut self.previews, draft),
         }
     }
 }

@@ -3,6 +3,7 @@ use std::{path::PathBuf, sync::Arc};
 use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
+    closing::Closing,
     dialogs::{DialogKind, Dialogs},
     files::Files,
     notice::{self, notice_ui},
@@ -10,9 +11,10 @@ use super::{
     top_bar::top_bar_ui,
 };
 use crate::app::{
+    job::{Job, Wake},
+    preview::PreviewEvent,
     shared::{Effect, Notice, RunsWorker, Shared},
     theme::{self, Theme, space},
-    threads::Wake,
     training_worker::Worker,
     views::Views,
 };
@@ -32,9 +34,11 @@ pub struct DecouplerWindow {
     /// The path last typed, offered again for the same file.
     pub(super) typed: Option<Saving>,
     pub(super) worker: Worker,
+    pub(super) previews: Job<PreviewEvent>,
     pub(super) runs: RunsWorker,
     pub(super) files: Files,
     pub(super) dialogs: Dialogs,
+    pub(super) closing: Option<Closing>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
 }
@@ -53,7 +57,7 @@ impl DecouplerWindow {
         };
         let mut views = Views::new(&wake);
         let names = views.all().into_iter().map(|view| view.name()).enumerate();
-        let window = Self {
+        let mut window = Self {
             names: names.collect(),
             shared: Shared::new(is_dark),
             views,
@@ -61,10 +65,12 @@ impl DecouplerWindow {
             notice: None,
             saving: None,
             typed: None,
-            worker: Worker::start(Arc::clone(&wake))?,
-            runs: RunsWorker::start(Arc::clone(&wake))?,
+            worker: Worker::start(Arc::clone(&wake)),
+            previews: Job::new("preview", Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
+            closing: None,
             wake,
             ctx: ctx.clone(),
         };
@@ -108,8 +114,8 @@ impl DecouplerWindow {
         }
         let mut effects = Vec::new();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
-        // The question for a path is to be answered first.
-        if self.saving.is_none() {
+        // A question is to be answered first.
+        if self.saving.is_none() && self.closing.is_none() {
             view.take_shortcuts(ui.ctx(), shared, &mut effects);
         }
         let palette = Theme::of(ui).palette;
@@ -172,6 +178,9 @@ impl DecouplerWindow {
             self.set_dark(!self.shared.look.is_dark);
         }
         self.ask_for_path(ui);
+        // What was begun in this frame must be finished too.
+        self.take_close_request();
+        self.closing_ui(ui);
     }
 
     /// Does what views ask for.
@@ -224,7 +233,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        app::shared::{FileTask, FileWords, Phase, Purpose},
+        app::{
+            shared::{FileTask, FileWords, Phase, Purpose},
+            test_view::TestView,
+        },
         evaluation::Run,
         export::NetworkFile,
     };
@@ -316,6 +328,15 @@ mod tests {
                 .as_ref()
                 .is_some_and(|preview| preview.baselines.is_some())
         });
+    }
+
+    #[test]
+    fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
+        let mut window = window();
+        let settings = window.shared.draft;
+        let drawn = TestView::draw(&settings);
+        window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
+        assert!(window.shared.preview.is_none() && window.shared.result().is_some());
     }
 
     #[test]

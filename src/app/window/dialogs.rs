@@ -3,27 +3,29 @@
 use std::{
     path::PathBuf,
     pin::Pin,
-    sync::mpsc::{Receiver, Sender, channel},
-    thread,
     time::{Duration, Instant},
 };
 
 use rfd::FileHandle;
 
-use crate::app::{shared::FileTask, threads::Wake};
+use crate::app::{
+    job::{Job, Wake},
+    shared::FileTask,
+};
 
-/// An answer sooner than this was no person's: the desktop has no dialog to show.
-const NO_PERSON: Duration = Duration::from_millis(250);
+/// An answer sooner than this was no person's: the desktop has no dialog to show. On a busy machine that takes a while to
+/// be found out; a person who cancels as fast is asked in the window.
+const NO_PERSON: Duration = Duration::from_secs(1);
 
 /// What became of a question for a path.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// The user chose this file.
-    Chosen(FileTask, PathBuf),
+    Chosen(PathBuf),
     /// The user thought better of it.
     Cancelled,
     /// There is no dialog here; ask in the window.
-    NoDialog(FileTask),
+    NoDialog,
 }
 
 /// Where questions for a path go.
@@ -35,74 +37,74 @@ pub enum DialogKind {
     None,
 }
 
-/// Questions under way.
+/// Questions under way, each with the task that it was asked for.
 #[derive(Debug)]
 pub struct Dialogs {
     kind: DialogKind,
-    outgoing: Sender<Answer>,
-    answers: Receiver<Answer>,
+    asked: Vec<(FileTask, Job<Answer>)>,
 }
 
 impl Dialogs {
     /// No questions yet.
     pub fn new(kind: DialogKind) -> Self {
-        let (outgoing, answers) = channel();
         Self {
             kind,
-            outgoing,
-            answers,
+            asked: Vec::new(),
         }
     }
 
-    /// Asks for the path of a file; `wake` is called when the answer is there. Must run on the window's thread, which
-    /// some desktops require.
-    pub fn ask(&self, task: FileTask, wake: Wake) {
-        let send = self.outgoing.clone();
-        let no_dialog = Answer::NoDialog(task.clone());
+    /// Asks for the path of a file; returns whether there is a dialog to ask with. `wake` is called when the answer is
+    /// there. Must run on the window's thread, which some desktops require.
+    pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
         if self.kind == DialogKind::None {
-            // The receiver lives as long as `self`.
-            let _ = send.send(no_dialog);
-            return;
+            return false;
         }
-        let suggestion = task.suggested_path();
-        let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
-        for extension in task.words.extensions {
-            dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
-        }
-        if let Some(folder) = suggestion.parent() {
-            dialog = dialog.set_directory(folder);
-        }
+        let choice = choice(task);
         let asked = Instant::now();
-        let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = if task.is_read() {
-            // The terminal gives checkpoints any name.
-            Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
-        } else {
-            if let Some(name) = suggestion.file_name() {
-                dialog = dialog.set_file_name(name.to_string_lossy());
-            }
-            Box::pin(dialog.save_file())
-        };
-        let wait = move || {
-            let answer = match pollster::block_on(choice) {
-                Some(file) => Answer::Chosen(task, file.path().to_owned()),
-                None if asked.elapsed() < NO_PERSON => Answer::NoDialog(task),
+        let mut job = Job::prompt("file dialog", wake);
+        job.start(
+            move |_| match pollster::block_on(choice) {
+                Some(file) => Answer::Chosen(file.path().to_owned()),
+                None if asked.elapsed() < NO_PERSON => Answer::NoDialog,
                 None => Answer::Cancelled,
-            };
-            // The window may have closed meanwhile.
-            let _ = send.send(answer);
-            wake();
-        };
-        if thread::Builder::new()
-            .name("file dialog".to_owned())
-            .spawn(wait)
-            .is_err()
-        {
-            let _ = self.outgoing.send(no_dialog);
-        }
+            },
+            |answer| answer.unwrap_or(Answer::NoDialog),
+        );
+        self.asked.push((task.clone(), job));
+        true
     }
 
-    /// The next answer, if one has come.
-    pub fn next_answer(&self) -> Option<Answer> {
-        self.answers.try_recv().ok()
+    /// The next answer, if one has come, with the task that it was asked for.
+    pub fn next_answer(&mut self) -> Option<(FileTask, Answer)> {
+        let mut jobs = self.asked.iter().enumerate();
+        let (number, answer) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
+        let (task, _) = self.asked.remove(number);
+        Some((task, answer))
+    }
+
+    /// Whether an answer is still to come.
+    pub fn is_asking(&self) -> bool {
+        !self.asked.is_empty()
+    }
+}
+
+/// Shows the dialog.
+fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
+    let suggestion = task.suggested_path();
+    let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+    for extension in task.words.extensions {
+        dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
+    }
+    if let Some(folder) = suggestion.parent() {
+        dialog = dialog.set_directory(folder);
+    }
+    if task.is_read() {
+        // The terminal gives checkpoints any name.
+        Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
+    } else {
+        if let Some(name) = suggestion.file_name() {
+            dialog = dialog.set_file_name(name.to_string_lossy());
+        }
+        Box::pin(dialog.save_file())
     }
 }

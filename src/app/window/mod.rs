@@ -2,6 +2,7 @@
 //! ask for.
 
 mod applying;
+mod closing;
 mod decoupler_window;
 mod dialogs;
 mod files;

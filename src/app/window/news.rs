@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     app::{
+        preview::PreviewEvent,
         shared::{Notice, Phase, Preview, RunView},
         training_worker::Event,
     },
@@ -16,19 +17,11 @@ use crate::{
 impl DecouplerWindow {
     /// Takes what the threads and the dialogs have to tell.
     pub fn take_news(&mut self) {
-        loop {
-            match self.worker.next_event() {
-                Ok(Some(event)) => self.take_event(event),
-                Ok(None) => break,
-                Err(_) => {
-                    if self.shared.phase != Phase::Died {
-                        self.shared.phase = Phase::Died;
-                        let text = "The training thread ended unexpectedly. What is shown can still be looked at.";
-                        self.notice = Some(Notice::Failed(text.to_owned()));
-                    }
-                    break;
-                }
-            }
+        while let Some(event) = self.worker.next_event() {
+            self.take_event(event);
+        }
+        while let Some(event) = self.previews.next_event() {
+            self.take_preview(event);
         }
         if let Some(notice) = self.shared.runs.take_news(&self.runs) {
             self.notice = Some(notice);
@@ -36,10 +29,10 @@ impl DecouplerWindow {
         while let Some(written) = self.files.next_written() {
             self.tell_written(written);
         }
-        while let Some(answer) = self.dialogs.next_answer() {
+        while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(task, path) => self.answer(task, path),
-                Answer::NoDialog(task) => self.type_path(task),
+                Answer::Chosen(path) => self.answer(task, path),
+                Answer::NoDialog => self.type_path(task),
                 Answer::Cancelled => {}
             }
         }
@@ -51,6 +44,7 @@ impl DecouplerWindow {
         }
         self.shared.working = working;
         self.apply_all(effects);
+        self.take_close_request();
     }
 
     /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
@@ -66,33 +60,48 @@ impl DecouplerWindow {
                 self.typed = None;
                 Notice::Done(format!("Saved {}", path.display()))
             }
-            Err(reason) => Notice::Failed(reason),
+            Err(reason) => {
+                // The user has to see this.
+                self.closing = None;
+                Notice::Failed(reason)
+            }
         });
     }
 
-    fn take_event(&mut self, event: Event) {
+    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
         let shared = &mut self.shared;
         match event {
             // Settings that have moved on meanwhile have asked for another test set, or need none.
-            Event::Previewed(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
-            Event::Previewed(settings, Ok(test)) => {
-                if !shared.phase.is_busy() {
-                    shared.preview = Some(Preview {
-                        settings: *settings,
-                        test,
-                        baselines: None,
-                    });
-                    self.ask_for_what_is_missing();
-                }
+            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
+            // A training has begun meanwhile, and shows the same.
+            PreviewEvent::Drawn(settings, _)
+                if shared
+                    .run
+                    .as_ref()
+                    .is_some_and(|run| have_same_test_set(&run.settings, &settings)) => {}
+            PreviewEvent::Drawn(settings, Ok(test)) => {
+                shared.preview = Some(Preview {
+                    settings: *settings,
+                    test,
+                    baselines: None,
+                });
+                self.ask_for_what_is_missing();
             }
-            Event::Previewed(_, Err(error)) => self.notice = Some(Notice::Failed(error.to_string())),
-            Event::Compared(settings, baselines) => {
+            PreviewEvent::Drawn(_, Err(error)) => self.notice = Some(Notice::Failed(error.to_string())),
+            PreviewEvent::Compared(settings, baselines) => {
                 if let Some(preview) = &mut shared.preview
                     && have_same_sets(&settings, &shared.draft)
                 {
                     preview.baselines = baselines;
                 }
             }
+            PreviewEvent::Failed(error) => self.notice = Some(Notice::Failed(error.to_string())),
+        }
+    }
+
+    fn take_event(&mut self, event: Event) {
+        let shared = &mut self.shared;
+        match event {
             Event::Began(Ok(began)) => {
                 shared.preview = None;
                 shared.run = Some(RunView::new(*began));
@@ -102,7 +111,10 @@ impl DecouplerWindow {
             Event::Opened(Ok(began)) => {
                 shared.draft = began.settings;
                 shared.preview = None;
-                shared.run = Some(RunView::new(*began));
+                shared.run = Some(RunView {
+                    is_saved: true,
+                    ..RunView::new(*began)
+                });
                 self.typed = None;
                 // If it has ended, the news of it say so.
                 shared.phase = Phase::Paused;
@@ -115,6 +127,7 @@ impl DecouplerWindow {
                         ..run.asked
                     };
                     run.settings = *settings;
+                    run.is_saved = false;
                     run.stop_reason = None;
                 }
                 shared.phase = Phase::Training;
@@ -136,7 +149,18 @@ impl DecouplerWindow {
             }
             Event::Finished(Ok(file)) => self.runs.keep(*file),
             Event::Finished(Err(reason)) => self.notice = Some(Notice::Failed(reason)),
-            Event::Exported(written) => self.tell_written(written),
+            Event::Died(reason) => {
+                shared.phase = Phase::Died;
+                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                let text = format!("The training ended unexpectedly{reason}. What is shown can still be looked at.");
+                self.notice = Some(Notice::Failed(text));
+            }
+            // The worker keeps these to itself.
+            Event::Abandoned => {}
+        }
+        if self.worker.is_preparing() {
+            // This was news of the training before.
+            self.shared.phase = Phase::Preparing;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     RunList, RunsWorker,
-    worker::{Listed, RunsRequest},
+    worker::{Listed, RunsEvent, RunsRequest},
 };
 use crate::app::shared::Notice;
 
@@ -10,24 +10,23 @@ impl RunList {
     /// Takes the list from the thread; returns what the user is to be told.
     pub fn take_news(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
-        loop {
-            match worker.next_event() {
-                Ok(Some(Listed { runs, path, problems })) => {
+        while let Some(event) = worker.next_event() {
+            match event {
+                RunsEvent::Listed(Listed { runs, path, problems }) => {
                     (self.workspace, self.path) = (runs, path);
                     if !problems.is_empty() {
                         notice = Some(Notice::Failed(problems.join(". ")));
                     }
                 }
-                Ok(None) => return notice,
-                Err(_) if self.has_worker_died => return notice,
-                Err(_) => {
-                    (self.has_worker_died, self.path) = (true, None);
-                    let text = "The thread that keeps the run list ended unexpectedly: runs are not kept from now on. \
-                                Start the program again.";
-                    return Some(Notice::Failed(text.to_owned()));
+                RunsEvent::Died(reason) => {
+                    self.path = None;
+                    let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                    let text = format!("Runs are not kept from now on{reason}. Start the program again.");
+                    notice = Some(Notice::Failed(text));
                 }
             }
         }
+        notice
     }
 
     /// Gives the run with this number another name, unless that is empty.

@@ -10,8 +10,6 @@ pub const PLACES: [&str; 2] = ["A", "B"];
 pub struct RunList {
     /// The runs, and which two are compared.
     pub workspace: KeptRuns,
-    /// Whether the thread that keeps them has ended, which the user was told.
-    pub has_worker_died: bool,
     /// Where runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
 }

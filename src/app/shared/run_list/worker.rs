@@ -6,15 +6,18 @@ use std::{
     path::PathBuf,
     sync::{
         Arc,
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Sender, channel},
     },
-    thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use crate::{
-    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+    app::job::{Job, JobError, Wake},
     export::{KeptRuns, NetworkFile, RunFolder},
 };
+
+/// Longest time that closing waits for the files.
+const LONGEST_WRITE: Duration = Duration::from_secs(5);
 
 /// Requests to the thread.
 pub(super) enum RunsRequest {
@@ -41,35 +44,39 @@ pub(super) struct Listed {
     pub(super) problems: Vec<String>,
 }
 
+/// News from the thread.
+pub(super) enum RunsEvent {
+    /// The run list after a request.
+    Listed(Listed),
+    /// The thread has ended, and why, unless it was to end.
+    Died(Option<JobError>),
+}
+
 /// The window's end of the thread.
+#[derive(Debug)]
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
-    events: Receiver<Listed>,
-    thread: Option<JoinHandle<()>>,
+    job: Job<RunsEvent>,
 }
 
 impl RunsWorker {
     /// Starts the thread. `wake` is called after each event.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn start(wake: Wake) -> std::io::Result<Self> {
+    pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let (outgoing, events) = channel();
-        let report = Report::new(outgoing, wake);
-        let work = move || {
-            yield_to_window();
-            let mut folder = RunFolder::default();
-            for request in incoming {
-                report.send(answer(request, &mut folder));
-            }
-        };
-        let thread = thread::Builder::new().name("run list".to_owned()).spawn(work)?;
-        Ok(Self {
+        let mut job = Job::new("run list", wake);
+        job.start(
+            move |report| {
+                let mut folder = RunFolder::default();
+                for request in incoming {
+                    report.send(RunsEvent::Listed(answer(request, &mut folder)));
+                }
+            },
+            |ended| RunsEvent::Died(ended.err()),
+        );
+        Self {
             requests: Some(requests),
-            events,
-            thread: Some(thread),
-        })
+            job,
+        }
     }
 
     /// Shows the runs in the folder `path`, and keeps runs there from now on.
@@ -89,17 +96,14 @@ impl RunsWorker {
 
     pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
-            // The other end is gone only if the thread died, which the next look at the events shows.
+            // The other end is gone only if the thread died, which is the last event.
             let _ = requests.send(request);
         }
     }
 
     /// The next event, if one has come.
-    ///
-    /// # Errors
-    /// The thread has ended.
-    pub(super) fn next_event(&self) -> Result<Option<Listed>, WorkerDied> {
-        next_event(&self.events)
+    pub(super) fn next_event(&self) -> Option<RunsEvent> {
+        self.job.next_event()
     }
 }
 
@@ -107,15 +111,7 @@ impl Drop for RunsWorker {
     fn drop(&mut self) {
         // The thread ends when everything asked for is done.
         self.requests = None;
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-impl fmt::Debug for RunsWorker {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RunsWorker").finish_non_exhaustive()
+        self.job.wait(LONGEST_WRITE);
     }
 }
 

@@ -1,19 +1,12 @@
-use std::{
-    fmt,
-    sync::{
-        Arc,
-        mpsc::{Receiver, channel},
-    },
-    thread,
-};
+use std::{fmt, sync::Arc};
 
 use ndarray::Array2;
 
 use crate::{
     app::{
+        job::{Job, Wake},
         shared::{Effect, Notice, RightCard, RunList},
         test_view::{Frame, TestView},
-        threads::{Report, Wake, next_event, yield_to_window},
     },
     export::NetworkFile,
 };
@@ -39,7 +32,7 @@ pub struct Place {
     /// What is drawn of it, once it is prepared.
     pub compared: Option<Compared>,
     /// Where that comes from.
-    news: Option<Receiver<Result<Box<Compared>, String>>>,
+    job: Option<Job<Result<Box<Compared>, String>>>,
 }
 
 /// A run as it is drawn.
@@ -112,16 +105,13 @@ impl CompareView {
             if place.id != run.map(|run| run.id) {
                 *place = Place::default();
                 if let Some(run) = run {
-                    (place.id, place.news) = (Some(run.id), prepare(&run.file, &self.wake));
+                    (place.id, place.job) = (Some(run.id), Some(prepare(&run.file, &self.wake)));
                 }
             }
-            let Some(news) = &place.news else { continue };
-            let prepared = match next_event(news) {
-                Ok(Some(prepared)) => prepared,
-                Ok(None) => continue,
-                Err(_) => Err("The surfaces of this run could not be prepared: try again.".to_owned()),
+            let Some(prepared) = place.job.as_ref().and_then(Job::next_event) else {
+                continue;
             };
-            place.news = None;
+            place.job = None;
             match prepared {
                 Ok(mut compared) => {
                     if self.snapshot > 0 {
@@ -137,18 +127,17 @@ impl CompareView {
     }
 }
 
-/// Draws the test set of a run and what its network makes of it, on a thread of its own.
-fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Option<Receiver<Result<Box<Compared>, String>>> {
-    let (outgoing, news) = channel();
-    let report = Report::new(outgoing, Arc::clone(wake));
+/// Draws the test set of a run and what its network makes of it, in the background.
+fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Job<Result<Box<Compared>, String>> {
+    let mut job = Job::new("compared run", Arc::clone(wake));
     let file = Arc::clone(file);
-    let work = move || {
-        yield_to_window();
-        report.send(Compared::new(&file).map(Box::new));
-    };
-    // Without a thread the other end is gone, which the next look at the news shows.
-    let _ = thread::Builder::new().name("compared run".to_owned()).spawn(work);
-    Some(news)
+    job.start(
+        move |_| Compared::new(&file).map(Box::new),
+        |prepared| {
+            prepared.unwrap_or_else(|error| Err(format!("The surfaces of this run could not be prepared: {error}")))
+        },
+    );
+    job
 }
 
 impl fmt::Debug for CompareView {

@@ -6,12 +6,12 @@ use std::{
 
 use super::{
     Form,
-    worker::{ExperimentWorker, RunNumber},
+    worker::{self, ExperimentEvent},
 };
 use crate::{
     app::{
-        shared::{Effect, Notice},
-        threads::Wake,
+        job::{Job, Wake},
+        shared::Effect,
     },
     evaluation::{
         SimulatedSettings,
@@ -67,7 +67,7 @@ pub struct ExperimentsView {
     pub look: ExperimentLook,
     /// What runs.
     pub running: Option<Running>,
-    pub(super) worker: ExperimentWorker,
+    pub(super) job: Job<ExperimentEvent>,
     forms: HashMap<Topic, CheckedForm>,
     outcomes: HashMap<Topic, Outcome>,
 }
@@ -116,8 +116,6 @@ pub struct Running {
     pub time_left: Option<Duration>,
     /// When it began.
     pub begun: Instant,
-    /// By which its news are known.
-    pub(super) number: RunNumber,
 }
 
 /// How an experiment ended.
@@ -198,7 +196,7 @@ impl ExperimentsView {
             topic: Topic::ALL[0],
             look: ExperimentLook::default(),
             running: None,
-            worker: ExperimentWorker::new(wake),
+            job: Job::new("experiments", wake),
             forms: HashMap::new(),
             outcomes: HashMap::new(),
         };
@@ -247,26 +245,19 @@ impl ExperimentsView {
         let Ok(experiment) = self.form().experiment() else {
             return;
         };
-        match self.worker.run(experiment.clone()) {
-            Ok(number) => {
-                effects.push(Effect::DismissNotice);
-                self.begin(experiment, number);
-            }
-            Err(error) => {
-                let text = format!("No thread could be started: {error}");
-                effects.push(Effect::Tell(Notice::Failed(text)));
-            }
-        }
+        effects.push(Effect::DismissNotice);
+        self.begin(experiment.clone());
+        worker::run(&mut self.job, experiment);
     }
 
     /// Ends the one that runs; what is finished stays.
     pub(super) fn cancel(&mut self) {
-        self.worker.cancel();
+        self.job.abandon();
         self.end(Instant::now());
     }
 
     /// Makes room for the results of `experiment`.
-    fn begin(&mut self, experiment: Experiment, number: RunNumber) {
+    fn begin(&mut self, experiment: Experiment) {
         let outcome = Outcome::new(experiment);
         self.running = Some(Running {
             topic: self.topic,
@@ -274,7 +265,6 @@ impl ExperimentsView {
             trials: outcome.trials().1,
             time_left: None,
             begun: Instant::now(),
-            number,
         });
         self.look = ExperimentLook::default();
         self.outcomes.insert(self.topic, outcome);

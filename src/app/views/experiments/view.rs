@@ -27,14 +27,10 @@ impl View for ExperimentsView {
 
     fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         let mut finished = Vec::new();
-        let present = self.running.map(|running| running.number);
-        while let Some(event) = self.worker.next_event() {
+        while let Some(event) = self.job.next_event() {
             match event {
-                // Of one that was cancelled.
-                ExperimentEvent::Finished(number, _) | ExperimentEvent::Ended(number, _) if Some(number) != present => {
-                }
-                ExperimentEvent::Finished(_, trial) => finished.push(*trial),
-                ExperimentEvent::Ended(_, result) => {
+                ExperimentEvent::Finished(trial) => finished.push(*trial),
+                ExperimentEvent::Ended(result) => {
                     self.record(std::mem::take(&mut finished));
                     self.end(Instant::now());
                     effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));

@@ -1,6 +1,8 @@
+use std::sync::Arc;
+
 use super::{Analysis, Question, worker::IdentifiabilityWorker};
 use crate::{
-    app::threads::Wake,
+    app::job::Wake,
     evaluation::SimulatedSettings,
     scene::Scene,
     sensor::{Axes, SensorModel},
@@ -12,7 +14,7 @@ pub struct IdentifiabilityView {
     /// What is asked.
     pub question: Question,
     /// The newest answer; it stays in view while the next is computed.
-    pub analysis: Option<Box<Analysis>>,
+    pub analysis: Option<Arc<Analysis>>,
     /// Why the question has no answer.
     pub problem: Option<String>,
     /// Whether the answer to the question is still to come.
@@ -44,10 +46,7 @@ impl IdentifiabilityView {
     /// Asks the question.
     pub(super) fn ask(&mut self) {
         self.is_pending = true;
-        if let Err(error) = self.worker.ask(self.question) {
-            self.is_pending = false;
-            self.problem = Some(format!("No thread could be started: {error}"));
-        }
+        self.worker.ask(self.question);
     }
 
     /// Takes up these settings, unless they are as they were when last taken: then what was changed here stays.

@@ -1,22 +1,19 @@
-//! The thread that answers questions. Only the newest question counts: older ones that wait are dropped, and an answer
+//! Answers questions in the background. Only the newest question counts: older ones that wait are dropped, and an answer
 //! that takes long is abandoned as soon as another question is asked.
 
 use std::{
-    fmt, io,
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-        mpsc::{Receiver, Sender, channel},
-    },
-    thread,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
-use super::{Analysis, AnalysisError, Question};
-use crate::app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window};
+use super::{Analysis, Question};
+use crate::app::job::{Job, Wake};
 
 /// An answer that takes less is finished though another question is asked, so that the picture follows a slider.
 const SHORT: Duration = Duration::from_millis(250);
+
+/// What the readings can tell; `None` if that was not computed to the end.
+type Answered = Result<Option<Arc<Analysis>>, String>;
 
 /// What the thread tells the window.
 #[derive(Debug)]
@@ -24,160 +21,120 @@ pub struct Answer {
     /// Whether no other question has been asked since.
     pub is_newest: bool,
     /// What the readings can tell, or why that is not known.
-    pub analysis: Result<Box<Analysis>, String>,
+    pub analysis: Result<Arc<Analysis>, String>,
 }
-
-type Numbered = (u64, Result<Box<Analysis>, AnalysisError>);
 
 /// The window's end of the thread.
+#[derive(Debug)]
 pub struct IdentifiabilityWorker {
-    wake: Wake,
-    /// The number of the newest question.
-    newest: Arc<AtomicU64>,
-    link: Option<Link>,
-}
-
-struct Link {
-    questions: Sender<(u64, Question)>,
-    answers: Receiver<Numbered>,
+    job: Job<Answered>,
+    /// The newest question, asked while another is answered.
+    waiting: Option<Question>,
+    last: Option<Arc<Analysis>>,
 }
 
 impl IdentifiabilityWorker {
-    /// No thread yet. `wake` is called after each answer.
+    /// Nothing asked yet. `wake` is called after each answer.
     pub fn new(wake: Wake) -> Self {
         Self {
-            wake,
-            newest: Arc::default(),
-            link: None,
+            job: Job::new("identifiability", wake),
+            waiting: None,
+            last: None,
         }
     }
 
-    /// Asks, on the thread that is there or on a new one.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn ask(&mut self, question: Question) -> io::Result<()> {
-        let number = self.newest.fetch_add(1, Ordering::Relaxed) + 1;
-        let link = match self.link.take() {
-            Some(link) => link,
-            None => self.start()?,
-        };
-        // The other end is gone only if the thread died, which the next look at the answers shows.
-        let _ = link.questions.send((number, question));
-        self.link = Some(link);
-        Ok(())
+    /// Asks.
+    pub fn ask(&mut self, question: Question) {
+        if self.job.is_under_way() {
+            self.job.cancel();
+            self.waiting = Some(question);
+        } else {
+            self.begin(question);
+        }
     }
 
     /// The next answer, if one has come.
     pub fn next_answer(&mut self) -> Option<Answer> {
-        let newest = self.newest.load(Ordering::Relaxed);
-        match next_event(&self.link.as_ref()?.answers) {
-            Ok(Some((number, analysis))) => Some(Answer {
-                is_newest: number == newest,
-                analysis: analysis.map_err(|error| error.to_string()),
-            }),
-            Ok(None) => None,
-            Err(WorkerDied) => {
-                self.link = None;
-                let text = "The thread that computes this ended unexpectedly: change a value to try again.";
-                Some(Answer {
-                    is_newest: true,
-                    analysis: Err(text.to_owned()),
-                })
+        loop {
+            let answered = self.job.next_event()?;
+            if let Ok(Some(analysis)) = &answered {
+                self.last = Some(Arc::clone(analysis));
+            }
+            let next = self.waiting.take();
+            let is_newest = next.is_none();
+            if let Some(question) = next {
+                self.begin(question);
+            }
+            if let Some(analysis) = answered.transpose() {
+                return Some(Answer { is_newest, analysis });
             }
         }
     }
 
-    fn start(&self) -> io::Result<Link> {
-        let (questions, incoming) = channel();
-        let (outgoing, answers) = channel();
-        let report = Report::new(outgoing, Arc::clone(&self.wake));
-        let newest = Arc::clone(&self.newest);
-        let work = move || {
-            yield_to_window();
-            answer_all(&incoming, &newest, &report);
-        };
-        thread::Builder::new().name("identifiability".to_owned()).spawn(work)?;
-        Ok(Link { questions, answers })
-    }
-}
-
-impl Drop for IdentifiabilityWorker {
-    fn drop(&mut self) {
-        // What is being answered is of no use any more.
-        self.newest.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-impl fmt::Debug for IdentifiabilityWorker {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("IdentifiabilityWorker").finish_non_exhaustive()
-    }
-}
-
-fn answer_all(incoming: &Receiver<(u64, Question)>, newest: &AtomicU64, report: &Report<Numbered>) {
-    let mut last: Option<Analysis> = None;
-    while let Ok(mut asked) = incoming.recv() {
-        while let Ok(newer) = incoming.try_recv() {
-            asked = newer;
-        }
-        let (number, question) = asked;
-        let begun = Instant::now();
-        let is_abandoned = || newest.load(Ordering::Relaxed) != number && begun.elapsed() > SHORT;
-        match Analysis::new(&question, last.as_ref(), is_abandoned) {
-            Ok(Some(analysis)) => {
-                last = Some(analysis.clone());
-                report.send((number, Ok(Box::new(analysis))));
-            }
-            Ok(None) => {}
-            Err(error) => report.send((number, Err(error))),
-        }
+    fn begin(&mut self, question: Question) {
+        let last = self.last.clone();
+        self.job.start(
+            move |report| {
+                let begun = Instant::now();
+                let is_abandoned = || report.is_cancelled() && begun.elapsed() > SHORT;
+                let analysis = Analysis::new(&question, last.as_deref(), is_abandoned);
+                Ok(analysis.map_err(|error| error.to_string())?.map(Arc::new))
+            },
+            |ended| ended.unwrap_or_else(|error| Err(format!("{error}; change a value to try again"))),
+        );
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::{Receiver, channel};
+
     use super::*;
     use crate::evaluation::SimulatedSettings;
 
+    fn worker() -> (IdentifiabilityWorker, Receiver<()>) {
+        let (woke, wakes) = channel();
+        (
+            IdentifiabilityWorker::new(Arc::new(move || woke.send(()).unwrap_or(()))),
+            wakes,
+        )
+    }
+
+    fn next_answer(worker: &mut IdentifiabilityWorker, wakes: &Receiver<()>) -> Answer {
+        loop {
+            if let Some(answer) = worker.next_answer() {
+                return answer;
+            }
+            wakes.recv_timeout(Duration::from_secs(60)).expect("an answer");
+        }
+    }
+
     #[test]
     fn the_last_answer_is_to_the_newest_question() {
-        let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
+        let (mut worker, wakes) = worker();
         let mut question = Question::of(&SimulatedSettings::default());
         for step in 1..=40 {
             question.sensor.geometry.height_mm = 0.1 * f64::from(step);
-            worker.ask(question).unwrap();
+            worker.ask(question);
         }
-        let mut answers = 0;
-        loop {
-            match worker.next_answer() {
-                None => thread::sleep(Duration::from_millis(2)),
-                Some(answer) => {
-                    answers += 1;
-                    let analysis = answer.analysis.unwrap();
-                    assert_eq!(answer.is_newest, analysis.question == question);
-                    if answer.is_newest {
-                        break;
-                    }
-                }
+        for answers in 1.. {
+            assert!(answers <= 40);
+            let answer = next_answer(&mut worker, &wakes);
+            assert_eq!(answer.is_newest, answer.analysis.unwrap().question == question);
+            if answer.is_newest {
+                break;
             }
         }
-        assert!((1..=40).contains(&answers));
         assert!(worker.next_answer().is_none());
     }
 
     #[test]
     fn an_impossible_question_is_answered_with_its_reason() {
-        let mut worker = IdentifiabilityWorker::new(Arc::new(|| ()));
+        let (mut worker, wakes) = worker();
         let mut question = Question::of(&SimulatedSettings::default());
         question.sensor.geometry.row_pitch_mm = 0.0;
-        worker.ask(question).unwrap();
-        let answer = loop {
-            if let Some(answer) = worker.next_answer() {
-                break answer;
-            }
-            thread::sleep(Duration::from_millis(2));
-        };
+        worker.ask(question);
+        let answer = next_answer(&mut worker, &wakes);
         assert!(answer.analysis.unwrap_err().contains("row pitch"));
     }
 }

@@ -2,12 +2,12 @@ use std::time::{Duration, Instant};
 
 use super::{
     TradeForm, TradeFormError, TradePlan,
-    worker::{TradeNumber, TradeWorker},
+    worker::{self, TradeEvent},
 };
 use crate::{
     app::{
-        shared::{Effect, Notice, Shared, View as _},
-        threads::Wake,
+        job::{Job, Wake},
+        shared::{Effect, Shared, View as _},
     },
     evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under},
 };
@@ -23,7 +23,7 @@ pub struct TradeOffView {
     pub outcome: Option<TradeOutcome>,
     /// How it is looked at.
     pub look: TradeLook,
-    pub(super) worker: TradeWorker,
+    pub(super) job: Job<TradeEvent>,
 }
 
 /// How a measurement is looked at.
@@ -51,8 +51,6 @@ pub struct TradeLimits {
 pub struct TradeRunning {
     /// When it began.
     pub begun: Instant,
-    /// By which its news are known.
-    pub(super) number: TradeNumber,
 }
 
 /// How a measurement ended.
@@ -102,7 +100,7 @@ impl TradeOffView {
             running: None,
             outcome: None,
             look: TradeLook::default(),
-            worker: TradeWorker::new(wake),
+            job: Job::new("trade-off", wake),
         }
     }
 
@@ -119,21 +117,14 @@ impl TradeOffView {
     /// Measures what the form says.
     pub(super) fn measure(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let Ok(plan) = self.plan(&shared.draft) else { return };
-        match self.worker.measure(plan.clone()) {
-            Ok(number) => {
-                effects.push(Effect::DismissNotice);
-                self.begin(plan, number);
-            }
-            Err(error) => {
-                let text = format!("No thread could be started: {error}");
-                effects.push(Effect::Tell(Notice::Failed(text)));
-            }
-        }
+        effects.push(Effect::DismissNotice);
+        self.begin(plan.clone());
+        worker::measure(&mut self.job, plan);
     }
 
     /// Ends the measurement; what is measured stays.
     pub(super) fn cancel(&mut self) {
-        self.worker.cancel();
+        self.job.abandon();
         self.end(Instant::now());
     }
 
@@ -146,17 +137,14 @@ impl TradeOffView {
     }
 
     /// Makes room for the points of `plan`.
-    fn begin(&mut self, plan: TradePlan, number: TradeNumber) {
+    fn begin(&mut self, plan: TradePlan) {
         let level = |&noise: &f64| TradeLevel {
             noise,
             points: Vec::new(),
         };
         self.look.level = self.look.level.min(plan.noises.len() - 1);
         self.look.marked = None;
-        self.running = Some(TradeRunning {
-            begun: Instant::now(),
-            number,
-        });
+        self.running = Some(TradeRunning { begun: Instant::now() });
         self.outcome = Some(TradeOutcome {
             levels: plan.noises.iter().map(level).collect(),
             plan,

@@ -32,13 +32,10 @@ impl View for TradeOffView {
     }
 
     fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
-        while let Some(event) = self.worker.next_event() {
-            let present = self.running.map(|running| running.number);
+        while let Some(event) = self.job.next_event() {
             match event {
-                // Of one that was cancelled.
-                TradeEvent::Measured(number, ..) | TradeEvent::Ended(number, _) if Some(number) != present => {}
-                TradeEvent::Measured(_, level, point) => self.record(level, *point),
-                TradeEvent::Ended(_, result) => {
+                TradeEvent::Measured(level, point) => self.record(level, *point),
+                TradeEvent::Ended(result) => {
                     self.end(Instant::now());
                     effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
                 }

@@ -18,4 +18,5 @@ mod workbench;
 
 pub use charts::BottomTab;
 pub use decoders::DecoderResult;
+pub use export_kind::ExportKind;
 pub use state::TrainView;

@@ -6,8 +6,8 @@ use super::{
 };
 use crate::{
     app::{
+        job::Wake,
         shared::{Effect, Look, RightCard, RunView, Shared},
-        threads::Wake,
     },
     evaluation::NodeAddress,
     training::StopReason,

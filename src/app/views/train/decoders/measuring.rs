@@ -1,20 +1,12 @@
-//! The thread that measures decoders. It yields to the window and ends after the last, or after the one in hand when
-//! nobody waits for more.
+//! Measures decoders in the background. It ends after the last, or after the one in hand when nobody waits for more.
 
-use std::{
-    fmt,
-    sync::{
-        Arc,
-        mpsc::{Receiver, channel},
-    },
-    thread,
-};
+use std::sync::Arc;
 
 use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
+        job::{Job, JobError, Report, Wake},
         shared::{Phase, Shared},
-        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
         training_worker::RunId,
     },
     dataset::Dataset,
@@ -22,23 +14,27 @@ use crate::{
     network::Networks,
 };
 
-/// The place of a decoder in the list, and what it is worth.
-type News = (usize, Result<DecoderReport, String>);
+/// What the thread tells the window.
+enum News {
+    /// What the decoder at this place in the list is worth.
+    Measured(usize, Result<DecoderReport, String>),
+    /// Nothing more will come.
+    Ended(Result<(), JobError>),
+}
 
-/// The window's end of the thread; without it the thread ends after the decoder in hand.
+/// The window's end of the thread.
+#[derive(Debug)]
 pub struct DecoderMeasuring {
-    wake: Wake,
-    news: Option<Receiver<News>>,
+    job: Job<News>,
     /// The training whose networks are measured, and how many epochs had been run.
     of: Option<(RunId, usize)>,
 }
 
 impl DecoderMeasuring {
-    /// No thread yet. `wake` is called after each decoder and at the end.
+    /// Nothing measured yet. `wake` is called after each decoder and at the end.
     pub fn new(wake: Wake) -> Self {
         Self {
-            wake,
-            news: None,
+            job: Job::new("decoders", wake),
             of: None,
         }
     }
@@ -60,64 +56,56 @@ impl DecoderMeasuring {
         {
             self.of = Some(of);
             state.measured = Some(DecoderResult::pending());
-            let begun = self.begin(run.settings, (**networks).clone(), Arc::clone(&run.test.set));
-            if let Err(error) = begun {
-                state.end(&format!("no thread could be started: {error}"));
-            }
+            self.begin(run.settings, (**networks).clone(), Arc::clone(&run.test.set));
         }
     }
 
     fn forget(&mut self, state: &mut DecodersState) {
-        (self.news, self.of, state.measured) = (None, None, None);
+        self.job.abandon();
+        (self.of, state.measured) = (None, None);
     }
 
     /// Measures all decoders of `settings` with their trained `networks` on `test`.
-    fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) -> std::io::Result<()> {
-        let (outgoing, incoming) = channel();
-        let news = Report::new(outgoing, Arc::clone(&self.wake));
-        let work = move || {
-            yield_to_window();
-            let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
-            for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
-                let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, &test) {
-                    Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
-                    Err(error) => Err(error.to_string()),
-                };
-                let report = set.as_ref().map_err(String::clone).and_then(measure);
-                // Nobody waits any more.
-                if !news.try_send((place, report)) {
-                    return;
-                }
-            }
-        };
-        thread::Builder::new().name("decoders".to_owned()).spawn(work)?;
-        self.news = Some(incoming);
-        Ok(())
+    fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) {
+        self.job.start(
+            move |report| measure_all(settings, networks, &test, report),
+            News::Ended,
+        );
     }
 
     /// Takes what the thread has to tell.
     fn take_news(&mut self, state: &mut DecodersState) {
-        while let Some(news) = &self.news {
-            match next_event(news) {
-                Ok(Some((place, report))) => state.take(place, report),
-                Ok(None) => return,
-                Err(WorkerDied) => {
-                    state.end("measuring ended unexpectedly: fold the table and unfold it again");
-                    self.news = None;
-                }
+        while let Some(news) = self.job.next_event() {
+            match news {
+                News::Measured(place, report) => state.take(place, report),
+                News::Ended(Ok(())) => {}
+                News::Ended(Err(error)) => state.end(&format!("{error}: fold the table and unfold it again")),
             }
         }
     }
 }
 
-impl fmt::Debug for DecoderMeasuring {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("DecoderMeasuring").finish_non_exhaustive()
+fn measure_all(settings: SimulatedSettings, networks: Networks, test: &Dataset, report: &Report<News>) {
+    let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
+    for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
+        if report.is_cancelled() {
+            return;
+        }
+        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
+            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
+            Err(error) => Err(error.to_string()),
+        };
+        report.send(News::Measured(
+            place,
+            set.as_ref().map_err(String::clone).and_then(measure),
+        ));
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::channel;
+
     use super::*;
     use crate::evaluation::{Run, Simulation};
 
@@ -142,9 +130,7 @@ mod tests {
         assert!(state.is_measuring());
         let mut impossible = settings;
         impossible.source.samples = 0;
-        measuring
-            .begin(impossible, run.network(), Arc::clone(run.test()))
-            .unwrap();
+        measuring.begin(impossible, run.network(), Arc::clone(run.test()));
         while state.is_measuring() {
             woken.recv().unwrap();
             measuring.take_news(&mut state);
