@@ -25,7 +25,7 @@ mod views;
 mod widgets;
 mod window;
 
-use crate::export::ticks;
+use crate::figure::ticks;
 
 pub use dialogs::DialogKind;
 pub use file_task::FileTask;

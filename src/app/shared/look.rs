@@ -1,6 +1,6 @@
-use crate::app::{
-    surface_view::{OrbitCamera, ViewMode},
-    test_view::Frame,
+use crate::{
+    app::test_view::Frame,
+    figure::surface::{OrbitCamera, ViewMode},
 };
 
 /// How the results are looked at.
@@ -63,8 +63,8 @@ pub struct Frames {
 
 /// Decoupled − actual: z of the nodes and of the grid.
 pub fn error_frame(actual: &Frame, decoupled: &Frame) -> Frame {
-    let nodes = actual.nodes_mm.iter().zip(&decoupled.nodes_mm);
-    let grid = actual.grid_mm.iter().zip(&decoupled.grid_mm);
+    let nodes = actual.nodes_mm.iter().zip(decoupled.nodes_mm.iter());
+    let grid = actual.grid_mm.iter().zip(decoupled.grid_mm.iter());
     Frame {
         nodes_mm: nodes
             .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))

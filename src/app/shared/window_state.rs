@@ -4,7 +4,6 @@ use super::{BottomTab, Frames, Look, RightCard, RunResult, RunView, error_frame,
 use crate::{
     app::{
         file_task::FileTask,
-        surface_view::{OrbitCamera, ViewMode},
         test_view::TestView,
         training_worker::{ExportKind, file_name},
         views::{
@@ -13,6 +12,7 @@ use crate::{
         },
     },
     evaluation::{Baselines, SimulatedSettings, node_rms_mm},
+    figure::surface::{OrbitCamera, ViewMode},
     training::StopReason,
 };
 

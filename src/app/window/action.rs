@@ -4,7 +4,6 @@ use crate::{
     app::{
         file_task::FileTask,
         shared::{BottomTab, RightCard, View},
-        surface_view::{OrbitCamera, ViewMode},
         training_worker::ExportKind,
         views::{
             compare::RunsAction,
@@ -15,6 +14,7 @@ use crate::{
         },
     },
     evaluation::{NodeAddress, SimulatedSettings},
+    figure::surface::{OrbitCamera, ViewMode},
     training::TrainerState,
 };
 

@@ -128,6 +128,27 @@ impl Canvas {
         ));
     }
 
+    /// Part of a surface that lets shine through what lies behind it. Its edges are sharp: soft ones would show seams
+    /// between neighbours.
+    pub fn pale_facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
+        let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
+        self.put(format_args!(
+            r#"<polygon points="{points}" fill="{fill}" fill-opacity="{opacity}" shape-rendering="crispEdges"/>"#
+        ));
+    }
+
+    /// Straight lines that do not cover each other.
+    pub fn segments(&mut self, ends: &[[At; 2]], stroke: Stroke, opacity: f64) {
+        let pieces = ends.iter().map(|&[from, to]| format!("M{}L{}", pair(from), pair(to)));
+        let (path, style) = (pieces.collect::<String>(), stroke_style(stroke));
+        let opacity = if opacity < 1.0 {
+            format!(r#" stroke-opacity="{}""#, number(opacity))
+        } else {
+            String::new()
+        };
+        self.put(format_args!(r#"<path d="{path}" {style}{opacity}/>"#));
+    }
+
     pub fn outline(&mut self, area: Area, stroke: Stroke) {
         let (left, top) = (area.left, area.top);
         let corners = [
@@ -146,6 +167,21 @@ impl Canvas {
         let edge = edge.map(stroke_style).unwrap_or_default();
         self.put(format_args!(
             r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" {edge}/>"#
+        ));
+    }
+
+    pub fn pale_disc(&mut self, at: At, radius: f64, fill: Rgb, opacity: f64) {
+        let ([x, y], radius, fill, opacity) = (at.map(number), number(radius), hex(fill), number(opacity));
+        self.put(format_args!(
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" fill-opacity="{opacity}"/>"#
+        ));
+    }
+
+    pub fn pale_ring(&mut self, at: At, radius: f64, stroke: Stroke, opacity: f64) {
+        let ([x, y], radius, style) = (at.map(number), number(radius), stroke_style(stroke));
+        let opacity = number(opacity);
+        self.put(format_args!(
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="none" {style} stroke-opacity="{opacity}"/>"#
         ));
     }
 
@@ -219,8 +255,12 @@ fn number(value: f64) -> String {
 }
 
 fn coordinates(points: &[At]) -> String {
-    let pairs = points.iter().map(|point| point.map(number).join(","));
+    let pairs = points.iter().map(|&point| pair(point));
     pairs.collect::<Vec<_>>().join(" ")
+}
+
+fn pair(point: At) -> String {
+    point.map(number).join(",")
 }
 
 fn hex([red, green, blue]: Rgb) -> String {

@@ -1,5 +1,3 @@
-use std::ops::RangeInclusive;
-
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
 use super::{
@@ -7,14 +5,16 @@ use super::{
     curves::{colours, curves_keys, curves_ui},
     figures_table::figures_ui,
 };
-use crate::app::{
-    plotting::{legend_ui, legend_width},
-    shared::{Compared, PLACES, RightCard, RunsState, State},
-    surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
-    theme::{Theme, semibold, space, type_size},
-    views::train::surfaces::symmetric_range_mm,
-    widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui},
-    window::Action,
+use crate::{
+    app::{
+        plotting::{legend_ui, legend_width},
+        shared::{Compared, PLACES, RightCard, RunsState, State},
+        surface_view::{ColourBar, SurfaceView},
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui},
+        window::Action,
+    },
+    figure::surface::{OrbitCamera, Surface, SurfaceFigure, ViewMode},
 };
 
 /// The middle of the Compare view: the surfaces of both runs above, their curves and figures below.
@@ -27,14 +27,19 @@ pub fn compare_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let upper = upper.with_max_y(upper.max.y - gap);
     let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
     let width = 0.5 * (cards.width() - gap);
-    let range_mm = common_range_mm(&state.runs);
+    let figure = compare_figure(state);
+    let mut surfaces = figure.surfaces.iter();
     for place in 0..2 {
+        let surface = state.runs.compared[place].as_ref().and_then(|_| surfaces.next());
         let left = cards.left() + (width + gap) * place as f32;
         let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
-        card_ui(ui, card, |ui| side_ui(ui, state, place, &range_mm, &mut actions));
+        card_ui(ui, card, |ui| side_ui(ui, state, place, surface, &mut actions));
     }
-    if state.runs.compared.iter().any(Option::is_some) {
-        scale_ui(ui, scale.shrink2(Vec2::new(0.0, space(4))), state.runs.card, range_mm);
+    if let [colours, ..] = &figure.scales()[..] {
+        let slot = scale.shrink2(Vec2::new(0.0, space(4)));
+        let theme = Theme::of(ui);
+        let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+        ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
     }
     let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
     let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
@@ -49,37 +54,25 @@ pub fn compare_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     actions
 }
 
-/// One scale for both, so that colours and heights mean the same.
-fn common_range_mm(runs: &RunsState) -> RangeInclusive<f64> {
-    let ranges = runs.compared.iter().flatten().map(|compared| match runs.card {
-        RightCard::Decoupled => compared.test.z_range_mm(),
-        RightCard::Error => symmetric_range_mm(&compared.frames[2]),
-    });
-    let union = |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
-    ranges.reduce(union).unwrap_or(0.0..=1.0)
-}
-
-fn colours_of(card: RightCard) -> Colours {
-    match card {
-        RightCard::Decoupled => Colours::Height,
-        RightCard::Error => Colours::Error,
-    }
-}
-
-fn scale_ui(ui: &mut Ui, rect: Rect, card: RightCard, range: RangeInclusive<f64>) {
-    let mut slot = ui.new_child(UiBuilder::new().max_rect(rect));
-    let colours = colours_of(card);
-    let theme = Theme::of(ui);
-    let bar = ColourBar {
-        title: colours.title(),
-        range,
-        colours,
-        theme,
+/// The surfaces of the runs that are prepared, with one scale.
+fn compare_figure(state: &State) -> SurfaceFigure {
+    let (runs, mode) = (&state.runs, state.look.mode);
+    let surface = |compared: &Compared| {
+        let [_, decoupled, error] = &compared.frames;
+        match runs.card {
+            RightCard::Decoupled => compared.test.heights("Decoupled", decoupled, mode),
+            RightCard::Error => compared.test.errors("Error", error, mode),
+        }
     };
-    bar.show(&mut slot, rect.height());
+    SurfaceFigure {
+        surfaces: runs.compared.iter().flatten().map(surface).collect(),
+        camera: state.look.camera,
+        marked_node: None,
+    }
+    .with_common_scales()
 }
 
-fn side_ui(ui: &mut Ui, state: &State, place: usize, range_mm: &RangeInclusive<f64>, actions: &mut Vec<Action>) {
+fn side_ui(ui: &mut Ui, state: &State, place: usize, surface: Option<&Surface>, actions: &mut Vec<Action>) {
     let theme = Theme::of(ui);
     let runs = &state.runs;
     ui.horizontal(|ui| {
@@ -112,8 +105,8 @@ fn side_ui(ui: &mut Ui, state: &State, place: usize, range_mm: &RangeInclusive<f
             }
         });
     });
-    match &runs.compared[place] {
-        Some(compared) => surface_ui(ui, state, place, compared, range_mm, actions),
+    match surface {
+        Some(surface) => surface_ui(ui, place, surface, state.look.camera, actions),
         None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
         None => {
             let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
@@ -122,32 +115,15 @@ fn side_ui(ui: &mut Ui, state: &State, place: usize, range_mm: &RangeInclusive<f
     }
 }
 
-fn surface_ui(
-    ui: &mut Ui,
-    state: &State,
-    place: usize,
-    compared: &Compared,
-    range_mm: &RangeInclusive<f64>,
-    actions: &mut Vec<Action>,
-) {
-    let [_, decoupled, error] = &compared.frames;
-    let frame = match state.runs.card {
-        RightCard::Decoupled => decoupled,
-        RightCard::Error => error,
-    };
+fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, camera: OrbitCamera, actions: &mut Vec<Action>) {
     let view = SurfaceView {
         label: ["Surface of A", "Surface of B"][place],
-        grid: compared.test.surface.grid(),
-        values_mm: &frame.grid_mm,
-        nodes_mm: &frame.nodes_mm,
-        range_mm: range_mm.clone(),
-        colours: colours_of(state.runs.card),
-        mode: state.look.mode,
-        highlight: None,
+        surface,
+        marked_node: None,
         theme: Theme::of(ui),
     };
-    let shown = view.show(ui, state.look.camera);
-    if shown.camera != state.look.camera {
+    let shown = view.show(ui, camera);
+    if shown.camera != camera {
         actions.push(Action::MoveCamera(shown.camera));
     }
 }

@@ -1,8 +1,4 @@
-use crate::{
-    app::{shared::BottomTab, surface_view::ViewMode},
-    evaluation::SimulatedSettings,
-    sensor::SensorModel,
-};
+use crate::{app::shared::BottomTab, evaluation::SimulatedSettings, figure::surface::ViewMode, sensor::SensorModel};
 
 /// A figure of the paper that the window can show: its configuration, trained and looked at in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

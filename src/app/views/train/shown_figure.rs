@@ -1,24 +1,21 @@
 //! What the window shows, as a figure for print.
 
-use super::charts;
+use super::{charts, surfaces::surface_figure};
 use crate::{
     app::{
         plotting::plot_style::thinned,
         shared::{BottomTab, RunResult, RunView, State},
-        surface_view::ViewMode,
         test_view::Frame,
     },
-    export::figures::{
-        Hue, Marker, Picture, Plot, PlotAxis, PlotPoint, Series, Span, SurfaceFigure, SurfaceLook, SurfacePanel,
-        node_plot,
-    },
+    export::figures::{Hue, Marker, Picture, Plot, PlotAxis, PlotPoint, Series, Span, draw_surfaces, node_plot},
+    figure::surface::{SurfaceFigure, ViewMode},
     training::EpochRecord,
 };
 
 /// Which of the pictures in view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ShownPicture {
-    /// Actual and decoupled surface of the snapshot.
+    /// Actual surface of the snapshot, and the decoupled one or the error beside it.
     Surfaces,
     /// The chart below them.
     Chart,
@@ -37,7 +34,7 @@ impl Undrawn {
     /// Draws it.
     pub fn draw(&self) -> Picture {
         match self {
-            Self::Surfaces(figure) => figure.draw(),
+            Self::Surfaces(figure) => draw_surfaces(figure),
             Self::Plot(plot) => plot.draw(),
         }
     }
@@ -62,29 +59,10 @@ impl ShownPicture {
         let run = state.shown_run()?;
         let result = run.result.as_ref()?;
         match self {
-            Self::Surfaces => surfaces(state, run).map(Undrawn::Surfaces),
+            Self::Surfaces => Some(Undrawn::Surfaces(surface_figure(state))),
             Self::Chart => chart(state, run, result).map(Undrawn::Plot),
         }
     }
-}
-
-fn surfaces(state: &State, run: &RunView) -> Option<SurfaceFigure> {
-    let panel = |title: &str, frame: &Frame| SurfacePanel {
-        title: title.to_owned(),
-        values_mm: frame.grid_mm.clone(),
-        nodes_mm: frame.nodes_mm.clone(),
-    };
-    let (decoupled, _) = state.frames.decoupled.as_ref()?;
-    Some(SurfaceFigure {
-        grid: run.test.surface.grid().clone(),
-        interpolation: run.test.surface.interpolation(),
-        panels: vec![panel("Actual", &state.frames.actual), panel("Decoupled", decoupled)],
-        range_mm: run.test.z_range_mm(),
-        look: match state.look.mode {
-            ViewMode::ThreeD => SurfaceLook::ThreeD,
-            ViewMode::Top => SurfaceLook::Top,
-        },
-    })
 }
 
 fn chart(state: &State, run: &RunView, result: &RunResult) -> Option<Plot> {

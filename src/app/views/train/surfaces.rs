@@ -1,17 +1,16 @@
-use std::ops::RangeInclusive;
-
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
 use crate::{
     app::{
         shared::{RightCard, State},
-        surface_view::{ColourBar, Colours, SurfaceView, SurfaceViewResponse, ViewMode},
-        test_view::{Frame, TestView},
+        surface_view::{ColourBar, SurfaceView, SurfaceViewResponse},
+        test_view::TestView,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, segmented_ui},
         window::Action,
     },
     export::format_number,
+    figure::surface::{SurfaceFigure, ViewMode},
 };
 
 /// Both surfaces side by side, and the scale of their colours.
@@ -21,9 +20,28 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, state: &State, actions: &mut Vec<Act
     let width = 0.5 * (cards.width() - gap);
     let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
     let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
-    card_ui(ui, left, |ui| actual_card_ui(ui, state, actions));
-    card_ui(ui, right, |ui| right_card_ui(ui, state, actions));
-    colour_scales_ui(ui, scales, state);
+    let figure = surface_figure(state);
+    card_ui(ui, left, |ui| actual_card_ui(ui, state, &figure, actions));
+    card_ui(ui, right, |ui| right_card_ui(ui, state, &figure, actions));
+    colour_scales_ui(ui, scales, &figure);
+}
+
+/// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
+pub fn surface_figure(state: &State) -> SurfaceFigure {
+    let (frames, look) = (&state.frames, &state.look);
+    let surfaces = state.test().into_iter().flat_map(|test| {
+        let actual = test.heights("Actual", &frames.actual, look.mode);
+        let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match look.right {
+            RightCard::Decoupled => test.heights("Decoupled", decoupled, look.mode),
+            RightCard::Error => test.errors("Error", error, look.mode),
+        });
+        std::iter::once(actual).chain(beside)
+    });
+    SurfaceFigure {
+        surfaces: surfaces.collect(),
+        camera: look.camera,
+        marked_node: look.node,
+    }
 }
 
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.
@@ -38,7 +56,7 @@ fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
 }
 
-fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn actual_card_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Actual", space(29));
@@ -49,17 +67,10 @@ fn actual_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             }
         });
     });
-    let Some(test) = state.test() else { return };
-    let card = Card {
-        label: "Actual surface",
-        frame: &state.frames.actual,
-        colours: Colours::Height,
-        range_mm: test.z_range_mm(),
-    };
-    card.show_ui(ui, state, test, actions);
+    surface_ui(ui, state, figure, 0, actions);
 }
 
-fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn right_card_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Network", space(36));
@@ -70,97 +81,42 @@ fn right_card_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             }
         });
     });
-    let (Some(test), Some((decoupled, error))) = (state.test(), &state.frames.decoupled) else {
+    if figure.surfaces.len() < 2 {
         placeholder_ui(
             ui,
             "Press Train: the surface that the network decouples takes shape here while it learns.",
         );
         return;
-    };
-    let card = match state.look.right {
-        RightCard::Decoupled => Card {
-            label: "Decoupled surface",
-            frame: decoupled,
-            colours: Colours::Height,
-            range_mm: test.z_range_mm(),
-        },
-        RightCard::Error => Card {
-            label: "Error surface",
-            frame: error,
-            colours: Colours::Error,
-            range_mm: symmetric_range_mm(error),
-        },
-    };
-    card.show_ui(ui, state, test, actions);
+    }
+    surface_ui(ui, state, figure, 1, actions);
 }
 
 /// The scale that both surfaces share; beside it that of the errors while they are shown.
-fn colour_scales_ui(ui: &mut Ui, rect: Rect, state: &State) {
-    let Some(test) = state.test() else { return };
-    let theme = Theme::of(ui);
-    let height = |range| ColourBar {
-        title: Colours::Height.title(),
-        range,
-        colours: Colours::Height,
-        theme,
-    };
-    let mut scales = vec![height(test.z_range_mm())];
-    if let (RightCard::Error, Some((_, error))) = (state.look.right, &state.frames.decoupled) {
-        let colours = Colours::Error;
-        scales.push(ColourBar {
-            title: colours.title(),
-            range: symmetric_range_mm(error),
-            colours,
-            theme,
-        });
-    }
+fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
+    let scales = figure.scales();
     let part = rect.height() / scales.len() as f32;
-    for (index, scale) in scales.into_iter().enumerate() {
+    for (index, scale) in scales.iter().enumerate() {
         let top = rect.top() + part * index as f32;
         let slot = Rect::from_x_y_ranges(rect.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
         let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-        scale.show(&mut slot_ui, slot.height());
-    }
-}
-
-/// ± the largest error of a node, so that zero keeps its colour.
-pub fn symmetric_range_mm(error: &Frame) -> RangeInclusive<f64> {
-    let largest = error
-        .nodes_mm
-        .iter()
-        .map(|node| node.z.abs())
-        .filter(|z| z.is_finite())
-        .fold(0.0, f64::max);
-    // Nothing finer than a nanometre is told apart.
-    let largest = largest.max(1e-6);
-    -largest..=largest
-}
-
-struct Card<'a> {
-    label: &'static str,
-    frame: &'a Frame,
-    colours: Colours,
-    range_mm: RangeInclusive<f64>,
-}
-
-impl Card<'_> {
-    fn show_ui(self, ui: &mut Ui, state: &State, test: &TestView, actions: &mut Vec<Action>) {
         let theme = Theme::of(ui);
-        let view = SurfaceView {
-            label: self.label,
-            grid: test.surface.grid(),
-            values_mm: &self.frame.grid_mm,
-            nodes_mm: &self.frame.nodes_mm,
-            range_mm: self.range_mm,
-            colours: self.colours,
-            mode: state.look.mode,
-            highlight: state.look.node,
-            theme,
-        };
-        let shown = view.show(ui, state.look.camera);
-        answer(&shown, state, actions);
-        shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
+        ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
     }
+}
+
+fn surface_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, card: usize, actions: &mut Vec<Action>) {
+    let (Some(test), Some(surface)) = (state.test(), figure.surfaces.get(card)) else {
+        return;
+    };
+    let view = SurfaceView {
+        label: &format!("{} surface", surface.title),
+        surface,
+        marked_node: figure.marked_node,
+        theme: Theme::of(ui),
+    };
+    let shown = view.show(ui, figure.camera);
+    answer(&shown, state, actions);
+    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
 }
 
 fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>) {
