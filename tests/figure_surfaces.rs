@@ -75,7 +75,6 @@ fn lay_out(surface: &Surface, camera: OrbitCamera) -> Drawing {
             },
             measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
             colours: ColourMap::viridis(),
-            most_cells: 1000,
         },
     )
 }
@@ -166,9 +165,9 @@ fn scales_are_made_common_by_quantity() {
 /// Fills of the cells of a picture, the most frequent first.
 fn fills(picture: &Picture) -> Vec<String> {
     let mut counts = std::collections::BTreeMap::new();
-    for line in picture.svg().lines().filter(|line| line.starts_with("<polygon")) {
+    for line in picture.svg().lines().filter(|line| line.starts_with("<path color")) {
         *counts
-            .entry(line.split("fill=\"").nth(1).unwrap()[..7].to_owned())
+            .entry(line.split("color=\"").nth(1).unwrap()[..7].to_owned())
             .or_insert(0) += 1;
     }
     let mut fills: Vec<_> = counts.into_iter().collect();

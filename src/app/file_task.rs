@@ -90,8 +90,8 @@ impl FileTask {
             Self::SaveExperiment(_, file) => file.description(),
             Self::SaveTrade(file) => file.description(),
             Self::SavePicture(ShownPicture::Surfaces) => {
-                "Actual and decoupled surface as they are in view, for print: on a light ground, as PNG or SVG as the name \
-                 ends."
+                "The surfaces as they are in view, with the camera and the error card, for print: on a light ground, as PNG \
+                 or SVG as the name ends."
             }
             Self::SavePicture(ShownPicture::Chart) => {
                 "The chart in view, for print: on a light ground, as PNG or SVG as the name ends."

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Ui};
+use eframe::egui::{Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Shape, Stroke, Ui};
 use glam::Vec2;
 
-use super::{ribbon, view::SurfaceViewResponse};
+use super::ribbon;
 use crate::{
     app::theme::{Palette, Theme, rgb, type_size},
     figure::surface::{self, Bounds, Card, Disc, DiscShape, Dots, Ink, Line, OrbitCamera, Surface, Text, ViewMode},
@@ -26,11 +26,11 @@ pub(super) struct Painted {
 
 impl Painted {
     /// What the last frame painted if nothing has changed, or made anew.
-    pub(super) fn of(surface: &Surface, theme: &Theme, ui: &Ui, rect: Rect, shown: &SurfaceViewResponse) -> Arc<Self> {
-        let id = shown.response.id;
+    pub(super) fn of(surface: &Surface, camera: OrbitCamera, theme: &Theme, ui: &Ui, response: &Response) -> Arc<Self> {
+        let (id, rect) = (response.id, response.rect);
         let kept: Option<Arc<Self>> = ui.data(|data| data.get_temp(id));
         let camera = match surface.mode {
-            ViewMode::ThreeD => shown.camera,
+            ViewMode::ThreeD => camera,
             ViewMode::Top => OrbitCamera::default(),
         };
         let place = (camera, rect, ui.pixels_per_point(), theme.is_dark);
@@ -51,7 +51,6 @@ impl Painted {
                 bounds: bounds(rect),
                 measure: &|text| measure(ui.painter(), text),
                 colours: theme.colours(surface.quantity),
-                most_cells: usize::MAX - 1,
             },
         );
         Self {

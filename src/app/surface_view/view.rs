@@ -84,7 +84,7 @@ impl SurfaceView<'_> {
 
     fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
         let painter = ui.painter_at(rect);
-        let painted = Painted::of(self.surface, self.theme, ui, rect, shown);
+        let painted = Painted::of(self.surface, shown.camera, self.theme, ui, &shown.response);
         let is_idle = !shown.response.dragged();
         let pointer = shown.response.hover_pos().filter(|_| is_idle);
         shown.hovered_node = pointer.and_then(|pointer| painted.dots.nearest(to_glam(pointer)));

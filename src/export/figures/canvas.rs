@@ -104,12 +104,27 @@ impl Canvas {
         self.put(format_args!(r#"<polyline points="{points}" fill="none" {style}/>"#));
     }
 
-    /// A filled shape; a hairline of its own colour closes the seam to its neighbours.
-    pub fn facet(&mut self, corners: &[At], fill: Rgb) {
-        let (points, fill) = (coordinates(corners), hex(fill));
-        self.put(format_args!(
-            r#"<polygon points="{points}" fill="{fill}" stroke="{fill}" stroke-width=".3"/>"#
-        ));
+    /// Begins a group of [`Self::facet`]s.
+    pub fn begin_facets(&mut self) {
+        self.put(r#"<g fill="currentColor" stroke="currentColor" stroke-width=".3">"#);
+    }
+
+    /// Ends a group.
+    pub fn end_group(&mut self) {
+        self.put("</g>");
+    }
+
+    /// A piece of a surface. A hairline of its own colour closes the seam to its neighbours; where it lets shine through
+    /// what lies behind it, its edges are sharp instead, for the hairlines would show.
+    pub fn facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
+        let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
+        if opacity == "1" {
+            self.put(format_args!(r#"<path color="{fill}" d="M{points}z"/>"#));
+        } else {
+            self.put(format_args!(
+                r#"<path color="{fill}" d="M{points}z" fill-opacity="{opacity}" stroke="none" shape-rendering="crispEdges"/>"#
+            ));
+        }
     }
 
     /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
@@ -128,15 +143,6 @@ impl Canvas {
         ));
     }
 
-    /// Part of a surface that lets shine through what lies behind it. Its edges are sharp: soft ones would show seams
-    /// between neighbours.
-    pub fn pale_facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
-        let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
-        self.put(format_args!(
-            r#"<polygon points="{points}" fill="{fill}" fill-opacity="{opacity}" shape-rendering="crispEdges"/>"#
-        ));
-    }
-
     /// Straight lines that do not cover each other.
     pub fn segments(&mut self, ends: &[[At; 2]], stroke: Stroke, opacity: f64) {
         let pieces = ends.iter().map(|&[from, to]| format!("M{}L{}", pair(from), pair(to)));
@@ -146,7 +152,7 @@ impl Canvas {
         } else {
             String::new()
         };
-        self.put(format_args!(r#"<path d="{path}" {style}{opacity}/>"#));
+        self.put(format_args!(r#"<path d="{path}" fill="none" {style}{opacity}/>"#));
     }
 
     pub fn outline(&mut self, area: Area, stroke: Stroke) {

@@ -28,8 +28,6 @@ const LINE: f64 = 14.0;
 /// Height of a card: in its widths, and in points.
 const TALL_PER_WIDE: f64 = 0.98;
 const HEIGHT: [f64; 2] = [150.0, 290.0];
-/// Largest number of cells a side: more would only make the file larger.
-const MOST_CELLS: usize = 64;
 const BAR_STEPS: usize = 64;
 
 const EDGE: Rgb = [0xa2, 0xa9, 0xb4];
@@ -53,7 +51,6 @@ pub fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
                 bounds: layout(width, height),
                 measure: &measure,
                 colours: colours(surface.quantity),
-                most_cells: MOST_CELLS,
             },
         );
         notes.extend(drawing.dots.note().map(|note| (left, note)));
@@ -160,10 +157,12 @@ impl Pen<'_> {
     fn draw_surface(&mut self, drawing: &Drawing, marked_node: Option<usize>) {
         self.draw_frame(&drawing.lines, &drawing.texts);
         let mesh = &drawing.mesh;
+        self.canvas.begin_facets();
         for (cells, lines) in mesh.strips() {
             cells.iter().for_each(|&cell| self.draw_cell(mesh, cell));
             self.draw_contours(lines);
         }
+        self.canvas.end_group();
         for Disc {
             at,
             radius,
@@ -208,11 +207,7 @@ impl Pen<'_> {
         }
         let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
         let places = corners.map(|corner| self.at(corner.at));
-        if opacity < 1.0 {
-            self.canvas.pale_facet(&places, colour, f64::from(opacity));
-        } else {
-            self.canvas.facet(&places, colour);
-        }
+        self.canvas.facet(&places, colour, f64::from(opacity));
     }
 
     fn draw_contours(&mut self, lines: &[ContourLine]) {

@@ -7,8 +7,8 @@ use glam::Vec2;
 use super::{
     edge::TICK,
     labels::Labels,
+    quantity::Quantity,
     shapes::{Bounds, Ink, Line, Text},
-    value::Quantity,
 };
 use crate::figure::ticks::{multiples, round_steps, tick_text};
 

@@ -11,7 +11,7 @@ use super::{
     plan_axes::PlanAxes,
     projection::PlotBox,
     shapes::{Bounds, Line, Text},
-    value::{Surface, ViewMode},
+    surface_figure::{Surface, ViewMode},
 };
 use crate::figure::colour_map::ColourMap;
 
@@ -28,8 +28,6 @@ pub struct Card<'a> {
     pub measure: &'a dyn Fn(&str) -> Vec2,
     /// The colours of the values.
     pub colours: &'a ColourMap,
-    /// Largest number of cells a side; a finer surface is thinned.
-    pub most_cells: usize,
 }
 
 /// A laid-out surface, in the order of painting.
@@ -48,7 +46,7 @@ pub struct Drawing {
 impl Surface {
     /// Lays the surface out as `camera` sees it.
     pub fn lay_out(&self, camera: OrbitCamera, card: &Card<'_>) -> Drawing {
-        let field = Field::new(self, card.most_cells);
+        let field = Field::new(self);
         let names = ["x (mm)", "y (mm)", self.quantity.axis_name()];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);

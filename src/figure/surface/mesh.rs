@@ -84,7 +84,7 @@ pub struct Mesh {
 impl Mesh {
     /// The surface in the colours of `map`.
     pub(super) fn new(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Self {
-        let (x_mm, y_mm) = (&field.x_mm, &field.y_mm);
+        let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
         let mut mesh = Self {
             vertices: vertices(field, stage, map),
             across: y_mm.len(),
@@ -104,7 +104,7 @@ impl Mesh {
         let mut lineless = 0..0;
         for ix in far_to_near(x_mm, eye_mm.x) {
             let drawn = rows.iter().filter(|&&iy| field.is_drawn(ix, iy));
-            mesh.cells.extend(drawn.map(|&iy| field.index(ix, iy) as u32));
+            mesh.cells.extend(drawn.map(|&iy| field.grid.index(ix, iy) as u32));
             // Lines lag one strip behind, or the next strip would cover half of their width.
             let strip = lineless.end..mesh.cells.len();
             mesh.end_strip(lineless, field, &levels, &inks);
@@ -165,10 +165,11 @@ impl Mesh {
 
 /// One vertex for every grid point, in their order.
 fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Vec<Vertex> {
-    let across = field.y_mm.len();
+    let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+    let across = y_mm.len();
     let places = field.values.iter().enumerate().map(|(index, &value)| {
         let (ix, iy) = (index / across, index % across);
-        (ix, iy, DVec3::new(field.x_mm[ix], field.y_mm[iy], value))
+        (ix, iy, DVec3::new(x_mm[ix], y_mm[iy], value))
     });
     let vertex = |ix: usize, iy: usize, at: Vec2, value: f64, light: f32| {
         let beyond = field.beyond(ix, iy);
@@ -246,7 +247,83 @@ fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{contour_levels, far_to_near};
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        figure::surface::{Bounds, OrbitCamera, Quantity, Surface, ViewMode, projection::PlotBox},
+        surface::SurfaceMap,
+    };
+
+    /// How far from the eye a triangle is at a place on the screen; `None` beside it.
+    fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
+        let [a, b, c] = corners.map(|(at, _)| at);
+        let whole = (b - a).perp_dot(c - a);
+        let parts = [(b, c), (c, a), (a, b)].map(|(from, to)| (to - from).perp_dot(place - from) / whole);
+        let mean = || {
+            parts
+                .iter()
+                .zip(&corners)
+                .map(|(part, (_, distance))| part * distance)
+                .sum()
+        };
+        parts.iter().all(|part| *part > 0.0).then(mean)
+    }
+
+    #[test]
+    fn what_is_near_is_painted_over_what_is_far() {
+        let places: Vec<f64> = (0..6).map(f64::from).collect();
+        let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
+        let values = map.evaluate(
+            &(0..36)
+                .map(|node| 4.5 + 0.5 * (1.9 * f64::from(node)).sin())
+                .collect::<Vec<_>>(),
+        );
+        let surface = Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: Arc::new([]),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode: ViewMode::ThreeD,
+        };
+        let field = Field::new(&surface);
+        let (min_mm, max_mm) = field.box_mm();
+        let plot_box = PlotBox::new(min_mm, max_mm, 1.0);
+        let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
+        let mut hidden = 0;
+        for turn in 0..6 {
+            let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
+            let projection = Projection::fit(plot_box, camera, screen);
+            let mesh = Mesh::new(&field, &Stage::Space(&projection), ColourMap::viridis());
+            let distance = |index: usize| {
+                let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+                let z = field.values[index].clamp(min_mm.z, max_mm.z);
+                let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
+                plot_box.unit(place).distance(projection.eye)
+            };
+            let corners: Vec<(Vec2, f32)> = (0..mesh.vertices.len())
+                .map(|index| (mesh.vertices[index].at, distance(index)))
+                .collect();
+            for probe in 0..100 {
+                let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
+                let cells = mesh.strips().flat_map(|(cells, _)| cells);
+                let painted = cells.flat_map(|&cell| {
+                    let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
+                    [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .filter_map(|corners| distance_at(place, corners))
+                });
+                let painted: Vec<f32> = painted.collect();
+                hidden += painted.len().saturating_sub(1);
+                let nearest = painted.iter().copied().fold(f32::INFINITY, f32::min);
+                // Neighbouring cells may meet here.
+                assert!(painted.last().is_none_or(|last| *last < nearest + 0.03), "{painted:?}");
+            }
+        }
+        assert!(hidden > 100, "{hidden}: there is something to hide");
+    }
 
     #[test]
     fn contour_lines_lie_between_the_ends_of_the_range() {

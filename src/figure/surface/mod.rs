@@ -19,13 +19,15 @@ mod mesh;
 mod nodes;
 mod plan_axes;
 mod projection;
+mod quantity;
 mod shapes;
-mod value;
+mod surface_figure;
 
 pub use camera::OrbitCamera;
 pub use colour_scale::{ColourScale, ScaleDrawing};
 pub use drawing::{Card, Drawing};
 pub use mesh::{ContourLine, Mesh, Vertex};
 pub use nodes::Dots;
+pub use quantity::Quantity;
 pub use shapes::{Bounds, Disc, DiscShape, Ink, Line, Text};
-pub use value::{Quantity, Surface, SurfaceFigure, ViewMode};
+pub use surface_figure::{Surface, SurfaceFigure, ViewMode};

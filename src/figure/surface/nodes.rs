@@ -7,6 +7,7 @@ use super::{
     mesh::Stage,
     shapes::{Bounds, Disc, DiscShape, Ink},
 };
+use crate::surface::Grid;
 
 /// How near the pointer must be to a node, in points.
 const REACH: f32 = 10.0;
@@ -131,14 +132,15 @@ fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Stage<'_>) -> bool {
     let sight = plot_box.place_mm(projection.eye) - node;
     // A tolerance keeps nodes on a crest visible although the grid is coarser than the surface.
     let tolerance = 0.01 * (high - low);
-    line_of_sight(node, sight, [&field.x_mm, &field.y_mm])
+    line_of_sight(node, sight, field.grid)
         .take_while(|(place, _)| place.z <= high)
-        .any(|(place, [ix, iy])| field.values[field.index(ix, iy)].min(high) > place.z + tolerance)
+        .any(|(place, point)| field.values[point].min(high) > place.z + tolerance)
 }
 
-/// Places from a little off `node` towards the eye, as long as they lie over the grid of `x_mm` and `y_mm`; each
-/// with the grid point before it.
-fn line_of_sight(node: DVec3, sight: DVec3, [x_mm, y_mm]: [&[f64]; 2]) -> impl Iterator<Item = (DVec3, [usize; 2])> {
+/// Places from a little off `node` towards the eye, as long as they lie over the grid; each with the grid point before
+/// it.
+fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item = (DVec3, usize)> {
+    let (x_mm, y_mm) = (grid.x_mm(), grid.y_mm());
     // Half a cell of the axis along which cells are crossed faster: however stretched the array, so many steps lead
     // off the grid as it has points.
     let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
@@ -149,7 +151,7 @@ fn line_of_sight(node: DVec3, sight: DVec3, [x_mm, y_mm]: [&[f64]; 2]) -> impl I
     };
     (3..)
         .map(move |count| node + sight * (step * f64::from(count)))
-        .map_while(move |place| Some((place, [cell(x_mm, place.x)?, cell(y_mm, place.y)?])))
+        .map_while(move |place| Some((place, grid.index(cell(x_mm, place.x)?, cell(y_mm, place.y)?))))
 }
 
 #[cfg(test)]
@@ -173,7 +175,7 @@ mod tests {
                 (far - corner).with_y(0.0),
                 DVec3::new(0.0, 0.0, 1.0),
             ] {
-                let steps = line_of_sight(corner, sight, [grid.x_mm(), grid.y_mm()])
+                let steps = line_of_sight(corner, sight, grid)
                     .take_while(|(place, _)| place.z <= 1.0)
                     .take(100_000)
                     .count();

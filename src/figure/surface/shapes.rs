@@ -80,7 +80,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// A rectangle that holds nothing.
-    pub const NOTHING: Self = Self {
+    pub(super) const NOTHING: Self = Self {
         min: Vec2::INFINITY,
         max: Vec2::NEG_INFINITY,
     };

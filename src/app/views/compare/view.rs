@@ -39,7 +39,8 @@ pub fn compare_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         let slot = scale.shrink2(Vec2::new(0.0, space(4)));
         let theme = Theme::of(ui);
         let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-        ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
+        let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
+        bar.on_hover_text(figure.note());
     }
     let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
     let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);

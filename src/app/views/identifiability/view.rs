@@ -145,7 +145,8 @@ fn surface_ui(
     shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
     let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
     let colours = surface.scale();
-    ColourBar { scale: &colours, theme }.show(&mut slot, scale.height());
+    let bar = ColourBar { scale: &colours, theme }.show(&mut slot, scale.height());
+    bar.on_hover_text(figure.note());
 }
 
 fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {

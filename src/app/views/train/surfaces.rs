@@ -100,7 +100,8 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
         let slot = Rect::from_x_y_ranges(rect.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
         let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
         let theme = Theme::of(ui);
-        ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+        let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+        bar.on_hover_text(figure.note());
     }
 }
 
