@@ -6,14 +6,13 @@
 //! | `widgets` | the few components that egui lacks |
 //! | `plotting` | what all charts have in common |
 //! | [`surface_view`] | the surface plot |
-//! | `threads`, `dialogs`, `file_task` | background work, questions for a path |
+//! | `threads` | background work |
+//! | `test_view` | a test set ready to be drawn |
 //! | `training_worker` | the thread that trains |
-//! | `shared` | what all views read: settings, training on show, run list, look |
+//! | `shared` | what all views read: settings, training on show, run list, look; and what a view may ask for |
 //! | `views` | one room each, none knows another |
 //! | `window` | lays the views out and applies what they ask for |
 
-mod dialogs;
-mod file_task;
 mod plotting;
 mod shared;
 pub mod surface_view;
@@ -27,25 +26,16 @@ mod window;
 
 use crate::figure::ticks;
 
-pub use dialogs::DialogKind;
-pub use file_task::FileTask;
 pub use shared::{
-    BottomTab, Compared, Frames, Look, Notice, PLACES, Phase, Preview, RightCard, RunResult, RunView, RunsState,
-    Saving, State, View,
+    Columns, Contents, Effect, FileTask, FileWords, Look, Notice, PLACES, Phase, Preview, Purpose, RightCard, RunList,
+    RunResult, RunView, Shared, View,
 };
 pub use test_view::{Frame, TestView};
-pub use training_worker::ExportKind;
+pub use training_worker::{RunId, WriteRun};
 pub use views::{
-    compare::RunsAction,
-    experiments::{
-        AxisForm, AxisKind, Ending, ExperimentAction, ExperimentFile, ExperimentsState, Form, FormError, ListError,
-        Outcome, Running, SortBy, Topic,
-    },
-    identifiability::{Analysis, AnalysisError, IdentifiabilityAction, IdentifiabilityState, Question},
-    trade_off::{
-        Thoroughness, TradeAction, TradeEnding, TradeFile, TradeForm, TradeFormError, TradeLimits, TradeOutcome,
-        TradePlan, TradeRunning, TradeState, WhichPresets,
-    },
-    train::{DecoderResult, DecodersState, PaperFigure, ShownPicture},
+    Analysis, AnalysisError, AxisForm, AxisKind, BottomTab, CompareView, Compared, DecoderResult, DecodersState, Drawn,
+    Ending, ExperimentLook, ExperimentsView, Form, FormError, Frames, IdentifiabilityView, ListError, Outcome,
+    Question, Running, SortBy, Thoroughness, Topic, TradeEnding, TradeForm, TradeFormError, TradeLimits, TradeLook,
+    TradeOffView, TradeOutcome, TradePlan, TradeRunning, TrainView, Views, WhichPresets,
 };
-pub use window::{Action, DecouplerWindow, OpenError, open};
+pub use window::{DecouplerWindow, DialogKind, OpenError, open};

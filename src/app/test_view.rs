@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::DVec3;
 use ndarray::ArrayView2;
@@ -66,7 +66,7 @@ impl TestView {
     }
 
     /// z from full compression to rest, in millimetres: what the height scale spans.
-    pub fn z_range_mm(&self) -> std::ops::RangeInclusive<f64> {
+    pub fn z_range_mm(&self) -> RangeInclusive<f64> {
         let height_mm = self.sensor.geometry.height_mm;
         height_mm - self.stroke_mm..=height_mm
     }
@@ -155,11 +155,24 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// ± the largest error of a node, so that zero keeps its colour.
-    pub fn symmetric_range_mm(&self) -> std::ops::RangeInclusive<f64> {
-        let errors = self.nodes_mm.iter().map(|node| node.z.abs());
+    /// `decoupled` − this one: z of the nodes and of the grid.
+    pub fn error_of(&self, decoupled: &Self) -> Self {
+        let nodes = self.nodes_mm.iter().zip(decoupled.nodes_mm.iter());
+        let grid = self.grid_mm.iter().zip(decoupled.grid_mm.iter());
+        Self {
+            nodes_mm: nodes
+                .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
+                .collect(),
+            grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
+        }
+    }
+
+    /// ± the largest z of a node, so that zero keeps its colour.
+    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
+        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
+        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
         // Nothing finer than a nanometre is told apart.
-        let largest = errors.filter(|error| error.is_finite()).fold(1e-6, f64::max);
+        let largest = largest.max(1e-6);
         -largest..=largest
     }
 }

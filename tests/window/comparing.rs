@@ -3,7 +3,7 @@
 use std::fs;
 
 use decoupler::{
-    app::{BottomTab, Phase, View},
+    app::{BottomTab, Phase},
     export::{NetworkFile, format_number},
     figure::surface::ViewMode,
 };
@@ -33,7 +33,12 @@ fn trained_twice(driver: &mut Driver) {
 
 fn wait_for_both(driver: &mut Driver) {
     driver.wait("both surfaces", |driver| {
-        driver.state().runs.compared.iter().all(Option::is_some)
+        driver
+            .views()
+            .compare
+            .places
+            .iter()
+            .all(|place| place.compared.is_some())
     });
 }
 
@@ -66,7 +71,8 @@ fn two_runs_are_compared_and_survive_a_restart() {
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));
-        for (compared, run) in driver.state().runs.compared.iter().flatten().zip(&runs) {
+        let places = driver.views().compare.places.iter();
+        for (compared, run) in places.filter_map(|place| place.compared.as_ref()).zip(&runs) {
             assert_eq!(*compared.decoupled_mm, run.decouple_test(), "the same bits");
         }
         let kept = driver.state().runs.workspace.runs.iter();
@@ -76,7 +82,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     };
     check(&driver);
     driver.click("Next snapshot");
-    assert_eq!(driver.state().runs.snapshot, 1);
+    assert_eq!(driver.views().compare.snapshot, 1);
     driver.click_button("Error");
     driver.settle();
     // Closing the window waits for what is to be written.
@@ -90,7 +96,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     check(&driver);
     assert!(driver.harness().run() <= 2, "an idle view draws nothing");
     driver.click("Use the settings of Six hidden nodes");
-    assert_eq!((driver.state().view, driver.state().draft), (View::Train, small()));
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
 
 #[test]
@@ -127,18 +133,14 @@ fn a_damaged_list_is_told_of_and_kept_aside() {
     drop(driver);
     let mut driver = Driver::open_keeping(&path);
     wait_for_file(&mut driver);
-    assert!(
-        driver.state().notice.is_none(),
-        "told once: {:?}",
-        driver.state().notice
-    );
+    assert!(driver.notice().is_none(), "told once: {:?}", driver.notice());
     driver.configure_small();
     train_and_keep(&mut driver, 1);
     drop(driver);
     let mut driver = Driver::open_keeping(&path);
     wait_for_file(&mut driver);
     assert_eq!(kept(&driver), 1, "the new list is kept");
-    assert!(driver.state().notice.is_none());
+    assert!(driver.notice().is_none());
 }
 
 #[test]
@@ -148,7 +150,7 @@ fn a_second_window_leaves_the_list_to_the_first() {
     let mut first = Driver::open_keeping(&path);
     wait_for_file(&mut first);
     let mut second = Driver::open_keeping(&path);
-    second.wait("what it is told", |driver| driver.state().notice.is_some());
+    second.wait("what it is told", |driver| driver.notice().is_some());
     assert!(
         second.says("Another window keeps the run list"),
         "{:#?}",
@@ -176,14 +178,14 @@ fn figures_of_the_paper_are_one_click() {
     driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
     driver.click("Fig. 6");
-    assert_eq!(driver.state().look.tab, BottomTab::Nodes);
+    assert_eq!(driver.views().train.tab, BottomTab::Nodes);
     driver.wait("another training, for the first was stopped", |driver| {
         driver.state().phase == Phase::Training && driver.state().result().is_some()
     });
     driver.click("Error bars");
-    driver.wait("the bars", |driver| driver.state().frames.spread_mm.is_some());
-    let nodes = driver.state().frames.actual.nodes_mm.len();
-    assert_eq!(driver.state().frames.spread_mm.as_ref().map(Vec::len), Some(nodes));
+    driver.wait("the bars", |driver| driver.views().train.error_bars_mm().is_some());
+    let nodes = driver.views().train.drawn.frames.actual.nodes_mm.len();
+    assert_eq!(driver.views().train.error_bars_mm().map(<[f64]>::len), Some(nodes));
     driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
 }

@@ -232,10 +232,10 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
         give_path(&mut driver, OPEN, &path);
-        driver.wait("the reason", |driver| driver.state().notice.is_some());
+        driver.wait("the reason", |driver| driver.notice().is_some());
         let expected = CheckpointFile::load(&path).unwrap_err().to_string();
         assert!(expected.contains(reason), "{expected}");
-        assert_eq!(driver.state().notice, Some(Notice::Failed(expected.clone())));
+        assert_eq!(driver.notice(), Some(&Notice::Failed(expected.clone())));
         assert!(driver.has(&expected));
         assert_eq!(
             (driver.table(), driver.state().phase, driver.state().draft),

@@ -62,7 +62,7 @@ fn one_row_is_all_that_is_drawn() {
     assert_eq!(driver.state().draft.source.scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations a frame"));
     wait_for_scene(&mut driver);
-    assert_eq!(driver.state().frames.actual.nodes_mm.len(), 6);
+    assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
     assert!(driver.has("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
@@ -326,9 +326,11 @@ fn files_written_before_there_were_scenes_still_open() {
     fs::write(&path, workspace).unwrap();
     let mut driver = Driver::open_keeping(&path);
     driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
-    assert_eq!(driver.state().notice, None);
+    assert_eq!(driver.notice(), None);
     let kept = &driver.state().runs.workspace.runs[0].file.settings;
     assert_eq!((kept.source.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
     driver.click_button("Compare");
-    driver.wait("its surface", |driver| driver.state().runs.compared[0].is_some());
+    driver.wait("its surface", |driver| {
+        driver.views().compare.places[0].compared.is_some()
+    });
 }

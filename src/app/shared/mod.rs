@@ -1,12 +1,23 @@
-//! What all views read: the settings, the training on show, the run list, and how all is looked at.
+//! What all views read: the settings, the training on show, the run list, and how surfaces are looked at; and what a view
+//! may ask for.
 
+mod effect;
+mod file_task;
 mod look;
-pub mod run_list;
+mod notice;
+mod run_list;
 mod run_view;
-mod window_state;
+mod state;
+mod training_status;
+mod view;
 
 pub use super::training_worker::RunResult;
-pub use look::{BottomTab, Frames, Look, RightCard, error_frame};
-pub use run_list::{Compared, PLACES, RunsState};
+pub use effect::Effect;
+pub use file_task::{Contents, FileTask, FileWords, Purpose};
+pub use look::{Look, RightCard};
+pub use notice::Notice;
+pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;
-pub use window_state::{Notice, Phase, Preview, Saving, State, View};
+pub use state::{Phase, Preview, Shared};
+use training_status::training_status_ui;
+pub use view::{Columns, View};

@@ -1,7 +1,7 @@
 use crate::{
     app::{
         test_view::TestView,
-        training_worker::{Began, Progress, RunResult},
+        training_worker::{Began, Progress, RunId, RunResult},
     },
     evaluation::{Baselines, PublishedErrors, SimulatedSettings, StartRecord},
     training::{EpochRecord, Stage, StopReason},
@@ -10,6 +10,8 @@ use crate::{
 /// A training as far as the window knows it.
 #[derive(Debug)]
 pub struct RunView {
+    /// Which it is.
+    pub id: RunId,
     /// What it is trained with.
     pub settings: SimulatedSettings,
     /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
@@ -39,12 +41,14 @@ impl RunView {
     /// A training that has just begun.
     pub fn new(began: Began) -> Self {
         let Began {
+            id,
             settings,
             weights,
             test,
             baselines,
         } = began;
         Self {
+            id,
             published: settings.published(),
             settings,
             asked: settings,

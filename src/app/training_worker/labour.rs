@@ -9,7 +9,7 @@ use std::{
 };
 
 use super::{
-    Began, Event, Progress, Request, RunResult,
+    Began, Event, Progress, Request, RunId, RunResult,
     continuation::{continue_run, furthest_epoch},
 };
 use crate::{
@@ -33,6 +33,8 @@ const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 pub(super) struct Labour {
     report: Report<Event>,
     run: Option<Run>,
+    /// Which training `run` is.
+    id: Option<RunId>,
     is_paused: bool,
     /// Whether the window was told what is to be kept of the run.
     is_kept: bool,
@@ -49,6 +51,7 @@ impl Labour {
         Self {
             report,
             run: None,
+            id: None,
             is_paused: false,
             is_kept: false,
             elapsed: Duration::ZERO,
@@ -98,17 +101,17 @@ impl Labour {
                 self.report.send(Event::Compared(settings, baselines));
             }
             Request::Train(settings) => match Run::prepare(*settings).map_err(TestViewError::from).and_then(begun) {
-                Ok((run, began)) => self.begin(run, false, Event::Began(Ok(began))),
+                Ok((run, began)) => self.begin(run, began.id, false, Event::Began(Ok(began))),
                 Err(error) => self.report.send(Event::Began(Err(error))),
             },
             Request::Open(path) => match opened(&path) {
-                Ok((run, began)) => self.begin(run, true, Event::Opened(Ok(began))),
+                Ok((run, began)) => self.begin(run, began.id, true, Event::Opened(Ok(began))),
                 Err(error) => self.report.send(Event::Opened(Err(error))),
             },
             Request::TakeUp(settings, states) => {
                 let resumed = Run::resume(*settings, states).map_err(TestViewError::from);
                 match resumed.and_then(begun) {
-                    Ok((run, began)) => self.begin(run, true, Event::Opened(Ok(began))),
+                    Ok((run, began)) => self.begin(run, began.id, true, Event::Opened(Ok(began))),
                     Err(error) => self.report.send(Event::Opened(Err(error.to_string()))),
                 }
             }
@@ -124,14 +127,10 @@ impl Labour {
                 }
                 self.report_progress();
             }
-            Request::Networks(number) => {
-                let networks = self.run.as_ref().map(|run| Box::new(run.network()));
-                let networks = networks.ok_or_else(|| LOST.to_owned());
-                self.report.send(Event::Networks(number, networks));
-            }
-            Request::Export(kind, path) => {
+            Request::Export(id, write, path) => {
                 let result = match &self.run {
-                    Some(run) => kind.write(run, &path).map(|()| path).map_err(|error| error.to_string()),
+                    Some(run) if self.id == Some(id) => write(run, &path).map(|()| path),
+                    Some(_) => Err(REPLACED.to_owned()),
                     // The window offers no export before a training, so there was one.
                     None => Err(LOST.to_owned()),
                 };
@@ -141,11 +140,11 @@ impl Labour {
     }
 
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
-    fn begin(&mut self, run: Run, is_paused: bool, event: Event) {
+    fn begin(&mut self, run: Run, id: RunId, is_paused: bool, event: Event) {
         self.elapsed = run.leader().elapsed();
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
-        self.run = Some(run);
+        (self.run, self.id) = (Some(run), Some(id));
         self.is_paused = is_paused;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
@@ -217,6 +216,7 @@ impl Labour {
                     .count(),
                 elapsed: self.elapsed,
                 frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+                networks: is_standing.then(|| Arc::new(run.network())),
             },
             stop_reason: run.stop_reason(),
         })));
@@ -244,12 +244,17 @@ impl Labour {
 /// What the window says where the training it shows is not in the worker: only a worker that died lost it.
 const LOST: &str = "the network was lost when the training thread ended: train again";
 
+/// What the window says where a file was asked for before another training began.
+const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
+                        finished trainings are in the run list of the Compare view";
+
 /// A run, and what the window is to know of it.
 fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
     let simulated = run.settings().simulated().zip(run.baselines().copied());
     let (settings, baselines) = simulated.ok_or(TestViewError::Measured)?;
     let test = TestView::of(&settings, run.test().clone())?;
     let began = Began {
+        id: RunId::new(),
         settings,
         weights: run.leader().weights(),
         test,

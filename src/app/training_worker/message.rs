@@ -1,11 +1,17 @@
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use ndarray::Array2;
 
-use super::export_kind::ExportKind;
 use crate::{
     app::test_view::{TestView, TestViewError},
-    evaluation::{Baselines, Errors, RunFlaw, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, Errors, Run, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
@@ -32,10 +38,8 @@ pub enum Request {
     Resume,
     /// End the training; its network stays.
     Stop,
-    /// Hand over the best networks so far; the answer bears this number.
-    Networks(u64),
-    /// Write a file about the present training.
-    Export(ExportKind, PathBuf),
+    /// Write a file about this training, so long as no other has taken its place.
+    Export(RunId, WriteRun, PathBuf),
 }
 
 /// What the worker tells the window.
@@ -56,15 +60,30 @@ pub enum Event {
     Progressed(Box<Progress>),
     /// The training on show has ended: what is to be kept of it, or why nothing can be.
     Finished(Result<Box<NetworkFile>, String>),
-    /// The best networks so far, or why there are none; with the number of the request.
-    Networks(u64, Result<Box<Networks>, String>),
     /// A file was written, or why not.
     Exported(Result<PathBuf, String>),
+}
+
+/// Writes a file about a training, or says why not.
+pub type WriteRun = fn(&Run, &Path) -> Result<(), String>;
+
+/// Tells trainings apart, also those of a worker that died.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunId(u64);
+
+impl RunId {
+    /// That of no other training.
+    pub(super) fn new() -> Self {
+        static BEGUN: AtomicU64 = AtomicU64::new(0);
+        Self(BEGUN.fetch_add(1, Ordering::Relaxed))
+    }
 }
 
 /// What is known when a training begins.
 #[derive(Debug)]
 pub struct Began {
+    /// Which it is.
+    pub id: RunId,
     /// What was asked for.
     pub settings: SimulatedSettings,
     /// Weights and biases of the network.
@@ -109,4 +128,6 @@ pub struct RunResult {
     pub elapsed: Duration,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
+    /// The networks; there when the training pauses or ends.
+    pub networks: Option<Arc<Networks>>,
 }

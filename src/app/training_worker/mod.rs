@@ -2,11 +2,9 @@
 //! event wakes the window.
 
 mod continuation;
-mod export_kind;
 mod handle;
 mod labour;
 mod message;
 
-pub use export_kind::{ExportKind, file_name};
 pub use handle::Worker;
-pub use message::{Began, Event, Progress, Request, RunResult};
+pub use message::{Began, Event, Progress, Request, RunId, RunResult, WriteRun};

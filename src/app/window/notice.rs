@@ -1,19 +1,25 @@
 use eframe::egui::{Align, Frame, Layout, Margin, RichText, Stroke, Ui};
 
-use super::Action;
 use crate::app::{
-    shared::{Notice, Phase, State},
+    shared::{Notice, Phase},
     theme::{Theme, radius},
 };
 
-/// A strip above the work: what went wrong and what to do, or that something worked. Nothing while there is nothing to tell.
-pub fn notice_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
+/// What the user says to a notice.
+pub enum Reply {
+    /// It has been read.
+    Dismiss,
+    /// The training thread shall start again.
+    Restart,
+}
+
+/// A strip above the work: what went wrong and what to do, or that something worked.
+pub fn notice_ui(ui: &mut Ui, notice: &Notice, phase: Phase) -> Option<Reply> {
+    let mut reply = None;
     let palette = Theme::of(ui).palette;
-    let (text, colour) = match &state.notice {
-        Some(Notice::Done(text)) => (text, palette.good),
-        Some(Notice::Failed(text)) => (text, palette.bad),
-        None => return actions,
+    let (text, colour) = match notice {
+        Notice::Done(text) => (text, palette.good),
+        Notice::Failed(text) => (text, palette.bad),
     };
     let frame = Frame::new()
         .fill(palette.panel)
@@ -24,10 +30,10 @@ pub fn notice_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if ui.button("Dismiss").clicked() {
-                    actions.push(Action::DismissNotice);
+                    reply = Some(Reply::Dismiss);
                 }
-                if state.phase == Phase::Died && ui.button("Start again").clicked() {
-                    actions.push(Action::RestartWorker);
+                if phase == Phase::Died && ui.button("Start again").clicked() {
+                    reply = Some(Reply::Restart);
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.add(eframe::egui::Label::new(RichText::new(text).color(colour)).wrap());
@@ -35,5 +41,5 @@ pub fn notice_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             });
         });
     });
-    actions
+    reply
 }

@@ -1,12 +1,6 @@
 use std::{path::PathBuf, sync::Arc};
 
-use ndarray::Array2;
-
 use crate::{
-    app::{
-        shared::{RightCard, error_frame},
-        test_view::{Frame, TestView},
-    },
     evaluation::SimulatedSettings,
     export::{KeptRun, NetworkFile, Workspace},
 };
@@ -14,50 +8,18 @@ use crate::{
 /// The names of the two places.
 pub const PLACES: [&str; 2] = ["A", "B"];
 
-/// Everything the Compare view reads.
+/// The finished trainings.
 #[derive(Debug, Default)]
-pub struct RunsState {
+pub struct RunList {
     /// The runs, and which two are compared.
     pub workspace: Workspace,
-    /// What is drawn of the two, once it is prepared.
-    pub compared: [Option<Compared>; 2],
-    /// Snapshot of both test sets.
-    pub snapshot: usize,
-    /// What is shown of both networks.
-    pub card: RightCard,
-    /// The run that the user is asked about before it is removed.
-    pub removing: Option<u64>,
     /// Whether the thread that keeps them has ended, which the user was told.
     pub has_worker_died: bool,
     /// Where runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
 }
 
-/// A run as it is drawn.
-#[derive(Clone, Debug)]
-pub struct Compared {
-    /// Which run.
-    pub id: u64,
-    /// Its test set.
-    pub test: TestView,
-    /// What its network makes of it: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
-    /// The snapshot on show: actual, decoupled, difference.
-    pub frames: [Frame; 3],
-}
-
-impl Compared {
-    /// Makes the frames of `snapshot`, or of the last one if there are fewer.
-    pub fn show(&mut self, snapshot: usize) {
-        let snapshot = self.test.nearest_snapshot(snapshot);
-        let actual = self.test.frame(self.test.set.targets(), snapshot);
-        let decoupled = self.test.frame(self.decoupled_mm.view(), snapshot);
-        let error = error_frame(&actual, &decoupled);
-        self.frames = [actual, decoupled, error];
-    }
-}
-
-impl RunsState {
+impl RunList {
     /// The run with this number.
     pub fn run(&self, id: u64) -> Option<&KeptRun> {
         self.workspace.runs.iter().find(|run| run.id == id)
@@ -86,14 +48,5 @@ impl RunsState {
         let numbered = (2..).map(|number| format!("{name} ({number})"));
         let mut names = std::iter::once(name.clone()).chain(numbered);
         names.find(|name| !is_taken(name)).unwrap_or(name)
-    }
-
-    /// How many snapshots the larger of the two test sets has.
-    pub fn snapshots(&self) -> usize {
-        let compared = self.compared.iter().flatten();
-        compared
-            .map(|compared| compared.test.snapshots.len())
-            .max()
-            .unwrap_or(0)
     }
 }

@@ -1,4 +1,4 @@
-//! The thread that reads and writes files of the window's own and prepares what is compared. Requests go in, events
+//! The thread that reads and writes the workspace file. Requests go in, events
 //! come out, and each event wakes the window. When the window closes it waits for what is still to be written.
 
 use std::{
@@ -6,48 +6,29 @@ use std::{
     fmt,
     fs::{self, File},
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        mpsc::{Receiver, Sender, channel},
-    },
+    sync::mpsc::{Receiver, Sender, channel},
     thread::{self, JoinHandle},
 };
 
-use super::Compared;
 use crate::{
-    app::{
-        test_view::{Frame, TestView},
-        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
-        views::train::shown_figure::Undrawn,
-    },
-    export::{
-        FoundWorkspace, NetworkFile, Workspace, WorkspaceError, WriteError,
-        figures::{PictureError, PictureFormat},
-    },
+    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+    export::{FoundWorkspace, Workspace, WorkspaceError, WriteError},
 };
 
 /// What the window asks of the thread.
-pub enum RunsRequest {
+pub(super) enum RunsRequest {
     /// Take up the workspace in this file.
     Load(PathBuf),
     /// Write the workspace. Only the newest one counts.
     Save(Workspace),
-    /// Prepare this run to be drawn in one of the two places.
-    Prepare(usize, u64, Arc<NetworkFile>),
-    /// Draw and write a picture.
-    Write(Box<Undrawn>, PathBuf),
 }
 
 /// What the thread tells the window.
-pub enum RunsEvent {
+pub(super) enum RunsEvent {
     /// The workspace, or why runs are not kept.
     Loaded(PathBuf, Result<FoundWorkspace, String>),
     /// The workspace could not be written.
     NotSaved(String),
-    /// A run can be drawn, or why not.
-    Prepared(usize, Result<Box<Compared>, String>),
-    /// A picture was written, or why not.
-    Written(Result<PathBuf, String>),
 }
 
 /// The window's end of the thread.
@@ -83,8 +64,13 @@ impl RunsWorker {
         })
     }
 
+    /// Takes up the workspace in `path`, and keeps runs there from now on.
+    pub fn load(&self, path: PathBuf) {
+        self.ask(RunsRequest::Load(path));
+    }
+
     /// Asks for something.
-    pub fn ask(&self, request: RunsRequest) {
+    pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The other end is gone only if the thread died, which the next look at the events shows.
             let _ = requests.send(request);
@@ -95,7 +81,7 @@ impl RunsWorker {
     ///
     /// # Errors
     /// The thread has ended.
-    pub fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
+    pub(super) fn next_event(&self) -> Result<Option<RunsEvent>, WorkerDied> {
         next_event(&self.events)
     }
 }
@@ -154,14 +140,6 @@ impl Labour {
                 let saved = workspace.save(path);
                 saved.err().map(|error| RunsEvent::NotSaved(error.to_string()))
             }
-            RunsRequest::Prepare(place, id, file) => {
-                let prepared = prepare(id, &file).map(Box::new);
-                Some(RunsEvent::Prepared(place, prepared))
-            }
-            RunsRequest::Write(picture, path) => {
-                let written = write(&picture, &path).map(|()| path);
-                Some(RunsEvent::Written(written.map_err(|error| error.to_string())))
-            }
         }
     }
 
@@ -191,22 +169,4 @@ fn lock(path: &Path) -> Result<File, String> {
         // Some network folders know no locks; one window at a time is then the user's care.
         Err(fs::TryLockError::Error(_)) => Ok(file),
     }
-}
-
-fn prepare(id: u64, file: &NetworkFile) -> Result<Compared, String> {
-    let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
-    let decoupled_mm = file.network.decouple(&test.set);
-    let mut compared = Compared {
-        id,
-        test,
-        decoupled_mm: Arc::new(decoupled_mm),
-        frames: [Frame::default(), Frame::default(), Frame::default()],
-    };
-    compared.show(0);
-    Ok(compared)
-}
-
-fn write(picture: &Undrawn, path: &Path) -> Result<(), PictureError> {
-    let format = PictureFormat::of_path(path)?;
-    picture.draw().save(format, path)
 }

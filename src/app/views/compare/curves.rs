@@ -7,7 +7,7 @@ use crate::{
             Key, Mark,
             plot_style::{log_marks, log_text, plot, thinned},
         },
-        shared::{PLACES, RunsState},
+        shared::{PLACES, RunList},
         theme::{Palette, Theme},
     },
     training::EpochRecord,
@@ -19,7 +19,7 @@ pub fn colours(palette: &Palette) -> [Color32; 2] {
 }
 
 /// What is in the chart.
-pub fn curves_keys(palette: &Palette, runs: &RunsState) -> Vec<Key> {
+pub fn curves_keys(palette: &Palette, runs: &RunList) -> Vec<Key> {
     let places = (0..2).filter(|&place| runs.pinned(place).is_some());
     let keys = places.flat_map(|place| {
         let colour = colours(palette)[place];
@@ -30,7 +30,7 @@ pub fn curves_keys(palette: &Palette, runs: &RunsState) -> Vec<Key> {
 }
 
 /// Training and test error against epoch of both runs, in one chart with one scale.
-pub fn curves_ui(ui: &mut Ui, runs: &RunsState) {
+pub fn curves_ui(ui: &mut Ui, runs: &RunList) {
     let palette = Theme::of(ui).palette;
     let chart = plot(ui, "compared losses", "epoch", "mse (scaled)")
         .y_grid_spacer(log_marks)

@@ -5,7 +5,7 @@ use eframe::egui::Ui;
 use super::scene_words::{inputs_words, loading_words, movement_words, noise_words, rows_words};
 use crate::{
     app::{
-        shared::RunsState,
+        shared::RunList,
         theme::Theme,
         widgets::{Column, Row, table_ui},
     },
@@ -63,7 +63,7 @@ const FIGURES: [(&str, FigureOf); 18] = [
 ];
 
 /// Errors, configuration and cost of both runs.
-pub fn figures_ui(ui: &mut Ui, runs: &RunsState) {
+pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
     let colour = Theme::of(ui).palette.text;
     let row = |(name, figure): &(&'static str, FigureOf)| Row {
         name,

@@ -2,22 +2,21 @@ use std::time::Duration;
 
 use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
-use super::{RunsAction, scene_words::unlike_paper};
+use super::scene_words::unlike_paper;
 use crate::{
     app::{
-        shared::{PLACES, State},
+        shared::{Effect, PLACES, Shared},
         theme::{Theme, space, type_size},
         widgets::{scrolled_ui, section_heading_ui},
-        window::Action,
     },
     evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
 };
 
 /// The finished trainings, the newest first.
-pub fn run_list_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let runs = &state.runs;
+/// `removing` is the run that the user is asked about before it is removed.
+pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
+    let runs = &shared.runs;
     scrolled_ui(ui, "runs", |ui| {
         section_heading_ui(ui, "Runs");
         if runs.workspace.runs.is_empty() {
@@ -31,7 +30,7 @@ pub fn run_list_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         for run in runs.workspace.runs.iter().rev() {
             ui.add_space(space(2));
             ui.separator();
-            ui.push_id(run.id, |ui| run_ui(ui, state, run, &mut actions));
+            ui.push_id(run.id, |ui| run_ui(ui, shared, run, removing, effects));
         }
         ui.add_space(space(2));
         match &runs.path {
@@ -39,7 +38,6 @@ pub fn run_list_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             None => dim_ui(ui, "Not kept after this session."),
         };
     });
-    actions.into_iter().map(Action::from).collect()
 }
 
 fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
@@ -47,9 +45,9 @@ fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsAction>) {
+fn run_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
     let name = &run.name;
-    name_ui(ui, run, actions);
+    name_ui(ui, run, effects);
     dim_ui(ui, &conditions(&run.file.settings));
     let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
     let text = format!(
@@ -58,21 +56,22 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
         format_duration(time)
     );
     ui.label(RichText::new(text).size(type_size().note));
-    if state.runs.removing == Some(run.id) {
+    if *removing == Some(run.id) {
         ui.horizontal(|ui| {
             ui.label("Remove it for good?");
             if ui.button("Remove").clicked() {
-                actions.push(RunsAction::Remove(run.id));
+                effects.push(Effect::RemoveRun(run.id));
+                *removing = None;
             }
             if ui.button("Keep").clicked() {
-                actions.push(RunsAction::AskToRemove(None));
+                *removing = None;
             }
         });
         return;
     }
     ui.horizontal(|ui| {
         for (place, letter) in PLACES.into_iter().enumerate() {
-            let is_pinned = state.runs.workspace.pinned[place] == Some(run.id);
+            let is_pinned = shared.runs.workspace.pinned[place] == Some(run.id);
             let button = Button::selectable(is_pinned, letter)
                 .frame_when_inactive(true)
                 .min_size([space(6), space(6)].into());
@@ -84,25 +83,26 @@ fn run_ui(ui: &mut Ui, state: &State, run: &KeptRun, actions: &mut Vec<RunsActio
                 "Show on this side"
             };
             if response.on_hover_text(hint).clicked() {
-                actions.push(RunsAction::Pin(place, (!is_pinned).then_some(run.id)));
+                effects.push(Effect::PinRun(place, (!is_pinned).then_some(run.id)));
             }
         }
-        let can_take = !state.phase.is_busy();
+        let can_take = !shared.phase.is_busy();
         let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
         if take.on_hover_text("Take its settings for the next training").clicked() {
-            actions.push(RunsAction::TakeSettings(run.id));
+            let settings = Box::new(run.file.settings);
+            effects.extend([Effect::Configure(settings), Effect::ShowTraining]);
         }
         let remove = ui.add(Button::new("Remove…").min_size([0.0, space(6)].into()));
         remove.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Remove {name}")));
         if remove.clicked() {
-            actions.push(RunsAction::AskToRemove(Some(run.id)));
+            *removing = Some(run.id);
         }
     });
 }
 
 /// The name, to be changed in place; what is typed counts when the field is left.
-fn name_ui(ui: &mut Ui, run: &KeptRun, actions: &mut Vec<RunsAction>) {
+fn name_ui(ui: &mut Ui, run: &KeptRun, effects: &mut Vec<Effect>) {
     let id = Id::unique(("run name", run.id));
     let mut name: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| run.name.clone());
     let edit = ui.add(TextEdit::singleline(&mut name).id(id).desired_width(f32::INFINITY));
@@ -114,7 +114,7 @@ fn name_ui(ui: &mut Ui, run: &KeptRun, actions: &mut Vec<RunsAction>) {
     if edit.lost_focus() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {
-            actions.push(RunsAction::Rename(run.id, name));
+            effects.push(Effect::RenameRun(run.id, name));
         }
     }
 }

@@ -1,7 +1,8 @@
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use super::Topic;
 use crate::{
+    app::shared::{FileTask, FileWords},
     evaluation::experiments::{ExperimentResults, verdicts},
     export::{
         atomic_write, describe_conditions, draw_experiment,
@@ -23,6 +24,9 @@ pub enum ExperimentFile {
     Figure(PictureFormat),
 }
 
+/// What a figure is, in a sentence.
+const FIGURE: &str = "The picture on a light ground, at publication size.";
+
 impl ExperimentFile {
     /// In the order offered.
     pub const ALL: [Self; 5] = [
@@ -33,62 +37,48 @@ impl ExperimentFile {
         Self::Figure(PictureFormat::Png),
     ];
 
-    /// The words on its button.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cells => "Table as CSV…",
-            Self::Trials => "Every trial as CSV…",
-            Self::Markdown => "Table and verdicts as Markdown…",
-            Self::Figure(PictureFormat::Svg) => "Figure as SVG…",
-            Self::Figure(PictureFormat::Png) => "Figure as PNG…",
+    /// What the file is called.
+    pub fn words(self) -> FileWords {
+        let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
+            Self::Cells => (
+                "Table as CSV…",
+                "table",
+                "The figures of every cell with all their digits, as CSV.",
+                &["csv"],
+            ),
+            Self::Trials => (
+                "Every trial as CSV…",
+                "trials",
+                "Every trial with its seed and errors, as CSV.",
+                &["csv"],
+            ),
+            Self::Markdown => (
+                "Table and verdicts as Markdown…",
+                "table and verdicts",
+                "The table as it is shown, how it was made, and the verdicts, as Markdown.",
+                &["md"],
+            ),
+            Self::Figure(PictureFormat::Svg) => ("Figure as SVG…", "figure", FIGURE, &["svg"]),
+            Self::Figure(PictureFormat::Png) => ("Figure as PNG…", "figure", FIGURE, &["png"]),
+        };
+        FileWords {
+            name,
+            kind,
+            description,
+            extensions,
         }
     }
 
-    /// What the file holds, in a word or two.
-    pub fn file_kind(self) -> &'static str {
-        match self {
-            Self::Cells => "table",
-            Self::Trials => "trials",
-            Self::Markdown => "table and verdicts",
-            Self::Figure(_) => "figure",
-        }
+    /// The file about these results.
+    pub fn task(self, topic: Topic, results: Arc<ExperimentResults>) -> FileTask {
+        let words = self.words();
+        let kind = if self == Self::Trials { "_trials" } else { "" };
+        let name = topic.name().to_lowercase().replace(' ', "_");
+        let suggestion = format!("{name}{kind}.{}", words.extensions[0]);
+        FileTask::save(words, suggestion, move |path| self.write(topic, &results, path))
     }
 
-    /// What the file is, in a sentence.
-    pub fn description(self) -> &'static str {
-        match self {
-            Self::Cells => "The figures of every cell with all their digits, as CSV.",
-            Self::Trials => "Every trial with its seed and errors, as CSV.",
-            Self::Markdown => "The table as it is shown, how it was made, and the verdicts, as Markdown.",
-            Self::Figure(_) => "The picture on a light ground, at publication size.",
-        }
-    }
-
-    /// File name extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Cells | Self::Trials => "csv",
-            Self::Markdown => "md",
-            Self::Figure(format) => format.extension(),
-        }
-    }
-
-    /// The end of its name.
-    pub(super) fn ending(self) -> &'static str {
-        match self {
-            Self::Cells => ".csv",
-            Self::Trials => "_trials.csv",
-            Self::Markdown => ".md",
-            Self::Figure(PictureFormat::Svg) => ".svg",
-            Self::Figure(PictureFormat::Png) => ".png",
-        }
-    }
-
-    /// Writes the file.
-    ///
-    /// # Errors
-    /// The file cannot be written; nothing is left half-written.
-    pub fn write(self, topic: Topic, results: &ExperimentResults, path: &Path) -> Result<(), PictureError> {
+    fn write(self, topic: Topic, results: &ExperimentResults, path: &Path) -> Result<(), PictureError> {
         match self {
             Self::Cells => atomic_write(path, |writer| write_cells(results, writer))?,
             Self::Trials => atomic_write(path, |writer| write_trials(results, writer))?,

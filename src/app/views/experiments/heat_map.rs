@@ -3,21 +3,25 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, open_cell::open_cell};
+use super::{ExperimentLook, Outcome, open_cell::open_cell};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Shared},
         theme::{Theme, rgb, semibold, space, type_size},
-        window::Action,
     },
     export::{format_number, format_percent},
     figure::ColourMap,
 };
 
 /// Median Z error over both axes of a sweep: dark is small. A click marks the cell, two open it in the Train view.
-pub fn heat_map_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let marked = state.experiments.marked;
+pub fn heat_map_ui(
+    ui: &mut Ui,
+    outcome: &Outcome,
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let marked = look.marked;
     let palette = Theme::of(ui).palette;
     let experiment = &outcome.results.experiment;
     let across = &experiment.axis;
@@ -54,10 +58,10 @@ pub fn heat_map_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action>
         });
         let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(hover);
         if response.clicked() {
-            actions.push(ExperimentAction::Mark(at).into());
+            look.marked = Some(at);
         }
         if response.double_clicked() {
-            actions.extend(open_cell(state, outcome, at));
+            open_cell(shared, outcome, at, effects);
         }
         let fill = value.map(|value| rgb(ColourMap::viridis().at(log_share(value, medians()))));
         ui.painter().rect_filled(rect, 2.0, fill.unwrap_or(palette.raised));
@@ -100,7 +104,6 @@ pub fn heat_map_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action>
             eframe::egui::epaint::TextShape::new(place, galley, palette.text).with_angle(-std::f32::consts::FRAC_PI_2);
         ui.painter().add(upright);
     }
-    actions
 }
 
 /// What the colours mean.

@@ -1,27 +1,22 @@
 use super::Outcome;
-use crate::app::{
-    shared::{State, View},
-    window::Action,
-};
+use crate::app::shared::{Effect, Shared};
 
 /// Takes a cell to the Train view: its settings with the seed of its median trial, and the network of that trial. One
 /// that was not kept, as none is of a cross-validation, is trained there.
-pub fn open_cell(state: &State, outcome: &Outcome, cell: usize) -> Vec<Action> {
-    let cell = outcome.results.cells.get(cell).filter(|_| !state.phase.is_busy());
-    let Some(cell) = cell else { return Vec::new() };
+pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut Vec<Effect>) {
+    let cell = outcome.results.cells.get(cell).filter(|_| !shared.phase.is_busy());
+    let Some(cell) = cell else { return };
     let mut settings = cell.cell.settings;
-    let mut actions = Vec::new();
     match cell.median_trial() {
         Some(trial) => {
             settings.seed = trial.seed;
             if trial.states.is_empty() {
-                actions.extend([Action::Configure(Box::new(settings)), Action::Train]);
+                effects.extend([Effect::Configure(Box::new(settings)), Effect::Train]);
             } else {
-                actions.push(Action::TakeUp(Box::new(settings), trial.states.clone()));
+                effects.push(Effect::TakeUp(Box::new(settings), trial.states.clone()));
             }
         }
-        None => actions.push(Action::Configure(Box::new(settings))),
+        None => effects.push(Effect::Configure(Box::new(settings))),
     }
-    actions.push(Action::ShowView(View::Train));
-    actions
+    effects.push(Effect::ShowTraining);
 }

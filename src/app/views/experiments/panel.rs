@@ -1,19 +1,18 @@
 use eframe::egui::{Button, ComboBox, DragValue, TextEdit, Ui, vec2};
 
-use super::{AxisForm, AxisKind, ExperimentAction, Form, Running, Topic};
+use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Shared},
         theme::space,
         widgets::{
             dim_ui,
             fields::{count_ui, field_ui},
             ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
         },
-        window::Action,
     },
     dataset::FoldUnit,
-    evaluation::{MOST_STARTS, experiments::PaperTable},
+    evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable},
     export::format_duration,
     training::StoppingRules,
 };
@@ -22,19 +21,17 @@ use crate::{
 const MOST_TRIALS: usize = 1000;
 
 /// What is run: the choice, its lists and numbers, Run and Cancel.
-pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let experiments = &state.experiments;
+pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "experiment form", |ui| {
         section_heading_ui(ui, "Experiment");
         let options = Topic::ALL.map(|topic| (topic, topic.name()));
         if let Some(topic) = segmented_ui(ui, "Experiment", &options, experiments.topic, true) {
-            actions.push(ExperimentAction::Choose(topic).into());
+            experiments.choose(topic);
         }
         dim_ui(ui, what_it_does(experiments.topic));
         let mut form = experiments.form().clone();
         let is_idle = experiments.running.is_none();
-        ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, state));
+        ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, &shared.draft));
         match experiments.checked() {
             Ok(trials) => {
                 dim_ui(ui, &how_much(&form, *trials));
@@ -45,7 +42,7 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             }
         }
         ui.add_space(space(2));
-        run_buttons_ui(ui, state, &mut actions);
+        run_buttons_ui(ui, experiments, effects);
         if let Some(running) = &experiments.running {
             progress_ui(ui, running);
         }
@@ -60,11 +57,10 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             form = paper;
         }
         if form != *experiments.form() {
-            actions.push(ExperimentAction::Edit(Box::new(form)).into());
+            experiments.edit(form);
         }
         ui.add_space(space(4));
     });
-    actions
 }
 
 fn what_it_does(topic: Topic) -> &'static str {
@@ -90,7 +86,7 @@ fn how_much(form: &Form, trials: usize) -> String {
     )
 }
 
-fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, state: &State) {
+fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettings) {
     section_heading_ui(ui, "Values");
     match topic {
         Topic::Table(_) => form
@@ -108,7 +104,7 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, state: &State) {
     }
     section_heading_ui(ui, "Training");
     if topic == Topic::Sweep {
-        base_ui(ui, form, state);
+        base_ui(ui, form, draft);
     }
     let template = &mut form.template;
     let hint = "How many seeds in succession each cell is tried with: the spread of the results.";
@@ -185,7 +181,7 @@ fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
 }
 
 /// What a sweep holds, and where it may come from.
-fn base_ui(ui: &mut Ui, form: &mut Form, state: &State) {
+fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
     let base = &form.template.base;
     let text = format!(
         "{}, {} hidden nodes, {} samples, {}, where no axis says otherwise",
@@ -195,17 +191,16 @@ fn base_ui(ui: &mut Ui, form: &mut Form, state: &State) {
         base.training.method.name()
     );
     dim_ui(ui, &text);
-    let button = ui.add_enabled(*base != state.draft, Button::new("Take the settings of the Train view"));
+    let button = ui.add_enabled(base != draft, Button::new("Take the settings of the Train view"));
     if button
         .on_hover_text("Sensor, scene, network and training as they are set there")
         .clicked()
     {
-        form.template.base = state.draft;
+        form.template.base = *draft;
     }
 }
 
-fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let experiments = &state.experiments;
+fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut Vec<Effect>) {
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
@@ -214,7 +209,7 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             .on_hover_text("Run all trainings in the background (Ctrl+Enter)")
             .clicked()
         {
-            actions.push(ExperimentAction::Run.into());
+            experiments.run(effects);
         }
         let can_cancel = experiments.running.is_some();
         let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
@@ -222,7 +217,7 @@ fn run_buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             .on_hover_text("End it; what is finished stays (Ctrl+.)")
             .clicked()
         {
-            actions.push(ExperimentAction::Cancel.into());
+            experiments.cancel();
         }
     });
 }

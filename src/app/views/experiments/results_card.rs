@@ -1,15 +1,15 @@
+use std::sync::Arc;
+
 use eframe::egui::{
     Align, FontId, Label, Layout, RichText, TextWrapMode, Ui, Vec2, containers::menu::MenuButton, vec2,
 };
 
-use super::{ExperimentFile, Outcome, open_cell::open_cell, table::table_ui};
+use super::{ExperimentLook, Outcome, Topic, file::ExperimentFile, open_cell::open_cell, table::table_ui};
 use crate::{
     app::{
-        file_task::FileTask,
-        shared::State,
+        shared::{Effect, Shared},
         theme::{Theme, semibold, space, type_size},
         widgets::ghost_button,
-        window::Action,
     },
     export::{ExperimentTable, describe_conditions},
 };
@@ -18,14 +18,19 @@ use crate::{
 const MARGINS: f32 = 24.0;
 
 /// Title, how it was made, files, and the table.
-pub fn results_card_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
-    let mut actions = Vec::new();
+pub fn results_card_ui(
+    ui: &mut Ui,
+    (topic, outcome): (Topic, &Outcome),
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     let dim = Theme::of(ui).palette.dim;
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            export_ui(ui, state, outcome, &mut actions);
-            open_ui(ui, state, outcome, &mut actions);
-            let heading = RichText::new(state.experiments.topic.heading()).font(semibold(type_size().title));
+            export_ui(ui, topic, outcome, effects);
+            open_ui(ui, outcome, look.marked, shared, effects);
+            let heading = RichText::new(topic.heading()).font(semibold(type_size().title));
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 ui.add(Label::new(heading).truncate());
             });
@@ -35,10 +40,9 @@ pub fn results_card_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Act
     ui.label(conditions.size(type_size().note).color(dim));
     let note_height = note_size(ui, ui.available_width()).y + space(1);
     let table = vec2(ui.available_width(), ui.available_height() - note_height);
-    ui.allocate_ui(table, |ui| actions.extend(table_ui(ui, state, outcome)));
+    ui.allocate_ui(table, |ui| table_ui(ui, outcome, look, shared, effects));
     let note = RichText::new(ExperimentTable::NOTE).size(type_size().small);
     ui.label(note.color(dim));
-    actions
 }
 
 /// What the card needs to show every row in a card of such a width.
@@ -63,17 +67,17 @@ fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
         .size()
 }
 
-fn export_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Action>) {
+fn export_ui(ui: &mut Ui, topic: Topic, outcome: &Outcome, effects: &mut Vec<Effect>) {
     let has_figures = outcome.trials().0 > 0;
     ui.add_enabled_ui(has_figures, |ui| {
         let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
             ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
             for file in ExperimentFile::ALL {
-                let choice = ui.button(file.name()).on_hover_text(file.description());
-                if choice.clicked() {
-                    let task = FileTask::SaveExperiment(state.experiments.topic, file);
-                    actions.push(Action::ChooseFile(task));
+                let words = file.words();
+                if ui.button(words.name).on_hover_text(words.description).clicked() {
+                    let results = Arc::clone(&outcome.results);
+                    effects.push(Effect::ChooseFile(file.task(topic, results)));
                 }
             }
         });
@@ -82,9 +86,8 @@ fn export_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Ac
 }
 
 /// Takes the marked cell to the Train view.
-fn open_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Action>) {
-    let marked = state.experiments.marked;
-    let can_open = marked.is_some() && !state.phase.is_busy();
+fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Shared, effects: &mut Vec<Effect>) {
+    let can_open = marked.is_some() && !shared.phase.is_busy();
     let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let why_not = if marked.is_some() {
         "A training is under way there: its settings cannot change now"
@@ -95,6 +98,6 @@ fn open_ui(ui: &mut Ui, state: &State, outcome: &Outcome, actions: &mut Vec<Acti
         .on_hover_text("Show the network of the marked cell, that of its median trial, with its settings and surfaces")
         .on_disabled_hover_text(why_not);
     if let (true, Some(cell)) = (button.clicked(), marked) {
-        actions.extend(open_cell(state, outcome, cell));
+        open_cell(shared, outcome, cell, effects);
     }
 }

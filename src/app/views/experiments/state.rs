@@ -4,8 +4,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{ExperimentFile, Form, worker::RunNumber};
+use super::{
+    Form,
+    worker::{ExperimentWorker, RunNumber},
+};
 use crate::{
+    app::{
+        shared::{Effect, Notice},
+        threads::Wake,
+    },
     evaluation::{
         SimulatedSettings,
         experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
@@ -51,19 +58,27 @@ impl Topic {
     }
 }
 
-/// What the Experiments view knows.
+/// The Experiments view.
 #[derive(Debug)]
-pub struct ExperimentsState {
+pub struct ExperimentsView {
     /// What is looked at.
     pub topic: Topic,
+    /// How it is looked at.
+    pub look: ExperimentLook,
+    /// What runs.
+    pub running: Option<Running>,
+    pub(super) worker: ExperimentWorker,
+    forms: HashMap<Topic, CheckedForm>,
+    outcomes: HashMap<Topic, Outcome>,
+}
+
+/// How an experiment is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExperimentLook {
     /// The cell marked in table and picture.
     pub marked: Option<usize>,
     /// The order of the table.
     pub sort: SortBy,
-    /// What runs.
-    pub running: Option<Running>,
-    forms: HashMap<Topic, CheckedForm>,
-    outcomes: HashMap<Topic, Outcome>,
 }
 
 #[derive(Debug)]
@@ -102,7 +117,7 @@ pub struct Running {
     /// When it began.
     pub begun: Instant,
     /// By which its news are known.
-    pub(in crate::app) number: RunNumber,
+    pub(super) number: RunNumber,
 }
 
 /// How an experiment ended.
@@ -176,14 +191,14 @@ impl Outcome {
     }
 }
 
-impl ExperimentsState {
-    /// Every form as the paper has it, nothing run.
-    pub fn new() -> Self {
+impl ExperimentsView {
+    /// Every form as the paper has it, nothing run. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
         let mut state = Self {
             topic: Topic::ALL[0],
-            marked: None,
-            sort: SortBy::default(),
+            look: ExperimentLook::default(),
             running: None,
+            worker: ExperimentWorker::new(wake),
             forms: HashMap::new(),
             outcomes: HashMap::new(),
         };
@@ -198,8 +213,7 @@ impl ExperimentsState {
     /// Looks at another experiment.
     pub fn choose(&mut self, topic: Topic) {
         self.topic = topic;
-        self.marked = None;
-        self.sort = SortBy::default();
+        self.look = ExperimentLook::default();
     }
 
     /// The form of what is looked at.
@@ -228,8 +242,31 @@ impl ExperimentsState {
         self.running.is_none() && self.checked().is_ok()
     }
 
+    /// Runs what is looked at.
+    pub(super) fn run(&mut self, effects: &mut Vec<Effect>) {
+        let Ok(experiment) = self.form().experiment() else {
+            return;
+        };
+        match self.worker.run(experiment.clone()) {
+            Ok(number) => {
+                effects.push(Effect::DismissNotice);
+                self.begin(experiment, number);
+            }
+            Err(error) => {
+                let text = format!("No thread could be started: {error}");
+                effects.push(Effect::Tell(Notice::Failed(text)));
+            }
+        }
+    }
+
+    /// Ends the one that runs; what is finished stays.
+    pub(super) fn cancel(&mut self) {
+        self.worker.cancel();
+        self.end(Instant::now());
+    }
+
     /// Makes room for the results of `experiment`.
-    pub(in crate::app) fn begin(&mut self, experiment: Experiment, number: RunNumber) {
+    fn begin(&mut self, experiment: Experiment, number: RunNumber) {
         let outcome = Outcome::new(experiment);
         self.running = Some(Running {
             topic: self.topic,
@@ -239,8 +276,7 @@ impl ExperimentsState {
             begun: Instant::now(),
             number,
         });
-        self.marked = None;
-        self.sort = SortBy::default();
+        self.look = ExperimentLook::default();
         self.outcomes.insert(self.topic, outcome);
     }
 
@@ -275,23 +311,12 @@ impl ExperimentsState {
 
     /// What is known of the experiment looked at.
     pub fn outcome(&self) -> Option<&Outcome> {
-        self.outcome_of(self.topic)
+        self.outcomes.get(&self.topic)
     }
 
     /// What is to be shown of it: what is known or, before anything is run, the published figures.
     pub fn shown(&self) -> Option<&Outcome> {
         self.outcome().or(self.forms[&self.topic].preview.as_ref())
-    }
-
-    /// What is known of an experiment.
-    pub fn outcome_of(&self, topic: Topic) -> Option<&Outcome> {
-        self.outcomes.get(&topic)
-    }
-
-    /// The name of a file about an experiment, unless the user says otherwise.
-    pub fn file_name(topic: Topic, file: ExperimentFile) -> String {
-        let name = topic.name().to_lowercase().replace(' ', "_");
-        format!("{name}{}", file.ending())
     }
 }
 
@@ -302,10 +327,4 @@ fn bytes_of(trial: &Trial, settings: &SimulatedSettings) -> usize {
     // The present and the best weights, and up to as many numbers of the method's own.
     let of_start = 4 * weights * size_of::<f64>();
     trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
-}
-
-impl Default for ExperimentsState {
-    fn default() -> Self {
-        Self::new()
-    }
 }

@@ -1,13 +1,13 @@
 use eframe::egui::{RichText, Sense, Ui, Vec2};
 
-use super::{Ending, ExperimentsState};
+use super::{Ending, ExperimentsView};
 use crate::{
     app::theme::{Theme, space, type_size},
     export::format_duration,
 };
 
 /// What is going on, in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsState) {
+pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&experiments.running, experiments.outcome()) {
         (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),

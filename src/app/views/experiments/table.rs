@@ -7,41 +7,37 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use super::{ExperimentAction, Outcome, SortBy, open_cell::open_cell};
+use super::{ExperimentLook, Outcome, SortBy, open_cell::open_cell};
 use crate::app::{
-    shared::State,
+    shared::{Effect, Shared},
     theme::{Theme, semibold, space, type_size},
-    window::Action,
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
-pub fn table_ui(ui: &mut Ui, state: &State, outcome: &Outcome) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let experiments = &state.experiments;
-    let order = order(outcome, experiments.sort);
+pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, shared: &Shared, effects: &mut Vec<Effect>) {
+    let order = order(outcome, look.sort);
     let (places, total) = columns(ui, outcome);
     let row_height = space(6);
     ScrollArea::horizontal().id_salt("experiment table").show(ui, |ui| {
         ui.set_width(total);
         ui.spacing_mut().item_spacing.y = 0.0;
-        heading_ui(ui, outcome, experiments.sort, &places, total, &mut actions);
+        heading_ui(ui, outcome, &mut look.sort, &places, total);
         let body = ScrollArea::vertical()
             .id_salt("experiment rows")
             .auto_shrink([false, true]);
         body.show_rows(ui, row_height, order.len(), |ui, range| {
             for &cell in &order[range] {
-                let is_marked = experiments.marked == Some(cell);
+                let is_marked = look.marked == Some(cell);
                 let row = row_ui(ui, outcome, cell, is_marked, &places, total);
                 if row.clicked() {
-                    actions.push(ExperimentAction::Mark(cell).into());
+                    look.marked = Some(cell);
                 }
                 if row.double_clicked() {
-                    actions.extend(open_cell(state, outcome, cell));
+                    open_cell(shared, outcome, cell, effects);
                 }
             }
         });
     });
-    actions
 }
 
 /// The cells in the order of the table; those without the figure come last.
@@ -92,14 +88,7 @@ fn columns(ui: &Ui, outcome: &Outcome) -> (Vec<[f32; 2]>, f32) {
     (places, left + space(2))
 }
 
-fn heading_ui(
-    ui: &mut Ui,
-    outcome: &Outcome,
-    sort: SortBy,
-    places: &[[f32; 2]],
-    total: f32,
-    actions: &mut Vec<Action>,
-) {
+fn heading_ui(ui: &mut Ui, outcome: &Outcome, sort: &mut SortBy, places: &[[f32; 2]], total: f32) {
     let palette = Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
     let (line, _) = ui.allocate_exact_size(vec2(total, space(6)), Sense::hover());
@@ -113,11 +102,10 @@ fn heading_ui(
             .on_hover_text("Order the table by this column");
         if response.clicked() {
             let is_descending = is_sorted && !sort.is_descending;
-            let sort = SortBy {
+            *sort = SortBy {
                 column: Some(column),
                 is_descending,
             };
-            actions.push(ExperimentAction::Sort(sort).into());
         }
         let colour = if is_sorted || response.hovered() {
             palette.text

@@ -3,7 +3,6 @@
 
 use std::{
     fmt,
-    path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -12,10 +11,9 @@ use std::{
     thread,
 };
 
-use super::{ExperimentFile, Topic};
 use crate::{
     app::threads::{LastEvent, Report, Wake, yield_to_window},
-    evaluation::experiments::{Experiment, ExperimentResults, Finished, run_experiments, worker_threads},
+    evaluation::experiments::{Experiment, Finished, run_experiments, worker_threads},
 };
 
 /// Tells experiments apart that were begun in one window.
@@ -29,8 +27,6 @@ pub enum ExperimentEvent {
     Finished(RunNumber, Box<Finished>),
     /// The experiment has ended, or why it could not go on.
     Ended(RunNumber, Result<(), String>),
-    /// A file was written, or why not.
-    Written(Result<PathBuf, String>),
 }
 
 /// The window's end of the threads.
@@ -87,13 +83,6 @@ impl ExperimentWorker {
     /// Ends the experiment. Its threads end after the epochs in progress, which nobody waits for.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
-    }
-
-    /// Writes a file on a thread of its own.
-    pub fn write(&self, topic: Topic, file: ExperimentFile, results: Arc<ExperimentResults>, path: PathBuf) {
-        let write = move |path: &Path| file.write(topic, &results, path);
-        self.report
-            .write("experiment file", path, write, ExperimentEvent::Written);
     }
 
     /// The next event, if one has come.

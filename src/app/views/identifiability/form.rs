@@ -2,27 +2,25 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeric};
 
-use super::{IdentifiabilityAction, Question};
+use super::{IdentifiabilityView, Question};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Shared},
         theme::space,
         widgets::{
             dim_ui,
             fields::{count_ui, quantity_ui},
             primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style,
         },
-        window::Action,
     },
     scene::{Movement, RowModel, Rows},
     sensor::{ArrayScale, LARGEST_COUNT},
 };
 
 /// Array, geometry and scene to be tried, and the way back to the Train view.
-pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let before = state.identifiability.question;
-    let mut question = before;
+pub fn form_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let mut question = view.question;
+    let mut is_taken = false;
     scrolled_ui(ui, "identifiability form", |ui| {
         section_heading_ui(ui, "Geometry");
         geometry_ui(ui, &mut question);
@@ -31,13 +29,16 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         section_heading_ui(ui, "Scene");
         scene_ui(ui, &mut question);
         ui.add_space(space(3));
-        buttons_ui(ui, state, &mut actions);
+        is_taken = buttons_ui(ui, view, shared, effects);
         ui.add_space(space(4));
     });
-    if question != before {
-        actions.push(IdentifiabilityAction::Ask(Box::new(question)).into());
+    if question != view.question {
+        view.question = question;
+        view.ask();
+    } else if is_taken {
+        view.take(&shared.draft);
+        view.ask();
     }
-    actions
 }
 
 fn geometry_ui(ui: &mut Ui, question: &mut Question) {
@@ -143,15 +144,17 @@ fn add_slider(ui: &mut Ui, name: &str, present: f64, slider: Slider<'_>) {
     });
 }
 
-fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
-    let question = &state.identifiability.question;
-    let can_use = !state.phase.is_busy() && question.sensor != state.draft.source.sensor;
-    let why_not = if state.phase.is_busy() {
+/// Returns whether the question is to be that of the Train view again.
+fn buttons_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) -> bool {
+    let question = view.question;
+    let mut is_taken = false;
+    let can_use = !shared.phase.is_busy() && question.sensor != shared.draft.source.sensor;
+    let why_not = if shared.phase.is_busy() {
         "A training is under way there: its settings cannot change now"
     } else {
         "It is the sensor of the Train view"
     };
-    let can_reset = *question != Question::of(&state.draft);
+    let can_reset = question != Question::of(&shared.draft);
     ui.vertical_centered_justified(|ui| {
         let button = primary_button("Use this sensor in the Train view");
         let button = ui.add_enabled(can_use, button);
@@ -160,11 +163,11 @@ fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             .on_disabled_hover_text(why_not)
             .clicked()
         {
-            actions.push(IdentifiabilityAction::UseSensor.into());
+            let settings = view.hand_over(&shared.draft);
+            effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
         }
         let reset = ui.add_enabled(can_reset, Button::new("Back to the Train view's"));
-        if reset.on_hover_text("Its sensor and its scene again").clicked() {
-            actions.push(IdentifiabilityAction::TakeDraft.into());
-        }
+        is_taken = reset.on_hover_text("Its sensor and its scene again").clicked();
     });
+    is_taken
 }

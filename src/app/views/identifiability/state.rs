@@ -1,13 +1,14 @@
-use super::{Analysis, Question};
+use super::{Analysis, Question, worker::IdentifiabilityWorker};
 use crate::{
+    app::threads::Wake,
     evaluation::SimulatedSettings,
     scene::Scene,
     sensor::{Axes, SensorModel},
 };
 
-/// Everything the Identifiability view reads.
+/// The Identifiability view.
 #[derive(Debug)]
-pub struct IdentifiabilityState {
+pub struct IdentifiabilityView {
     /// What is asked.
     pub question: Question,
     /// The newest answer; it stays in view while the next is computed.
@@ -20,22 +21,36 @@ pub struct IdentifiabilityState {
     pub axis: usize,
     /// Sensor and scene of the Train view when the question was last taken from there.
     followed: Option<(SensorModel, Scene)>,
+    /// The node under the pointer, marked on both pictures.
+    pub(super) node: Option<usize>,
+    pub(super) worker: IdentifiabilityWorker,
 }
 
-impl IdentifiabilityState {
-    /// The question of these settings, not yet asked.
-    pub fn new(settings: &SimulatedSettings) -> Self {
+impl IdentifiabilityView {
+    /// Nothing asked yet. `wake` is called after each answer.
+    pub fn new(wake: Wake) -> Self {
         Self {
-            question: Question::of(settings),
+            question: Question::of(&SimulatedSettings::default()),
             analysis: None,
             problem: None,
             is_pending: false,
             axis: 2,
             followed: None,
+            node: None,
+            worker: IdentifiabilityWorker::new(wake),
         }
     }
 
-    /// Asks about these settings, unless they are as they were when last taken: then what was changed here stays.
+    /// Asks the question.
+    pub(super) fn ask(&mut self) {
+        self.is_pending = true;
+        if let Err(error) = self.worker.ask(self.question) {
+            self.is_pending = false;
+            self.problem = Some(format!("No thread could be started: {error}"));
+        }
+    }
+
+    /// Takes up these settings, unless they are as they were when last taken: then what was changed here stays.
     /// Returns whether the question is a new one.
     pub fn follow(&mut self, settings: &SimulatedSettings) -> bool {
         let present = (settings.source.sensor, settings.source.scene);
@@ -46,7 +61,7 @@ impl IdentifiabilityState {
         true
     }
 
-    /// Asks about these settings, whatever was changed here.
+    /// Takes up these settings, whatever was changed here.
     pub fn take(&mut self, settings: &SimulatedSettings) {
         self.followed = Some((settings.source.sensor, settings.source.scene));
         self.question = Question::of(settings);
@@ -71,12 +86,14 @@ impl IdentifiabilityState {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
 
     #[test]
     fn what_is_tried_here_stays_until_the_settings_change() {
         let mut settings = SimulatedSettings::default();
-        let mut state = IdentifiabilityState::new(&settings);
+        let mut state = IdentifiabilityView::new(Arc::new(|| ()));
         assert!(state.follow(&settings));
         state.question.sensor.geometry.height_mm = 7.0;
         assert!(!state.follow(&settings));
@@ -88,7 +105,7 @@ mod tests {
 
     #[test]
     fn an_axis_at_rest_gives_way_to_z() {
-        let mut state = IdentifiabilityState::new(&SimulatedSettings::default());
+        let mut state = IdentifiabilityView::new(Arc::new(|| ()));
         state.axis = 0;
         assert_eq!((state.place_of_axis(Axes::Z), state.place_of_axis(Axes::Xyz)), (0, 0));
         state.axis = 2;

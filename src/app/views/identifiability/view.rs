@@ -1,27 +1,62 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
-use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{
-    Analysis, IdentifiabilityAction, IdentifiabilityState, facts::facts_ui, singular_values::singular_values_ui,
-};
+use super::{Analysis, IdentifiabilityView, facts::facts_ui, form, singular_values::singular_values_ui};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Look, Shared, View},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui},
-        window::Action,
     },
     export::format_number,
     figure::surface::{Quantity, Surface, SurfaceFigure, ViewMode},
 };
 
-/// The middle of the Identifiability view: pattern and sensitivity above, singular values and what they come to below.
-pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let shown = &state.identifiability;
+impl View for IdentifiabilityView {
+    fn name(&self) -> &'static str {
+        "Identifiability"
+    }
+
+    /// Shows the sensor and scene of the Train view, with what was last tried on them.
+    fn enter(&mut self, shared: &Shared) {
+        if self.follow(&shared.draft) || self.problem.is_some() {
+            self.ask();
+        }
+    }
+
+    fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        while let Some(answer) = self.worker.next_answer() {
+            if answer.is_newest {
+                self.is_pending = false;
+            }
+            match answer.analysis {
+                Ok(analysis) => {
+                    self.problem = None;
+                    self.analysis = Some(analysis);
+                }
+                Err(reason) => self.problem = Some(reason),
+            }
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        form::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        identifiability_ui(ui, self, shared, effects);
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Pattern and sensitivity above, singular values and what they come to below.
+fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     let Some(analysis) = &shown.analysis else {
         card_ui(ui, whole, |ui| match &shown.problem {
@@ -30,7 +65,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             }
             None => placeholder_ui(ui, "The singular values are being computed."),
         });
-        return actions;
+        return;
     };
     let gap = space(2);
     let lower_height = (0.44 * whole.height()).clamp(space(60), space(100));
@@ -38,13 +73,15 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     let upper = upper.with_max_y(upper.max.y - gap);
     let width = 0.5 * (upper.width() - gap);
     let place = shown.place_of_axis(analysis.question.scene.movement.axes());
-    let figure = identifiability_figure(state, analysis, place);
+    let figure = identifiability_figure(shown, analysis, place, shared.look);
     let labels = ["Worst-seen deformation of each row", "Sensitivity of each node"];
-    for (card, label) in labels.into_iter().enumerate() {
+    let mut pointed = (shown.axis, shown.node);
+    for (card, (surface, label)) in figure.surfaces.iter().zip(labels).enumerate() {
         let left = upper.left() + (width + gap) * card as f32;
-        let rect = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
-        card_ui(ui, rect, |ui| {
-            surface_ui(ui, state, analysis, (&figure, card, label), &mut actions)
+        let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
+        card_ui(ui, card, |ui| {
+            let scale = surface_ui(ui, (surface, label), shared.look, analysis, &mut pointed, effects);
+            scale.on_hover_text(figure.note());
         });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
@@ -61,7 +98,7 @@ pub fn identifiability_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
         });
     });
     ui.allocate_rect(whole, Sense::hover());
-    actions
+    (shown.axis, shown.node) = pointed;
 }
 
 /// From no sensitivity to the largest of any axis.
@@ -72,7 +109,7 @@ fn sensitivity_range(analysis: &Analysis) -> RangeInclusive<f64> {
 }
 
 /// The worst-seen pattern and the sensitivity of the nodes.
-fn identifiability_figure(state: &State, analysis: &Analysis, place: usize) -> SurfaceFigure {
+fn identifiability_figure(shown: &IdentifiabilityView, analysis: &Analysis, place: usize, look: Look) -> SurfaceFigure {
     let surface = |title: &str, frame: &Frame, quantity, range, mode| Surface {
         title: title.to_owned(),
         map: Arc::clone(&analysis.surface),
@@ -83,70 +120,67 @@ fn identifiability_figure(state: &State, analysis: &Analysis, place: usize) -> S
         mode,
     };
     let (pattern, sensitivity) = (&analysis.patterns[place], &analysis.sensitivities[place]);
-    let largest = sensitivity_range(analysis);
+    let pattern = surface(
+        "Worst-seen deformation",
+        pattern,
+        Quantity::Pattern,
+        -1.0..=1.0,
+        look.mode,
+    );
+    let (quantity, range) = (Quantity::Sensitivity, sensitivity_range(analysis));
+    let sensitivity = surface("Sensitivity of each node", sensitivity, quantity, range, ViewMode::Top);
     SurfaceFigure {
-        surfaces: vec![
-            surface(
-                "Worst-seen deformation",
-                pattern,
-                Quantity::Pattern,
-                -1.0..=1.0,
-                state.look.mode,
-            ),
-            surface(
-                "Sensitivity of each node",
-                sensitivity,
-                Quantity::Sensitivity,
-                largest,
-                ViewMode::Top,
-            ),
-        ],
-        camera: state.look.camera,
-        marked_node: state.look.node,
+        surfaces: vec![pattern, sensitivity],
+        camera: look.camera,
+        marked_node: shown.node,
     }
 }
 
+/// One of the two pictures: `axis` is the one on show, `node` the one marked on both. Returns the scale of its colours.
 fn surface_ui(
     ui: &mut Ui,
-    state: &State,
+    (surface, label): (&Surface, &str),
+    look: Look,
     analysis: &Analysis,
-    (figure, card, label): (&SurfaceFigure, usize, &str),
-    actions: &mut Vec<Action>,
-) {
-    let (theme, surface) = (Theme::of(ui), &figure.surfaces[card]);
+    (axis, node): &mut (usize, Option<usize>),
+    effects: &mut Vec<Effect>,
+) -> Response {
+    let theme = Theme::of(ui);
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| match surface.quantity {
             Quantity::Pattern => {
                 let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                let picked = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false);
-                actions.extend(picked.map(Action::SetViewMode));
+                let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
             }
-            _ => axes_ui(ui, &state.identifiability, analysis, actions),
+            _ => axes_ui(ui, axis, analysis),
         });
     });
     let space_left = ui.available_rect_before_wrap();
     let (picture, scale) = space_left.split_left_right_at_x(space_left.right() - ColourBar::WIDTH);
     let mut slot = ui.new_child(UiBuilder::new().max_rect(picture));
+    let marked_node = *node;
     let view = SurfaceView {
         label,
         surface,
-        marked_node: figure.marked_node,
+        marked_node,
         theme,
     };
-    let shown = view.show(&mut slot, figure.camera);
-    if shown.camera != figure.camera {
-        actions.push(Action::MoveCamera(shown.camera));
+    let shown = view.show(&mut slot, look.camera);
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
     }
-    if shown.response.contains_pointer() && shown.hovered_node != figure.marked_node {
-        actions.push(Action::HoverNode(shown.hovered_node));
+    if shown.response.contains_pointer() && shown.hovered_node != *node {
+        *node = shown.hovered_node;
+        ui.ctx().request_repaint();
     }
     shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
     let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
     let colours = surface.scale();
-    let bar = ColourBar { scale: &colours, theme }.show(&mut slot, scale.height());
-    bar.on_hover_text(figure.note());
+    ColourBar { scale: &colours, theme }.show(&mut slot, scale.height())
 }
 
 fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
@@ -165,18 +199,17 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
 }
 
 /// Which coordinate is shown, where several are unknown.
-fn axes_ui(ui: &mut Ui, shown: &IdentifiabilityState, analysis: &Analysis, actions: &mut Vec<Action>) {
+fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     let axes = analysis.question.scene.movement.axes().indices();
     if axes.len() < 2 {
         return;
     }
     let options = [(0, "x"), (1, "y"), (2, "z")];
-    let picked = segmented_ui(ui, "Axis on show", &options, shown.axis, false);
-    actions.extend(picked.map(IdentifiabilityAction::ShowAxis).map(Action::from));
+    *axis = segmented_ui(ui, "Axis on show", &options, *axis, false).unwrap_or(*axis);
 }
 
 /// What is looked at, in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, shown: &IdentifiabilityState) {
+fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&shown.problem, &shown.analysis) {
         _ if shown.is_pending => (palette.accent, "Computing".to_owned()),

@@ -6,7 +6,7 @@ use eframe::egui::{
 use egui_plot::{HLine, Line, LineStyle, MarkerShape, PlotPoint, PlotUi, Points, VLine};
 
 use super::{
-    TradeAction, TradeLimits,
+    TradeLimits, TradeLook,
     names::{point_facts, point_name},
 };
 use crate::{
@@ -15,10 +15,8 @@ use crate::{
             Key, Mark,
             plot_style::{log_marks, log_marks_across, log_text, plot},
         },
-        shared::State,
         theme::{Palette, Theme, semibold, type_size},
         widgets::dim_ui,
-        window::Action,
     },
     decoupling::{ColourKey, DecoderKind, Precision},
     evaluation::{Preset, TradeCost, TradeLevel, TradePoint},
@@ -68,10 +66,9 @@ fn place(point: &TradePoint, cost: TradeCost) -> Option<[f64; 2]> {
     place.iter().all(|part| part.is_finite()).then_some(place)
 }
 
-/// The chart over the space that is left.
-pub fn chart_ui(ui: &mut Ui, state: &State, level: &TradeLevel, cost: TradeCost) -> Vec<Action> {
+/// The chart over the space that is left; returns the point that is clicked. One that can be loaded says so.
+pub fn chart_ui(ui: &mut Ui, look: &TradeLook, level: &TradeLevel, cost: TradeCost, can_load: bool) -> Option<usize> {
     let palette = Theme::of(ui).palette;
-    let trade = &state.trade;
     let id = match cost {
         TradeCost::Decoding => "trade decoding",
         TradeCost::Training => "trade training",
@@ -91,14 +88,13 @@ pub fn chart_ui(ui: &mut Ui, state: &State, level: &TradeLevel, cost: TradeCost)
             plot_ui.hline(line.width(1.4).style(LineStyle::dashed_dense()));
         }
         if cost == TradeCost::Decoding {
-            limits(plot_ui, trade.limits, level, palette.accent);
+            limits(plot_ui, look.limits, level, palette.accent);
         }
         front(plot_ui, level, cost, palette.dim);
         for point in &level.points {
             draw(plot_ui, point, cost, &palette);
         }
     });
-    let mut actions = Vec::new();
     let at = |point: &TradePoint| {
         let [x, y] = place(point, cost)?;
         Some(shown.transform.position_from_point(&PlotPoint::new(x, y)))
@@ -108,34 +104,36 @@ pub fn chart_ui(ui: &mut Ui, state: &State, level: &TradeLevel, cost: TradeCost)
             ui.painter().circle_stroke(at, radius, Stroke::new(1.6, colour));
         }
     };
-    for chosen in trade.chosen().into_iter().flatten() {
+    for chosen in look.chosen(level).into_iter().flatten() {
         ringed(chosen, palette.accent, 9.0);
     }
-    if let Some(marked) = trade.marked {
+    if let Some(marked) = look.marked {
         ringed(marked, palette.text, 8.0);
     }
+    let mut clicked = None;
     for (number, point) in level.points.iter().enumerate() {
         if let Some(at) = at(point) {
             let id = ui.scope_id().with((id, number));
-            actions.extend(point_ui(ui, state, (number, point), cost, at, id));
+            let is_marked = look.marked == Some(number);
+            if point_ui(ui, (point, is_marked, can_load), cost, at, id) {
+                clicked = Some(number);
+            }
         }
     }
-    actions
+    clicked
 }
 
-/// Answers the pointer at a point: its name and figures, a click takes it over.
+/// Answers the pointer at a point with its name and figures; returns whether it is clicked.
 fn point_ui(
     ui: &mut Ui,
-    state: &State,
-    (number, point): (usize, &TradePoint),
+    (point, is_marked, can_load): (&TradePoint, bool, bool),
     cost: TradeCost,
     at: Pos2,
     id: Id,
-) -> Option<Action> {
+) -> bool {
     let rect = Rect::from_center_size(at, Vec2::splat(2.0 * REACH));
     let response = ui.interact(rect, id, Sense::click());
     let name = point_name(point);
-    let is_marked = state.trade.marked == Some(number);
     response.widget_info(|| {
         let what = match cost {
             TradeCost::Decoding => "Decoding",
@@ -147,7 +145,6 @@ fn point_ui(
         let ring = Stroke::new(1.6, Theme::of(ui).palette.text);
         ui.painter().circle_stroke(at, 8.0, ring);
     }
-    let can_load = !state.phase.is_busy();
     let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_ui(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
         ui.label(RichText::new(&name).font(semibold(type_size().note)));
@@ -163,12 +160,7 @@ fn point_ui(
             },
         );
     });
-    let action = if can_load {
-        TradeAction::Load(number)
-    } else {
-        TradeAction::Mark(Some(number))
-    };
-    response.clicked().then(|| action.into())
+    response.clicked()
 }
 
 /// From point to point that no other beats, in steps: between them nothing better was measured.

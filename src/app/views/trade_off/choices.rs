@@ -3,74 +3,64 @@
 use eframe::egui::{Align, Label, Layout, RichText, Ui};
 
 use super::{
-    TradeAction, TradeState,
+    TradeLook,
     names::{frame_time, point_facts, point_name},
 };
 use crate::{
     app::{
-        shared::State,
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
-        window::Action,
     },
     evaluation::{TradeLevel, TradePoint},
     export::format_percent,
 };
 
-/// "Fastest under", "most accurate under", and what is marked.
-pub fn choices_ui(ui: &mut Ui, state: &State, level: &TradeLevel) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let trade = &state.trade;
-    let mut limits = trade.limits;
-    let [fastest, most_accurate] = trade.chosen();
+/// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
+/// so.
+pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_load: bool) -> Option<usize> {
+    let [fastest, most_accurate] = look.chosen(level);
     section_heading_ui(ui, "Which one to take");
     let hint = "The least time for a frame with at most this error of z.";
-    quantity_ui(ui, "Fastest under", hint, &mut limits.percent, 1e-15..=1e6, "%");
+    quantity_ui(ui, "Fastest under", hint, &mut look.limits.percent, 1e-15..=1e6, "%");
     let none = "Nothing measured here is as accurate.";
-    actions.extend(answer_ui(ui, trade, level, "Fastest", fastest, none));
+    answer_ui(ui, &mut look.marked, level, "Fastest", fastest, none);
     ui.add_space(space(1));
     let hint = "The least error of z among those that decode a frame within this time.";
     quantity_ui(
         ui,
         "Most accurate under",
         hint,
-        &mut limits.microseconds,
+        &mut look.limits.microseconds,
         1e-6..=1e12,
         "µs",
     );
     let none = "Nothing measured here is as fast.";
-    actions.extend(answer_ui(ui, trade, level, "Most accurate", most_accurate, none));
-    if limits != trade.limits {
-        actions.push(TradeAction::SetLimits(limits).into());
-    }
+    answer_ui(ui, &mut look.marked, level, "Most accurate", most_accurate, none);
     section_heading_ui(ui, "Marked point");
-    match trade
-        .marked
-        .and_then(|marked| Some((marked, level.points.get(marked)?)))
-    {
-        Some((marked, point)) => marked_ui(ui, state, marked, point, &mut actions),
+    match look.marked.and_then(|marked| Some((marked, level.points.get(marked)?))) {
+        Some((marked, point)) => marked_ui(ui, point, can_load).then_some(marked),
         None => {
             dim_ui(
                 ui,
                 "Click a row of the table to mark its point, or a point of a chart to load it.",
             );
+            None
         }
     }
-    actions
 }
 
 /// The configuration that answers a question; a click marks it.
 fn answer_ui(
     ui: &mut Ui,
-    trade: &TradeState,
+    marked: &mut Option<usize>,
     level: &TradeLevel,
     question: &str,
     chosen: Option<usize>,
     none: &str,
-) -> Option<Action> {
+) {
     let Some((number, point)) = chosen.and_then(|number| Some((number, level.points.get(number)?))) else {
         dim_ui(ui, none);
-        return None;
+        return;
     };
     let text = format!(
         "{}: {}, {}",
@@ -80,7 +70,7 @@ fn answer_ui(
     );
     let accent = Theme::of(ui).palette.accent;
     let response = ui.selectable_label(
-        trade.marked == Some(number),
+        *marked == Some(number),
         RichText::new(&text).size(type_size().note).color(accent),
     );
     let response = response.on_hover_text("Click to mark it in the charts and the table");
@@ -88,21 +78,21 @@ fn answer_ui(
         let label = format!("{question}: {text}");
         eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::Button, true, label)
     });
-    response.clicked().then(|| TradeAction::Mark(Some(number)).into())
+    if response.clicked() {
+        *marked = Some(number);
+    }
 }
 
-fn marked_ui(ui: &mut Ui, state: &State, marked: usize, point: &TradePoint, actions: &mut Vec<Action>) {
+/// Returns whether the point is to be loaded.
+fn marked_ui(ui: &mut Ui, point: &TradePoint, can_load: bool) -> bool {
+    let mut is_loaded = false;
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let can_load = !state.phase.is_busy();
             let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
-            if load
+            is_loaded = load
                 .on_hover_text("Take its sensor, scene and network settings for the next training")
                 .on_disabled_hover_text("A training is under way there: its settings cannot change now")
-                .clicked()
-            {
-                actions.push(TradeAction::Load(marked).into());
-            }
+                .clicked();
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 let name = RichText::new(point_name(point)).font(semibold(type_size().note));
                 ui.add(Label::new(name).truncate());
@@ -117,4 +107,5 @@ fn marked_ui(ui: &mut Ui, state: &State, marked: usize, point: &TradePoint, acti
             point.settings.source.samples, point.settings.training.stopping.epochs
         ),
     );
+    is_loaded
 }

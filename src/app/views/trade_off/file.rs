@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use crate::{
+    app::shared::{FileTask, FileWords},
     evaluation::{TradeCost, TradeLevel},
     export::{
         atomic_write,
@@ -28,56 +29,46 @@ impl TradeFile {
         Self::Figure(TradeCost::Training, PictureFormat::Png),
     ];
 
-    /// The words on its button.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Points => "All points as CSV…",
-            Self::Figure(TradeCost::Decoding, PictureFormat::Svg) => "Decoding chart as SVG…",
-            Self::Figure(TradeCost::Decoding, PictureFormat::Png) => "Decoding chart as PNG…",
-            Self::Figure(TradeCost::Training, PictureFormat::Svg) => "Training chart as SVG…",
-            Self::Figure(TradeCost::Training, PictureFormat::Png) => "Training chart as PNG…",
+    /// What the file is called.
+    pub fn words(self) -> FileWords {
+        let (name, extensions) = match self {
+            Self::Points => ("All points as CSV…", &["csv"]),
+            Self::Figure(TradeCost::Decoding, PictureFormat::Svg) => ("Decoding chart as SVG…", &["svg"]),
+            Self::Figure(TradeCost::Decoding, PictureFormat::Png) => ("Decoding chart as PNG…", &["png"]),
+            Self::Figure(TradeCost::Training, PictureFormat::Svg) => ("Training chart as SVG…", &["svg"]),
+            Self::Figure(TradeCost::Training, PictureFormat::Png) => ("Training chart as PNG…", &["png"]),
+        };
+        let (kind, description) = match self {
+            Self::Points => (
+                "points",
+                "Every point at every level of noise with all its digits, as CSV.",
+            ),
+            Self::Figure(..) => (
+                "chart",
+                "The chart of the level of noise on show, on a light ground, at publication size.",
+            ),
+        };
+        FileWords {
+            name,
+            kind,
+            description,
+            extensions,
         }
     }
 
-    /// What the file holds, in a word or two.
-    pub fn file_kind(self) -> &'static str {
-        match self {
-            Self::Points => "points",
-            Self::Figure(..) => "chart",
-        }
-    }
-
-    /// What the file is, in a sentence.
-    pub fn description(self) -> &'static str {
-        match self {
-            Self::Points => "Every point at every level of noise with all its digits, as CSV.",
-            Self::Figure(..) => "The chart of the level of noise on show, on a light ground, at publication size.",
-        }
-    }
-
-    /// File name extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Points => "csv",
-            Self::Figure(_, format) => format.extension(),
-        }
-    }
-
-    /// The name of the file, unless the user says otherwise.
-    pub fn file_name(self) -> String {
+    /// The file about `levels`, of which that in the place `shown` is on show.
+    pub fn task(self, levels: Vec<TradeLevel>, shown: usize) -> FileTask {
         let word = match self {
             Self::Points => "trade",
             Self::Figure(TradeCost::Decoding, _) => "trade_decoding",
             Self::Figure(TradeCost::Training, _) => "trade_training",
         };
-        format!("{word}.{}", self.extension())
+        let words = self.words();
+        let suggestion = format!("{word}.{}", words.extensions[0]);
+        FileTask::save(words, suggestion, move |path| self.write(&levels, shown, path))
     }
 
-    /// Writes the file; `shown` is the place of the level on show.
-    ///
-    /// # Errors
-    /// The file cannot be written; nothing is left half-written.
-    pub fn write(self, levels: &[TradeLevel], shown: usize, path: &Path) -> Result<(), PictureError> {
+    fn write(self, levels: &[TradeLevel], shown: usize, path: &Path) -> Result<(), PictureError> {
         match (self, levels.get(shown)) {
             (Self::Figure(cost, format), Some(level)) => trade_plot(level, cost).draw().save(format, path)?,
             _ => atomic_write(path, |writer| write_trade(levels, writer))?,

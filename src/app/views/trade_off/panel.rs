@@ -1,19 +1,14 @@
 use eframe::egui::{TextEdit, Ui, vec2};
 
-use super::{
-    Thoroughness, TradeAction, TradeForm, WhichPresets,
-    names::noise_name,
-    news::{can_measure, is_quiet},
-};
+use super::{Thoroughness, TradeForm, TradeOffView, WhichPresets, names::noise_name};
 use crate::{
     app::{
-        shared::State,
+        shared::{Effect, Shared},
         theme::space,
         widgets::{
             dim_ui, fields::count_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui,
             section_heading_ui, segmented_ui,
         },
-        window::Action,
     },
     dataset::LARGEST_SAMPLES,
     decoupling::{DecoderKind, Precision},
@@ -22,19 +17,16 @@ use crate::{
 };
 
 /// What is measured: lists, presets, decoders, Measure and Cancel.
-pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let trade = &state.trade;
+pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "trade form", |ui| {
         section_heading_ui(ui, "What is measured");
-        let draft = &state.draft;
+        let draft = &shared.draft;
         let text = format!(
             "{} in the scene of the Train view, seed {}.",
             draft.source.sensor.scale, draft.seed
         );
         dim_ui(ui, &text);
-        let mut form = trade.form.clone();
-        ui.add_enabled_ui(trade.running.is_none(), |ui| fields_ui(ui, &mut form));
+        ui.add_enabled_ui(trade.running.is_none(), |ui| fields_ui(ui, &mut trade.form));
         ui.add_space(space(1));
         match trade.plan(draft) {
             Ok(plan) => {
@@ -44,14 +36,10 @@ pub fn form_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                 note_ui(ui, &problem.to_string());
             }
         }
-        buttons_ui(ui, state, &mut actions);
-        progress_ui(ui, state);
-        if form != trade.form {
-            actions.push(TradeAction::Edit(Box::new(form)).into());
-        }
+        buttons_ui(ui, trade, shared, effects);
+        progress_ui(ui, trade, shared);
         ui.add_space(space(4));
     });
-    actions
 }
 
 fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
@@ -110,15 +98,15 @@ fn list_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
 }
 
-fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
         let measure = primary_button("▶ Measure").min_size(size);
-        let measure = ui.add_enabled(can_measure(state), measure);
-        let why_not = if !is_quiet(state) {
+        let measure = ui.add_enabled(trade.can_measure(shared), measure);
+        let why_not = if !trade.is_quiet(shared) {
             "A training or an experiment is under way: it would disturb the times"
-        } else if state.trade.running.is_some() {
+        } else if trade.running.is_some() {
             "One measurement at a time"
         } else {
             "The note above says what to change"
@@ -128,21 +116,21 @@ fn buttons_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
             .on_disabled_hover_text(why_not)
             .clicked()
         {
-            actions.push(TradeAction::Measure.into());
+            trade.measure(shared, effects);
         }
         let cancel = ghost_button("■ Cancel").min_size(size);
-        let cancel = ui.add_enabled(state.trade.running.is_some(), cancel);
+        let cancel = ui.add_enabled(trade.running.is_some(), cancel);
         if cancel
             .on_hover_text("End it; what is measured stays (Ctrl+.)")
             .clicked()
         {
-            actions.push(TradeAction::Cancel.into());
+            trade.cancel();
         }
     });
 }
 
-fn progress_ui(ui: &mut Ui, state: &State) {
-    let (Some(_), Some(outcome)) = (&state.trade.running, &state.trade.outcome) else {
+fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
+    let (Some(_), Some(outcome)) = (&trade.running, &trade.outcome) else {
         return;
     };
     ui.add_space(space(1));
@@ -151,7 +139,7 @@ fn progress_ui(ui: &mut Ui, state: &State) {
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
     let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
     dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
-    if !is_quiet(state) {
+    if !trade.is_quiet(shared) {
         note_ui(
             ui,
             "A training or an experiment is under way: it makes these times longer.",

@@ -1,17 +1,34 @@
 use std::time::{Duration, Instant};
 
-use super::{TradeForm, TradeFormError, TradePlan, worker::TradeNumber};
-use crate::evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under};
+use super::{
+    TradeForm, TradeFormError, TradePlan,
+    worker::{TradeNumber, TradeWorker},
+};
+use crate::{
+    app::{
+        shared::{Effect, Notice, Shared, View as _},
+        threads::Wake,
+    },
+    evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under},
+};
 
-/// Everything the Trade-off view reads.
-#[derive(Debug, Default)]
-pub struct TradeState {
+/// The Trade-off view.
+#[derive(Debug)]
+pub struct TradeOffView {
     /// What is to be measured.
     pub form: TradeForm,
     /// What runs.
     pub running: Option<TradeRunning>,
     /// What is measured.
     pub outcome: Option<TradeOutcome>,
+    /// How it is looked at.
+    pub look: TradeLook,
+    pub(super) worker: TradeWorker,
+}
+
+/// How a measurement is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TradeLook {
     /// The level of noise on show.
     pub level: usize,
     /// The point marked in charts and table, by its place in the level on show.
@@ -35,7 +52,7 @@ pub struct TradeRunning {
     /// When it began.
     pub begun: Instant,
     /// By which its news are known.
-    pub(in crate::app) number: TradeNumber,
+    pub(super) number: TradeNumber,
 }
 
 /// How a measurement ended.
@@ -77,7 +94,49 @@ impl Default for TradeLimits {
     }
 }
 
-impl TradeState {
+impl TradeOffView {
+    /// Nothing measured yet. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            form: TradeForm::default(),
+            running: None,
+            outcome: None,
+            look: TradeLook::default(),
+            worker: TradeWorker::new(wake),
+        }
+    }
+
+    /// Whether nothing else of this program computes, which would disturb the times.
+    pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
+        !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
+    }
+
+    /// Whether the form can be measured now.
+    pub(super) fn can_measure(&self, shared: &Shared) -> bool {
+        self.running.is_none() && self.is_quiet(shared) && self.plan(&shared.draft).is_ok()
+    }
+
+    /// Measures what the form says.
+    pub(super) fn measure(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        let Ok(plan) = self.plan(&shared.draft) else { return };
+        match self.worker.measure(plan.clone()) {
+            Ok(number) => {
+                effects.push(Effect::DismissNotice);
+                self.begin(plan, number);
+            }
+            Err(error) => {
+                let text = format!("No thread could be started: {error}");
+                effects.push(Effect::Tell(Notice::Failed(text)));
+            }
+        }
+    }
+
+    /// Ends the measurement; what is measured stays.
+    pub(super) fn cancel(&mut self) {
+        self.worker.cancel();
+        self.end(Instant::now());
+    }
+
     /// What would be measured in the scene of these settings, or why nothing can be.
     ///
     /// # Errors
@@ -87,13 +146,13 @@ impl TradeState {
     }
 
     /// Makes room for the points of `plan`.
-    pub(in crate::app) fn begin(&mut self, plan: TradePlan, number: TradeNumber) {
+    fn begin(&mut self, plan: TradePlan, number: TradeNumber) {
         let level = |&noise: &f64| TradeLevel {
             noise,
             points: Vec::new(),
         };
-        self.level = self.level.min(plan.noises.len() - 1);
-        self.marked = None;
+        self.look.level = self.look.level.min(plan.noises.len() - 1);
+        self.look.marked = None;
         self.running = Some(TradeRunning {
             begun: Instant::now(),
             number,
@@ -130,12 +189,15 @@ impl TradeState {
 
     /// The level on show.
     pub fn shown(&self) -> Option<&TradeLevel> {
-        self.outcome.as_ref().and_then(|outcome| outcome.levels.get(self.level))
+        self.outcome
+            .as_ref()
+            .and_then(|outcome| outcome.levels.get(self.look.level))
     }
+}
 
-    /// The points that answer "fastest under" and "most accurate under", by their places in the level on show.
-    pub fn chosen(&self) -> [Option<usize>; 2] {
-        let Some(level) = self.shown() else { return [None; 2] };
+impl TradeLook {
+    /// The points that answer "fastest under" and "most accurate under", by their places in `level`.
+    pub(super) fn chosen(&self, level: &TradeLevel) -> [Option<usize>; 2] {
         let place = |chosen: Option<&TradePoint>| {
             let chosen = chosen?;
             level.points.iter().position(|point| std::ptr::eq(point, chosen))

@@ -6,16 +6,11 @@ use eframe::egui::{
 };
 
 use super::{
-    TradeAction,
     chart::colour,
     names::{frame_time, point_name, training_time},
 };
 use crate::{
-    app::{
-        shared::State,
-        theme::{Theme, semibold, space, type_size},
-        window::Action,
-    },
+    app::theme::{Theme, semibold, space, type_size},
     evaluation::{TradeCost, TradeLevel, TradePoint},
     export::format_number,
 };
@@ -61,9 +56,8 @@ impl Column {
     }
 }
 
-/// Lays out the table over the available space.
-pub fn table_ui(ui: &mut Ui, state: &State, level: &TradeLevel) -> Vec<Action> {
-    let mut actions = Vec::new();
+/// Lays out the table over the available space; a click marks a point.
+pub fn table_ui(ui: &mut Ui, level: &TradeLevel, marked: &mut Option<usize>) {
     let palette = Theme::of(ui).palette;
     let fronts = TradeCost::ALL.map(|cost| level.front(cost));
     // Without noise there is no limit to compare with.
@@ -98,12 +92,12 @@ pub fn table_ui(ui: &mut Ui, state: &State, level: &TradeLevel) -> Vec<Action> {
     body.show_rows(ui, space(6), order.len(), |ui, range| {
         for &number in &order[range] {
             let on_fronts = [fronts[0][number], fronts[1][number]];
-            if row_ui(ui, state, (number, &level.points[number]), on_fronts, (&columns, width)) {
-                actions.push(TradeAction::Mark(Some(number)).into());
+            let row = (&level.points[number], *marked == Some(number));
+            if row_ui(ui, row, on_fronts, (&columns, width)) {
+                *marked = Some(number);
             }
         }
     });
-    actions
 }
 
 /// The right end of the column that is so many from the right.
@@ -115,15 +109,13 @@ fn right_end(line: Rect, from_right: usize) -> Pos2 {
 /// Whether the row was clicked.
 fn row_ui(
     ui: &mut Ui,
-    state: &State,
-    (number, point): (usize, &TradePoint),
+    (point, is_marked): (&TradePoint, bool),
     on_fronts: [bool; 2],
     (columns, width): (&[Column], f32),
 ) -> bool {
     let palette = Theme::of(ui).palette;
     let (line, response) = ui.allocate_exact_size(vec2(width, space(6)), Sense::click());
     let name = point_name(point);
-    let is_marked = state.trade.marked == Some(number);
     response.widget_info(|| {
         let figures: Vec<String> = columns.iter().map(|column| column.text(point)).collect();
         let label = format!("{name}: {}", figures.join(", "));

@@ -1,32 +1,81 @@
+use std::time::Instant;
+
 use eframe::egui::{
-    Align, ComboBox, Layout, Rect, RichText, Sense, TextWrapMode, Ui, Vec2, containers::menu::MenuButton,
+    Align, ComboBox, Context, Key, Layout, Modifiers, Rect, RichText, Sense, TextWrapMode, Ui, Vec2,
+    containers::menu::MenuButton,
 };
 
 use super::{
-    TradeAction, TradeEnding, TradeFile, TradeOutcome, TradeState,
+    TradeEnding, TradeLook, TradeOffView, TradeOutcome,
     chart::{chart_ui, keys},
     choices::choices_ui,
+    file::TradeFile,
     names::noise_name,
+    panel,
     table::table_ui,
+    worker::TradeEvent,
 };
 use crate::{
     app::{
-        file_task::FileTask,
         plotting::{legend_ui, legend_width},
-        shared::State,
+        shared::{Effect, Notice, Shared, View},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, scrolled_ui, segmented_ui},
-        window::Action,
+        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui},
     },
     evaluation::{TradeCost, TradeLevel},
     export::format_duration,
 };
 
-/// The middle of the Trade-off view: both charts above, the table and the choices below.
-pub fn trade_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
+impl View for TradeOffView {
+    fn name(&self) -> &'static str {
+        "Trade-off"
+    }
+
+    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+        while let Some(event) = self.worker.next_event() {
+            let present = self.running.map(|running| running.number);
+            match event {
+                // Of one that was cancelled.
+                TradeEvent::Measured(number, ..) | TradeEvent::Ended(number, _) if Some(number) != present => {}
+                TradeEvent::Measured(_, level, point) => self.record(level, *point),
+                TradeEvent::Ended(_, result) => {
+                    self.end(Instant::now());
+                    effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
+                }
+            }
+        }
+    }
+
+    fn is_working(&self) -> bool {
+        self.running.is_some()
+    }
+
+    fn take_shortcuts(&mut self, ctx: &Context, shared: &Shared, effects: &mut Vec<Effect>) {
+        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && self.can_measure(shared) {
+            self.measure(shared, effects);
+        }
+        if pressed(ctx, Modifiers::COMMAND, Key::Period) && self.running.is_some() {
+            self.cancel();
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        panel::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        trade_ui(ui, self, !shared.phase.is_busy(), effects);
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Both charts above, the table and the choices below.
+fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
-    let (Some(outcome), Some(level)) = (&state.trade.outcome, state.trade.shown()) else {
+    let (Some(outcome), Some(level)) = (&trade.outcome, trade.shown()) else {
         card_ui(ui, whole, |ui| {
             placeholder_ui(
                 ui,
@@ -34,41 +83,52 @@ pub fn trade_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
                  at several levels of noise.",
             );
         });
-        return actions;
+        return;
     };
+    let mut look = trade.look;
+    let mut loaded = None;
     let gap = space(2);
     let lower_height = (0.38 * whole.height()).clamp(space(50), space(85));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
     card_ui(ui, upper.with_max_y(upper.max.y - gap), |ui| {
-        head_ui(ui, state, outcome, &mut actions);
+        head_ui(ui, outcome, &mut look, effects);
         legends_ui(ui, level);
-        charts_ui(ui, state, level, &mut actions);
+        if let Some(clicked) = charts_ui(ui, level, &look, (trade.running.is_some(), can_load)) {
+            look.marked = Some(clicked);
+            loaded = can_load.then_some(clicked);
+        }
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        actions.extend(table_ui(ui, state, level));
+        table_ui(ui, level, &mut look.marked);
     });
     card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "trade choices", |ui| actions.extend(choices_ui(ui, state, level)));
+        scrolled_ui(ui, "trade choices", |ui| {
+            loaded = loaded.or(choices_ui(ui, level, &mut look, can_load));
+        });
     });
     ui.allocate_rect(whole, Sense::hover());
-    actions
+    let settings = loaded.and_then(|point| Some(level.points.get(point)?.settings));
+    trade.look = look;
+    if let Some(settings) = settings {
+        effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
+    }
 }
 
-fn head_ui(ui: &mut Ui, state: &State, outcome: &TradeOutcome, actions: &mut Vec<Action>) {
+fn head_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook, effects: &mut Vec<Effect>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            export_ui(ui, outcome, actions);
-            level_ui(ui, &state.trade, outcome, actions);
+            export_ui(ui, outcome, look.level, effects);
+            level_ui(ui, outcome, look);
         });
     });
 }
 
 /// Few levels stand side by side, many in a list.
-fn level_ui(ui: &mut Ui, trade: &TradeState, outcome: &TradeOutcome, actions: &mut Vec<Action>) {
+fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
     let names: Vec<String> = outcome.plan.noises.iter().map(|&noise| noise_name(noise)).collect();
     let picked = if names.len() <= 5 {
         let options: Vec<_> = names
@@ -76,32 +136,34 @@ fn level_ui(ui: &mut Ui, trade: &TradeState, outcome: &TradeOutcome, actions: &m
             .enumerate()
             .map(|(level, name)| (level, name.as_str()))
             .collect();
-        segmented_ui(ui, "Noise on show", &options, trade.level, false)
+        segmented_ui(ui, "Noise on show", &options, look.level, false)
     } else {
         let mut picked = None;
-        let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[trade.level]);
+        let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
         combo.show_ui(ui, |ui| {
             for (level, name) in names.iter().enumerate() {
-                if ui.selectable_label(level == trade.level, name).clicked() {
+                if ui.selectable_label(level == look.level, name).clicked() {
                     picked = Some(level);
                 }
             }
         });
         picked
     };
-    actions.extend(picked.map(TradeAction::ShowLevel).map(Action::from));
+    if let Some(level) = picked {
+        (look.level, look.marked) = (level, None);
+    }
     dim_ui(ui, "Noise");
 }
 
-fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, actions: &mut Vec<Action>) {
+fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, shown: usize, effects: &mut Vec<Effect>) {
     ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
         let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
             ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
             for file in TradeFile::ALL {
-                let choice = ui.button(file.name()).on_hover_text(file.description());
-                if choice.clicked() {
-                    actions.push(Action::ChooseFile(FileTask::SaveTrade(file)));
+                let words = file.words();
+                if ui.button(words.name).on_hover_text(words.description).clicked() {
+                    effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), shown)));
                 }
             }
         });
@@ -122,28 +184,32 @@ fn legends_ui(ui: &mut Ui, level: &TradeLevel) {
     );
 }
 
-fn charts_ui(ui: &mut Ui, state: &State, level: &TradeLevel, actions: &mut Vec<Action>) {
+/// Returns the point that is clicked.
+fn charts_ui(ui: &mut Ui, level: &TradeLevel, look: &TradeLook, (is_running, can_load): (bool, bool)) -> Option<usize> {
     let place = ui.available_rect_before_wrap();
     if level.points.is_empty() {
-        let text = match state.trade.running {
-            Some(_) => "The points of this noise appear as they are measured.",
-            None => "The measurement ended before this noise.",
+        let text = if is_running {
+            "The points of this noise appear as they are measured."
+        } else {
+            "The measurement ended before this noise."
         };
         placeholder_ui(ui, text);
-        return;
+        return None;
     }
     let gap = space(3);
     let width = 0.5 * (place.width() - gap);
+    let mut clicked = None;
     for (number, cost) in TradeCost::ALL.into_iter().enumerate() {
         let left = place.left() + (width + gap) * number as f32;
         let rect = Rect::from_min_size([left, place.top()].into(), Vec2::new(width, place.height()));
         let mut slot = ui.new_child(eframe::egui::UiBuilder::new().max_rect(rect));
-        actions.extend(chart_ui(&mut slot, state, level, cost));
+        clicked = clicked.or(chart_ui(&mut slot, look, level, cost, can_load));
     }
+    clicked
 }
 
 /// What is going on, in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, trade: &TradeState) {
+fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&trade.running, &trade.outcome) {
         (Some(_), Some(outcome)) => {

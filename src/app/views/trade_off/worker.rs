@@ -3,7 +3,6 @@
 
 use std::{
     fmt, io,
-    path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -12,10 +11,10 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{TradeFile, TradePlan};
+use super::TradePlan;
 use crate::{
     app::threads::{LastEvent, Report, Wake, yield_to_window},
-    evaluation::{RunError, TradeLevel, TradePoint, measure_trade},
+    evaluation::{RunError, TradePoint, measure_trade},
 };
 
 /// Tells measurements apart that were begun in one window.
@@ -29,8 +28,6 @@ pub enum TradeEvent {
     Measured(TradeNumber, usize, Box<TradePoint>),
     /// The measurement has ended, or why it could not go on.
     Ended(TradeNumber, Result<(), String>),
-    /// A file was written, or why not.
-    Written(Result<PathBuf, String>),
 }
 
 /// The window's end of the threads.
@@ -86,12 +83,6 @@ impl TradeWorker {
     /// Ends the measurement. Its thread ends after the epoch or the decoder in progress, which nobody waits for.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
-    }
-
-    /// Writes a file on a thread of its own.
-    pub fn write(&self, file: TradeFile, levels: Vec<TradeLevel>, shown: usize, path: PathBuf) {
-        let write = move |path: &Path| file.write(&levels, shown, path);
-        self.report.write("trade file", path, write, TradeEvent::Written);
     }
 
     /// The next event, if one has come.

@@ -1,12 +1,14 @@
 use eframe::egui::Ui;
 
-use super::charts;
+use super::{
+    charts::{self, BottomTab},
+    state::TrainView,
+};
 use crate::app::{
     plotting::{Key, legend_ui, legend_width},
-    shared::{BottomTab, RunResult, RunView, State},
+    shared::{RunResult, RunView, Shared},
     theme::{Theme, space},
     widgets::{placeholder_ui, tabs_ui},
-    window::Action,
 };
 
 const TABS: [(BottomTab, &str); 5] = [
@@ -18,16 +20,13 @@ const TABS: [(BottomTab, &str); 5] = [
 ];
 
 /// The charts below the surfaces.
-pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
-    let keys = keys(ui, state);
+pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let keys = keys(ui, view, shared);
     let has_room = ui
         .horizontal(|ui| {
-            if let Some(tab) = tabs_ui(ui, "Charts", &TABS, state.look.tab) {
-                actions.push(Action::ShowTab(tab));
-            }
-            if state.look.tab == BottomTab::Nodes && state.result().is_some() {
-                error_bars_ui(ui, state, &mut actions);
+            view.tab = tabs_ui(ui, "Charts", &TABS, view.tab).unwrap_or(view.tab);
+            if view.tab == BottomTab::Nodes && shared.result().is_some() {
+                error_bars_ui(ui, &mut view.has_error_bars);
             }
             let spare = ui.available_width() - ui.spacing().item_spacing.x - legend_width(ui, &keys);
             let has_room = spare >= space(3);
@@ -41,46 +40,41 @@ pub fn charts_card_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
     if !has_room {
         legend_ui(ui, &keys);
     }
-    match (state.look.tab, trained(state)) {
+    match (view.tab, trained(shared)) {
         (BottomTab::Nodes, _) => {
-            let nodes_per_row = state.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
-            charts::nodes_ui(ui, &state.frames, nodes_per_row);
+            let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+            charts::nodes_ui(ui, &view.drawn.frames, view.error_bars_mm(), nodes_per_row);
         }
         (tab, None) => placeholder_ui(ui, what_comes(tab)),
         (BottomTab::Loss, Some((run, result))) => charts::loss_ui(ui, &run.history, &run.stages, result.best_epoch),
         (BottomTab::TrainingState, Some((run, _))) => {
             charts::training_state_ui(ui, &run.history, &run.stages);
         }
-        (BottomTab::ErrorHistogram, Some((run, result))) => {
-            charts::error_histogram_ui(ui, &run.test.set, &result.decoupled_mm);
+        (BottomTab::ErrorHistogram, Some(_)) => {
+            charts::error_histogram_ui(ui, view.drawn.pairs_mm().unwrap_or_default());
         }
-        (BottomTab::Regression, Some((run, result))) => {
-            charts::regression_ui(ui, &run.test.set, &result.decoupled_mm);
+        (BottomTab::Regression, Some(_)) => {
+            charts::regression_ui(ui, view.drawn.pairs_mm().unwrap_or_default());
         }
     }
-    actions
 }
 
 /// Whether the nodes have error bars.
-fn error_bars_ui(ui: &mut Ui, state: &State, actions: &mut Vec<Action>) {
+fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
     ui.add_space(space(3));
-    let mut has_bars = state.look.has_error_bars;
     let hint = "± the root mean square error of each node over all snapshots of the test set";
-    let checkbox = ui.checkbox(&mut has_bars, "Error bars").on_hover_text(hint);
-    if checkbox.changed() {
-        actions.push(Action::ShowErrorBars(has_bars));
-    }
+    ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
 }
 
-fn trained(state: &State) -> Option<(&RunView, &RunResult)> {
-    state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)))
+fn trained(shared: &Shared) -> Option<(&RunView, &RunResult)> {
+    shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)))
 }
 
 /// What the marks of the chart on show stand for.
-fn keys(ui: &Ui, state: &State) -> Vec<Key> {
+fn keys(ui: &Ui, view: &TrainView, shared: &Shared) -> Vec<Key> {
     let palette = &Theme::of(ui).palette;
-    match (state.look.tab, trained(state)) {
-        (BottomTab::Nodes, _) => charts::nodes_keys(palette, &state.frames),
+    match (view.tab, trained(shared)) {
+        (BottomTab::Nodes, _) => charts::nodes_keys(palette, &view.drawn.frames),
         (BottomTab::Loss, Some((run, _))) => charts::loss_keys(palette, &run.history),
         (BottomTab::TrainingState, Some((run, _))) => {
             charts::training_state_keys(palette, charts::parameter_name(&run.stages))

@@ -1,20 +1,22 @@
 //! The Train view: one training and what it makes of the sensor.
 
-pub mod charts;
+mod charts;
 mod charts_card;
 mod configuration;
-pub mod decoders;
+mod decoders;
+mod drawn;
+mod export_kind;
 mod paper_figure;
 mod report;
-mod shortcuts;
-pub mod shown_figure;
-pub mod surfaces;
+mod run_buttons;
+mod shown_figure;
+mod state;
+mod surfaces;
+mod test_pairs;
+mod view;
 mod workbench;
 
-pub use configuration::configuration_ui;
+pub use charts::BottomTab;
 pub use decoders::{DecoderResult, DecodersState};
-pub use paper_figure::PaperFigure;
-pub use report::report_ui;
-pub use shortcuts::pressed_shortcuts;
-pub use shown_figure::ShownPicture;
-pub use workbench::{WorkbenchLayout, workbench_ui};
+pub use drawn::{Drawn, Frames};
+pub use state::TrainView;

@@ -1,4 +1,5 @@
-use crate::{app::shared::BottomTab, evaluation::SimulatedSettings, figure::surface::ViewMode, sensor::SensorModel};
+use super::charts::BottomTab;
+use crate::{evaluation::SimulatedSettings, figure::surface::ViewMode, sensor::SensorModel};
 
 /// A figure of the paper that the window can show: its configuration, trained and looked at in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

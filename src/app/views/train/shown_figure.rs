@@ -1,19 +1,29 @@
 //! What the window shows, as a figure for print.
 
-use super::{charts, surfaces::surface_figure};
+use std::path::Path;
+
+use super::{
+    charts::{self, BottomTab},
+    export_kind::file_name,
+    state::TrainView,
+    surfaces::surface_figure,
+};
 use crate::{
     app::{
         plotting::plot_style::thinned,
-        shared::{BottomTab, RunResult, RunView, State},
+        shared::{FileTask, FileWords, RunResult, RunView, Shared},
         test_view::Frame,
     },
-    export::figures::{Hue, Marker, Picture, Plot, PlotAxis, PlotPoint, Series, Span, draw_surfaces, node_plot},
+    export::figures::{
+        Hue, Marker, Picture, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, draw_surfaces,
+        node_plot,
+    },
     figure::surface::{SurfaceFigure, ViewMode},
     training::EpochRecord,
 };
 
 /// Which of the pictures in view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShownPicture {
     /// Actual surface of the snapshot, and the decoupled one or the error beside it.
     Surfaces,
@@ -23,7 +33,7 @@ pub enum ShownPicture {
 
 /// A figure not yet drawn, which takes a while.
 #[derive(Clone, Debug)]
-pub enum Undrawn {
+enum Undrawn {
     /// Surfaces.
     Surfaces(SurfaceFigure),
     /// A chart.
@@ -31,8 +41,7 @@ pub enum Undrawn {
 }
 
 impl Undrawn {
-    /// Draws it.
-    pub fn draw(&self) -> Picture {
+    fn draw(&self) -> Picture {
         match self {
             Self::Surfaces(figure) => draw_surfaces(figure),
             Self::Plot(plot) => plot.draw(),
@@ -41,9 +50,38 @@ impl Undrawn {
 }
 
 impl ShownPicture {
-    /// The word for it in a file's name.
-    pub fn file_word(self, state: &State) -> &'static str {
-        match (self, state.look.mode, state.look.tab) {
+    /// What the file is called.
+    pub fn words(self) -> FileWords {
+        let (name, kind, description) = match self {
+            Self::Surfaces => (
+                "Surfaces, PNG or SVG…",
+                "picture of the surfaces",
+                "The surfaces as they are in view, with the camera and the error card, for print: on a light ground, as PNG \
+                 or SVG as the name ends.",
+            ),
+            Self::Chart => (
+                "Chart, PNG or SVG…",
+                "picture of the chart",
+                "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
+            ),
+        };
+        FileWords {
+            name,
+            kind,
+            description,
+            extensions: &["png", "svg"],
+        }
+    }
+
+    /// The picture as it is in view; `None` before a training.
+    pub fn task(self, view: &TrainView, shared: &Shared) -> Option<FileTask> {
+        let run = shared.shown_run()?;
+        let result = run.result.as_ref()?;
+        let picture = match self {
+            Self::Surfaces => Undrawn::Surfaces(surface_figure(view, shared)),
+            Self::Chart => Undrawn::Plot(chart(view, run, result)?),
+        };
+        let what = match (self, shared.look.mode, view.tab) {
             (Self::Surfaces, ViewMode::ThreeD, _) => "surfaces",
             (Self::Surfaces, ViewMode::Top, _) => "surfaces-top",
             (Self::Chart, _, BottomTab::Loss) => "loss",
@@ -51,32 +89,28 @@ impl ShownPicture {
             (Self::Chart, _, BottomTab::ErrorHistogram) => "histogram",
             (Self::Chart, _, BottomTab::Regression) => "regression",
             (Self::Chart, _, BottomTab::Nodes) => "nodes",
-        }
-    }
-
-    /// The picture as it is in view; `None` before a training.
-    pub fn of(self, state: &State) -> Option<Undrawn> {
-        let run = state.shown_run()?;
-        let result = run.result.as_ref()?;
-        match self {
-            Self::Surfaces => Some(Undrawn::Surfaces(surface_figure(state))),
-            Self::Chart => chart(state, run, result).map(Undrawn::Plot),
-        }
+        };
+        let words = self.words();
+        let write = move |path: &Path| -> Result<(), PictureError> {
+            let format = PictureFormat::of_path(path)?;
+            picture.draw().save(format, path)
+        };
+        Some(FileTask::save(words, file_name(what, words, &run.settings), write))
     }
 }
 
-fn chart(state: &State, run: &RunView, result: &RunResult) -> Option<Plot> {
-    let pairs = || charts::z_pairs_mm(&run.test.set, &result.decoupled_mm);
-    Some(match state.look.tab {
+fn chart(view: &TrainView, run: &RunView, result: &RunResult) -> Option<Plot> {
+    let pairs = || view.drawn.pairs_mm().unwrap_or_default();
+    Some(match view.tab {
         BottomTab::Loss => loss(run, result),
         BottomTab::TrainingState => training_state(run),
-        BottomTab::ErrorHistogram => histogram(&pairs()),
-        BottomTab::Regression => regression(&pairs()),
+        BottomTab::ErrorHistogram => histogram(pairs()),
+        BottomTab::Regression => regression(pairs()),
         BottomTab::Nodes => {
             let z_mm = |frame: &Frame| -> Vec<f64> { frame.nodes_mm.iter().map(|node| node.z).collect() };
-            let (decoupled, _) = state.frames.decoupled.as_ref()?;
-            let spread = state.frames.spread_mm.as_deref();
-            node_plot(&z_mm(&state.frames.actual), &z_mm(decoupled), spread)
+            let (decoupled, _) = view.drawn.frames.decoupled.as_ref()?;
+            let spread = view.error_bars_mm();
+            node_plot(&z_mm(&view.drawn.frames.actual), &z_mm(decoupled), spread)
         }
     })
 }

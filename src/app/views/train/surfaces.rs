@@ -1,46 +1,46 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
+use super::{drawn::Frames, state::TrainView};
 use crate::{
     app::{
-        shared::{RightCard, State},
-        surface_view::{ColourBar, SurfaceView, SurfaceViewResponse},
+        shared::{Effect, Look, RightCard, Shared},
+        surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, segmented_ui},
-        window::Action,
     },
     export::format_number,
-    figure::surface::{SurfaceFigure, ViewMode},
+    figure::surface::{Surface, SurfaceFigure, ViewMode},
 };
 
 /// Both surfaces side by side, and the scale of their colours.
-pub fn surfaces_ui(ui: &mut Ui, rect: Rect, state: &State, actions: &mut Vec<Action>) {
+pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let gap = space(2);
     let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let width = 0.5 * (cards.width() - gap);
     let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
     let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
-    let figure = surface_figure(state);
-    card_ui(ui, left, |ui| actual_card_ui(ui, state, &figure, actions));
-    card_ui(ui, right, |ui| right_card_ui(ui, state, &figure, actions));
+    let figure = surface_figure(view, shared);
+    card_ui(ui, left, |ui| actual_card_ui(ui, &figure, view, shared, effects));
+    card_ui(ui, right, |ui| right_card_ui(ui, &figure, view, shared, effects));
     colour_scales_ui(ui, scales, &figure);
 }
 
 /// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
-pub fn surface_figure(state: &State) -> SurfaceFigure {
-    let (frames, look) = (&state.frames, &state.look);
-    let surfaces = state.test().into_iter().flat_map(|test| {
-        let actual = test.heights("Actual", &frames.actual, look.mode);
-        let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match look.right {
-            RightCard::Decoupled => test.heights("Decoupled", decoupled, look.mode),
-            RightCard::Error => test.errors("Error", error, look.mode),
+pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
+    let (frames, mode) = (&view.drawn.frames, shared.look.mode);
+    let surfaces = shared.test().into_iter().flat_map(|test| {
+        let actual = test.heights("Actual", &frames.actual, mode);
+        let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
+            RightCard::Decoupled => test.heights("Decoupled", decoupled, mode),
+            RightCard::Error => test.errors("Error", error, mode),
         });
         std::iter::once(actual).chain(beside)
     });
     SurfaceFigure {
         surfaces: surfaces.collect(),
-        camera: look.camera,
-        marked_node: look.node,
+        camera: shared.look.camera,
+        marked_node: view.node,
     }
 }
 
@@ -56,39 +56,51 @@ fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
 }
 
-fn actual_card_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, actions: &mut Vec<Action>) {
+fn actual_card_ui(
+    ui: &mut Ui,
+    figure: &SurfaceFigure,
+    view: &mut TrainView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Actual", space(29));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-            if let Some(mode) = segmented_ui(ui, "How surfaces are drawn", &modes, state.look.mode, false) {
-                actions.push(Action::SetViewMode(mode));
-            }
+            let look = shared.look;
+            let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+            effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
         });
     });
-    surface_ui(ui, state, figure, 0, actions);
+    if let Some(surface) = figure.surfaces.first() {
+        surface_ui(ui, surface, view, shared, effects);
+    }
 }
 
-fn right_card_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, actions: &mut Vec<Action>) {
+fn right_card_ui(
+    ui: &mut Ui,
+    figure: &SurfaceFigure,
+    view: &mut TrainView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Network", space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
-            if let Some(right) = segmented_ui(ui, "What the network's card shows", &options, state.look.right, false) {
-                actions.push(Action::SetRightCard(right));
-            }
+            let picked = segmented_ui(ui, "What the network's card shows", &options, view.right, false);
+            view.right = picked.unwrap_or(view.right);
         });
     });
-    if figure.surfaces.len() < 2 {
-        placeholder_ui(
+    match figure.surfaces.get(1) {
+        Some(surface) => surface_ui(ui, surface, view, shared, effects),
+        None => placeholder_ui(
             ui,
             "Press Train: the surface that the network decouples takes shape here while it learns.",
-        );
-        return;
+        ),
     }
-    surface_ui(ui, state, figure, 1, actions);
 }
 
 /// The scale that both surfaces share; beside it that of the errors while they are shown.
@@ -105,34 +117,32 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
     }
 }
 
-fn surface_ui(ui: &mut Ui, state: &State, figure: &SurfaceFigure, card: usize, actions: &mut Vec<Action>) {
-    let (Some(test), Some(surface)) = (state.test(), figure.surfaces.get(card)) else {
+fn surface_ui(ui: &mut Ui, surface: &Surface, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let (Some(test), look) = (shared.test(), shared.look) else {
         return;
     };
-    let view = SurfaceView {
+    let shown = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
-        marked_node: figure.marked_node,
+        marked_node: view.node,
         theme: Theme::of(ui),
-    };
-    let shown = view.show(ui, figure.camera);
-    answer(&shown, state, actions);
-    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, state, test, node));
-}
-
-fn answer(shown: &SurfaceViewResponse, state: &State, actions: &mut Vec<Action>) {
-    if shown.camera != state.look.camera {
-        actions.push(Action::MoveCamera(shown.camera));
+    }
+    .show(ui, look.camera);
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
     }
     // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
-    if shown.response.contains_pointer() && shown.hovered_node != state.look.node {
-        actions.push(Action::HoverNode(shown.hovered_node));
+    if shown.response.contains_pointer() && shown.hovered_node != view.node {
+        view.node = shown.hovered_node;
+        ui.ctx().request_repaint();
     }
+    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, &view.drawn.frames, test, node));
 }
 
 /// The node under the pointer and its values, in two lines that hide little.
-fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
-    let Some(actual) = state.frames.actual.nodes_mm.get(node) else {
+fn node_values_ui(ui: &mut Ui, frames: &Frames, test: &TestView, node: usize) {
+    let Some(actual) = frames.actual.nodes_mm.get(node) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 0.0;
@@ -146,7 +156,7 @@ fn node_values_ui(ui: &mut Ui, state: &State, test: &TestView, node: usize) {
         ui.label(place.color(Theme::of(ui).palette.dim));
     });
     let mut text = format!("z {} mm", format_number(actual.z));
-    if let Some((decoupled, error)) = &state.frames.decoupled
+    if let Some((decoupled, error)) = &frames.decoupled
         && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
     {
         let [decoupled, error] = [decoupled.z, error.z].map(format_number);

@@ -1,7 +1,11 @@
 use eframe::egui::{Sense, Ui};
 
-use super::{charts_card::charts_card_ui, report::report_ui, surfaces::surfaces_ui};
-use crate::app::{shared::State, theme::space, widgets::card_ui, window::Action};
+use super::{charts_card::charts_card_ui, report::report_ui, state::TrainView, surfaces::surfaces_ui};
+use crate::app::{
+    shared::{Effect, Shared},
+    theme::space,
+    widgets::card_ui,
+};
 
 /// Where the report stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +30,8 @@ impl WorkbenchLayout {
 }
 
 /// The middle of the window: both surfaces above, the charts below.
-pub fn workbench_ui(ui: &mut Ui, state: &State, layout: WorkbenchLayout) -> Vec<Action> {
-    let mut actions = Vec::new();
+pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let layout = WorkbenchLayout::of_width(ui.ctx().content_rect().width());
     let whole = ui.available_rect_before_wrap();
     let gap = space(2);
     let (share, least) = match layout {
@@ -36,17 +40,16 @@ pub fn workbench_ui(ui: &mut Ui, state: &State, layout: WorkbenchLayout) -> Vec<
     };
     let lower_height = (share * whole.height()).clamp(least, space(75));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-    surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), state, &mut actions);
+    surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), view, shared, effects);
     let charts = match layout {
         WorkbenchLayout::ReportBeside => lower,
         WorkbenchLayout::ReportBelow => {
             let width = (0.45 * lower.width()).clamp(space(82), space(96));
             let (charts, report) = lower.split_left_right_at_x(lower.right() - width);
-            card_ui(ui, report, |ui| actions.extend(report_ui(ui, state)));
+            card_ui(ui, report, |ui| report_ui(ui, view, shared, effects));
             charts.with_max_x(charts.max.x - gap)
         }
     };
-    card_ui(ui, charts, |ui| actions.extend(charts_card_ui(ui, state)));
+    card_ui(ui, charts, |ui| charts_card_ui(ui, view, shared));
     ui.allocate_rect(whole, Sense::hover());
-    actions
 }

@@ -1,23 +1,17 @@
 use eframe::egui::Ui;
 use egui_plot::{Bar, BarChart, VLine};
-use ndarray::Array2;
 
-use super::test_pairs::z_pairs_mm;
 use crate::{
     app::{plotting::plot_style::plot, theme::Theme},
-    dataset::Dataset,
     export::format_number,
 };
 
 const BINS: usize = 41;
 
 /// How the errors of z (decoupled − actual) are distributed over the nodes of the test set.
-pub fn error_histogram_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64>) {
+pub fn error_histogram_ui(ui: &mut Ui, pairs_mm: &[(f64, f64)]) {
     let palette = Theme::of(ui).palette;
-    let errors: Vec<f64> = z_pairs_mm(test, decoupled_mm)
-        .iter()
-        .map(|(actual, decoupled)| decoupled - actual)
-        .collect();
+    let errors: Vec<f64> = pairs_mm.iter().map(|(actual, decoupled)| decoupled - actual).collect();
     let (counts, width) = histogram(&errors);
     let bars = counts.iter().enumerate().map(|(bin, &count)| {
         let centre = width * (bin as f64 - (BINS / 2) as f64);

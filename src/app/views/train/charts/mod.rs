@@ -6,7 +6,7 @@ mod loss;
 mod nodes;
 mod regression;
 mod stages;
-mod test_pairs;
+mod tab;
 mod training_state;
 
 pub use ceiling::{drawn_parameter, highest_gradient, highest_mse};
@@ -15,5 +15,5 @@ pub use loss::{loss_keys, loss_ui};
 pub use nodes::{nodes_keys, nodes_ui};
 pub use regression::{regression_keys, regression_ui};
 pub use stages::parameter_name;
-pub use test_pairs::z_pairs_mm;
+pub use tab::BottomTab;
 pub use training_state::{training_state_keys, training_state_ui};

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use crate::app::{
     plotting::{Key, Mark, plot_style::plot},
-    shared::Frames,
     theme::{Palette, Theme},
+    views::train::drawn::Frames,
 };
 
 const ACTUAL_RADIUS: f32 = 4.5;
@@ -27,8 +27,9 @@ pub fn nodes_keys(palette: &Palette, frames: &Frames) -> Vec<Key> {
     std::iter::once(actual).chain(decoupled).collect()
 }
 
-/// The nodes of the snapshot, row by row: actual as squares, decoupled as discs, as in the paper's Fig. 6.
-pub fn nodes_ui(ui: &mut Ui, frames: &Frames, nodes_per_row: usize) {
+/// The nodes of the snapshot, row by row: actual as squares, decoupled as discs, as in the paper's Fig. 6; with
+/// bars where the spread of each is given.
+pub fn nodes_ui(ui: &mut Ui, frames: &Frames, spread_mm: Option<&[f64]>, nodes_per_row: usize) {
     let palette = Theme::of(ui).palette;
     let heights = |nodes_mm: &[DVec3]| -> PlotPoints<'static> {
         nodes_mm
@@ -45,7 +46,7 @@ pub fn nodes_ui(ui: &mut Ui, frames: &Frames, nodes_per_row: usize) {
                 .filled(false);
             plot_ui.points(actual.radius(ACTUAL_RADIUS).color(palette.dim));
             if let Some((decoupled, _)) = &frames.decoupled {
-                if let Some(spread_mm) = &frames.spread_mm {
+                if let Some(spread_mm) = spread_mm {
                     plot_ui.box_plot(error_bars(&decoupled.nodes_mm, spread_mm, palette.accent));
                 }
                 let discs = Points::new("decoupled", heights(&decoupled.nodes_mm)).shape(MarkerShape::Circle);

@@ -1,8 +1,6 @@
 use eframe::egui::{RichText, Ui};
 use egui_plot::{Line, PlotPoints, Points};
-use ndarray::Array2;
 
-use super::test_pairs::z_pairs_mm;
 use crate::{
     app::{
         plotting::{
@@ -11,7 +9,6 @@ use crate::{
         },
         theme::{Palette, Theme, space, type_size},
     },
-    dataset::Dataset,
     export::format_number,
 };
 
@@ -28,13 +25,14 @@ pub fn regression_keys(palette: &Palette) -> Vec<Key> {
 
 /// Decoupled against actual z over the nodes of the test set, with the line on which they would be equal and the line
 /// fitted to them. Both axes have one scale.
-pub fn regression_ui(ui: &mut Ui, test: &Dataset, decoupled_mm: &Array2<f64>) {
+pub fn regression_ui(ui: &mut Ui, pairs_mm: &[(f64, f64)]) {
     let palette = Theme::of(ui).palette;
-    let pairs = z_pairs_mm(test, decoupled_mm);
-    let fit = Fit::new(&pairs);
-    let low = pairs.iter().map(|pair| pair.0).fold(f64::INFINITY, f64::min);
-    let high = pairs.iter().map(|pair| pair.0).fold(f64::NEG_INFINITY, f64::max);
-    let dots: PlotPoints<'_> = thinned(&pairs).map(|(actual, decoupled)| [actual, decoupled]).collect();
+    let fit = Fit::new(pairs_mm);
+    let low = pairs_mm.iter().map(|pair| pair.0).fold(f64::INFINITY, f64::min);
+    let high = pairs_mm.iter().map(|pair| pair.0).fold(f64::NEG_INFINITY, f64::max);
+    let dots: PlotPoints<'_> = thinned(pairs_mm)
+        .map(|(actual, decoupled)| [actual, decoupled])
+        .collect();
     let height = ui.available_height();
     ui.horizontal_top(|ui| {
         plot(ui, "regression", "actual z (mm)", "decoupled z (mm)")

@@ -8,34 +8,34 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Phase, State},
+        shared::{Effect, Phase, Shared},
         theme::{Theme, space, type_size},
         views::train::paper_figure::PaperFigure,
         widgets::{
             fields::{capitalised, count_ui, input_text, quantity_ui},
             ghost_button, scrolled_ui, section_heading_ui,
         },
-        window::Action,
     },
     evaluation::{MOST_STARTS, Outlook, SimulatedSettings},
     training::{Method, StoppingRules},
 };
 
 /// The settings of the next training, in the order of the pipeline.
-pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut draft = state.draft;
-    let mut actions = Vec::new();
+/// Returns the paper's figure that is to be shown, if the user said so.
+pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<PaperFigure> {
+    let mut draft = shared.draft;
+    let mut picked = None;
     scrolled_ui(ui, "configuration", |ui| {
-        let is_busy = state.phase.is_busy();
+        let is_busy = shared.phase.is_busy();
         ui.add_enabled_ui(!is_busy, |ui| preset_section_ui(ui, &mut draft));
         let followed = present(&draft);
-        ui.add_enabled_ui(!is_busy && state.phase != Phase::Died, |ui| {
-            paper_section_ui(ui, &mut actions);
+        ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {
+            picked = paper_section_ui(ui);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             sensor_section_ui(ui, &mut draft);
             let noise = draft.source.scene.noise;
-            scene_section_ui(ui, &mut draft, outlook(state));
+            scene_section_ui(ui, &mut draft, outlook(shared));
             // How many samples are best depends on whether there is noise.
             if let Some(preset) = followed.filter(|_| draft.source.scene.noise != noise) {
                 draft = applied(preset, &draft);
@@ -44,7 +44,7 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             network_section_ui(ui, &mut draft);
         });
         // What is held can be continued with another method.
-        ui.add_enabled_ui(!is_busy || state.phase == Phase::Paused, |ui| {
+        ui.add_enabled_ui(!is_busy || shared.phase == Phase::Paused, |ui| {
             training_section_ui(ui, &mut draft, !is_busy);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
@@ -60,29 +60,30 @@ pub fn configuration_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
             ui.add_space(space(4));
         });
     });
-    if draft != state.draft {
-        actions.push(Action::Configure(Box::new(draft)));
+    if draft != shared.draft {
+        effects.push(Effect::Configure(Box::new(draft)));
     }
-    actions
+    picked
 }
 
 /// What can be hoped for in the scene of the draft, where that is known.
-fn outlook(state: &State) -> Option<&Outlook> {
-    let (settings, test) = match (&state.preview, &state.run) {
+fn outlook(shared: &Shared) -> Option<&Outlook> {
+    let (settings, test) = match (&shared.preview, &shared.run) {
         (Some(preview), _) => (&preview.settings, &preview.test),
         (None, Some(run)) => (&run.settings, &run.test),
         (None, None) => return None,
     };
     let is_same =
-        (settings.source.sensor, settings.source.scene) == (state.draft.source.sensor, state.draft.source.scene);
+        (settings.source.sensor, settings.source.scene) == (shared.draft.source.sensor, shared.draft.source.scene);
     test.outlook.as_ref().filter(|_| is_same)
 }
 
 /// The paper's figures of single networks, one click each.
-fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
+fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
     section_heading_ui(ui, "The paper's figures");
     // So small that the names fit in the narrowest window.
     let gap = space(1);
+    let mut picked = None;
     let count = PaperFigure::ALL.len() as f32;
     let width = (ui.available_width() - gap * (count - 1.0)) / count;
     ui.horizontal(|ui| {
@@ -90,10 +91,11 @@ fn paper_section_ui(ui: &mut Ui, actions: &mut Vec<Action>) {
         for figure in PaperFigure::ALL {
             let button = ghost_button(figure.name()).min_size([width, space(7)].into());
             if ui.add(button).on_hover_text(figure.description()).clicked() {
-                actions.push(Action::ShowPaperFigure(figure));
+                picked = Some(figure);
             }
         }
     });
+    picked
 }
 
 fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {

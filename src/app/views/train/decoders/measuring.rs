@@ -12,7 +12,11 @@ use std::{
 
 use super::{DecoderResult, DecodersState};
 use crate::{
-    app::threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+    app::{
+        shared::{Phase, Shared},
+        threads::{Report, Wake, WorkerDied, next_event, yield_to_window},
+        training_worker::RunId,
+    },
     dataset::Dataset,
     evaluation::{DecoderReport, DecoderSet, SimulatedSettings},
     network::Networks,
@@ -22,47 +26,55 @@ use crate::{
 type News = (usize, Result<DecoderReport, String>);
 
 /// The window's end of the thread; without it the thread ends after the decoder in hand.
-#[derive(Default)]
 pub struct DecoderMeasuring {
+    wake: Wake,
     news: Option<Receiver<News>>,
-    /// Tells networks apart that are measured one after the other.
-    number: u64,
+    /// The training whose networks are measured, and how many epochs had been run.
+    of: Option<(RunId, usize)>,
 }
 
 impl DecoderMeasuring {
-    /// All decoders are to be measured once the networks of this number are there.
-    pub fn expect(&mut self, state: &mut DecodersState) -> u64 {
-        self.forget(state);
-        state.measured = Some(DecoderResult::pending());
-        self.number
+    /// No thread yet. `wake` is called after each decoder and at the end.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            wake,
+            news: None,
+            of: None,
+        }
     }
 
-    /// Whether networks of this number are still those to be measured.
-    pub fn awaits(&self, number: u64) -> bool {
-        self.number == number
+    /// Takes news, forgets what is of a network that is another one by now, and measures the networks on show once they
+    /// stand still and their table is unfolded.
+    pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
+        self.take_news(state);
+        let standing = shared.run.as_ref().and_then(|run| {
+            let result = run.result.as_ref()?;
+            Some((run, (run.id, result.epochs_run), result.networks.as_ref()?))
+        });
+        let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
+        if is_other || shared.phase == Phase::Training {
+            self.forget(state);
+        }
+        let is_wanted = state.is_open && state.measured.is_none();
+        if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
+        {
+            self.of = Some(of);
+            state.measured = Some(DecoderResult::pending());
+            let begun = self.begin(run.settings, (**networks).clone(), Arc::clone(&run.test.set));
+            if let Err(error) = begun {
+                state.end(&format!("no thread could be started: {error}"));
+            }
+        }
     }
 
-    /// Forgets what was measured, and what is still to come: the network is another one from now on.
-    pub fn forget(&mut self, state: &mut DecodersState) {
-        self.number += 1;
-        self.news = None;
-        state.measured = None;
+    fn forget(&mut self, state: &mut DecodersState) {
+        (self.news, self.of, state.measured) = (None, None, None);
     }
 
-    /// Measures all decoders of `settings` with their trained `networks` on `test`. `wake` is called after each decoder
-    /// and at the end.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn begin(
-        &mut self,
-        settings: SimulatedSettings,
-        networks: Networks,
-        test: Arc<Dataset>,
-        wake: Wake,
-    ) -> std::io::Result<()> {
+    /// Measures all decoders of `settings` with their trained `networks` on `test`.
+    fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) -> std::io::Result<()> {
         let (outgoing, incoming) = channel();
-        let news = Report::new(outgoing, wake);
+        let news = Report::new(outgoing, Arc::clone(&self.wake));
         let work = move || {
             yield_to_window();
             let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
@@ -84,7 +96,7 @@ impl DecoderMeasuring {
     }
 
     /// Takes what the thread has to tell.
-    pub fn take_news(&mut self, state: &mut DecodersState) {
+    fn take_news(&mut self, state: &mut DecodersState) {
         while let Some(news) = &self.news {
             match next_event(news) {
                 Ok(Some((place, report))) => state.take(place, report),
@@ -123,25 +135,26 @@ mod tests {
         };
         settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
         let run = Run::prepare(settings).unwrap();
-        let (mut measuring, mut state) = (DecoderMeasuring::default(), DecodersState::default());
-        let number = measuring.expect(&mut state);
-        assert!(measuring.awaits(number) && state.is_measuring());
         let (waking, woken) = channel();
+        let wake = move || waking.send(()).unwrap_or(());
+        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
+        state.measured = Some(DecoderResult::pending());
+        assert!(state.is_measuring());
         let mut impossible = settings;
         impossible.source.samples = 0;
-        let wake = move || waking.send(()).unwrap_or(());
         measuring
-            .begin(impossible, run.network(), Arc::clone(run.test()), Arc::new(wake))
+            .begin(impossible, run.network(), Arc::clone(run.test()))
             .unwrap();
-        // Until the thread has ended.
-        while woken.recv().is_ok() {}
-        measuring.take_news(&mut state);
+        while state.is_measuring() {
+            woken.recv().unwrap();
+            measuring.take_news(&mut state);
+        }
         assert!(!state.is_measuring());
         for result in state.measured.iter().flatten() {
             let reason = result.report.clone().unwrap().unwrap_err();
             assert!(reason.contains("training samples"), "{reason}");
         }
         measuring.forget(&mut state);
-        assert!(state.measured.is_none() && !measuring.awaits(number));
+        assert!(state.measured.is_none());
     }
 }

@@ -1,12 +1,12 @@
 use eframe::egui::{CollapsingHeader, Ui};
 
-use super::DecoderResult;
+use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
-        shared::{Phase, State},
-        theme::{Theme, space},
+        shared::Phase,
+        theme::Theme,
+        theme::space,
         widgets::{Column, Row, dim_ui, note_ui, table_ui},
-        window::Action,
     },
     decoupling::DecoderKind,
     evaluation::{DecoderReport, Errors},
@@ -36,8 +36,7 @@ const COLUMNS: [Column; 4] = [
 ];
 
 /// The other decoders on the same test set, folded away until the user asks for them.
-pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actions: &mut Vec<Action>) {
-    let decoders = &state.decoders;
+pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, reference: Option<&Errors>) {
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
@@ -45,7 +44,7 @@ pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actio
             if let Some(measured) = &decoders.measured {
                 measured_ui(ui, measured, reference);
             } else {
-                let text = match state.phase {
+                let text = match phase {
                     Phase::Died => "The network was lost with the training thread: train again.",
                     _ => "They are measured when the training is paused or has ended.",
                 };
@@ -55,7 +54,7 @@ pub fn decoders_ui(ui: &mut Ui, state: &State, reference: Option<&Errors>, actio
     let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, time, and \
                 distance from what is possible";
     if header.header_response.on_hover_text(hint).clicked() {
-        actions.push(Action::ShowDecoders(!decoders.is_open));
+        decoders.is_open = !decoders.is_open;
     }
 }
 
@@ -153,24 +152,24 @@ mod tests {
             .unwrap();
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
-        let mut state = State::new(true);
-        state.decoders.is_open = true;
-        state.decoders.measured = Some(DecoderResult::pending());
+        let mut decoders = DecodersState::default();
+        decoders.is_open = true;
+        decoders.measured = Some(DecoderResult::pending());
         let place = DecoderResult::pending()
             .iter()
             .position(|result| result.kind == DecoderKind::Ridge);
-        state.decoders.take(place.unwrap(), Ok(report));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        decoders.take(place.unwrap(), Ok(report));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
         harness.get_by_label(&format!("Ridge: {remark}"));
     }
 
     #[test]
     fn a_decoder_that_fails_says_why_and_the_others_stand() {
-        let mut state = State::new(true);
-        state.decoders.is_open = true;
-        state.decoders.measured = Some(DecoderResult::pending());
-        state.decoders.take(0, Err("no resistance at rest".to_owned()));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        let mut decoders = DecodersState::default();
+        decoders.is_open = true;
+        decoders.measured = Some(DecoderResult::pending());
+        decoders.take(0, Err("no resistance at rest".to_owned()));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
         harness.get_by_label("Training mean: no resistance at rest");
         harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
@@ -178,9 +177,9 @@ mod tests {
 
     #[test]
     fn rows_that_were_not_solved_are_counted_below_the_table() {
-        let mut state = State::new(true);
-        state.decoders.is_open = true;
-        state.decoders.measured = Some(DecoderResult::pending());
+        let mut decoders = DecodersState::default();
+        decoders.is_open = true;
+        decoders.measured = Some(DecoderResult::pending());
         // Four electrodes are too few for six nodes.
         let mut settings = Preset::Best.settings();
         settings.source.sensor.scale = "10x6_3x4".parse().unwrap();
@@ -196,8 +195,8 @@ mod tests {
             .iter()
             .position(|result| result.kind == DecoderKind::Newton)
             .unwrap();
-        state.decoders.take(place, Ok(report));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &state, None, &mut Vec::new()));
+        decoders.take(place, Ok(report));
+        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
         harness.get_by_label_contains("Newton: 10 of 10 rows are not determined by their readings");
     }
 }

@@ -5,70 +5,81 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        file_task::FileTask,
-        shared::{Phase, RunResult, RunView, State},
+        shared::{Effect, FileTask, FileWords, Phase, Purpose, RunResult, RunView, Shared},
         theme::{Theme, space, type_size},
-        training_worker::ExportKind,
         views::train::{
             decoders::{REFERENCE, decoders_ui},
+            export_kind::{ExportKind, OPEN_CHECKPOINT, file_name},
             shown_figure::ShownPicture,
+            state::TrainView,
         },
         widgets::{Column, Row, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
-        window::Action,
     },
-    evaluation::{ErrorRow, ReferenceNote, error_rows},
+    evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_rows},
     export::{format_duration, format_number},
 };
 
 /// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
-pub fn report_ui(ui: &mut Ui, state: &State) -> Vec<Action> {
-    let mut actions = Vec::new();
+pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         section_heading_ui(ui, "Errors on the test set");
-        let shown = state.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+        let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
         if let Some((run, result)) = shown {
             let baselines = &run.baselines;
             error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
-            verdict_ui(ui, state, run, result);
+            verdict_ui(ui, shared, run, result);
             conditioning_ui(ui, &run.test);
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            worst_node_ui(ui, result, &mut actions);
-            decoders_ui(ui, state, baselines.reference.as_ref(), &mut actions);
+            if let Some(worst) = worst_node_ui(ui, result) {
+                view.go_to(worst, shared);
+            }
+            decoders_ui(ui, &mut view.decoders, shared.phase, baselines.reference.as_ref());
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.starts);
         } else {
-            expectation_ui(ui, state);
+            expectation_ui(ui, shared);
         }
         section_heading_ui(ui, "Export");
         for kind in ExportKind::ALL {
             // A training under way is held first.
-            let is_standing = kind != ExportKind::Checkpoint || matches!(state.phase, Phase::Paused | Phase::Ended(_));
-            let can_save = shown.is_some() && is_standing;
-            ui.add_enabled_ui(can_save, |ui| file_ui(ui, FileTask::Save(kind), &mut actions));
+            let is_standing = kind != ExportKind::Checkpoint || matches!(shared.phase, Phase::Paused | Phase::Ended(_));
+            let run = shown.map(|(run, _)| run).filter(|_| is_standing);
+            ui.add_enabled_ui(run.is_some(), |ui| {
+                file_ui(ui, kind.words(), false, || run.map(|run| kind.task(run)), effects);
+            });
         }
         for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
             ui.add_enabled_ui(shown.is_some(), |ui| {
-                file_ui(ui, FileTask::SavePicture(picture), &mut actions);
+                file_ui(ui, picture.words(), false, || picture.task(view, shared), effects);
             });
         }
         section_heading_ui(ui, "Open");
-        let can_open = !state.phase.is_busy() && state.phase != Phase::Died;
-        ui.add_enabled_ui(can_open, |ui| file_ui(ui, FileTask::OpenCheckpoint, &mut actions));
+        let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        ui.add_enabled_ui(can_open, |ui| {
+            let task = || {
+                let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
+                Some(FileTask {
+                    words: OPEN_CHECKPOINT,
+                    suggestion: file_name("training", OPEN_CHECKPOINT, settings),
+                    purpose: Purpose::Open,
+                })
+            };
+            file_ui(ui, OPEN_CHECKPOINT, true, task, effects);
+        });
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, result);
         }
     });
-    actions
 }
 
 /// The table with the network's row still empty.
-fn expectation_ui(ui: &mut Ui, state: &State) {
-    let known = state.preview.as_ref();
+fn expectation_ui(ui: &mut Ui, shared: &Shared) {
+    let known = shared.preview.as_ref();
     if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
-        let published = state.draft.published();
+        let published = shared.draft.published();
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
             *row = ErrorRow {
@@ -86,7 +97,7 @@ fn expectation_ui(ui: &mut Ui, state: &State) {
         ui.add_space(space(2));
     }
     let text = "Press Train to fill in the network's row.";
-    if state.draft.is_papers_scene() {
+    if shared.draft.is_papers_scene() {
         dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
     } else {
         dim_ui(ui, text);
@@ -147,7 +158,7 @@ fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
 }
 
 /// Says plainly where the network loses, and what would help; or by how much it wins. Nothing while it still learns.
-fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
+fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
     let baselines = &run.baselines;
@@ -175,7 +186,7 @@ fn verdict_ui(ui: &mut Ui, state: &State, run: &RunView, result: &RunResult) {
         };
         dim_ui(ui, &text);
     }
-    if run.asked != state.draft {
+    if run.asked != shared.draft {
         dim_ui(ui, "The settings have changed since this training.");
     }
 }
@@ -192,7 +203,9 @@ fn dim_ui(ui: &mut Ui, text: &str) {
     ui.label(RichText::new(text).size(type_size().note).color(dim));
 }
 
-fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
+/// Returns the worst node, if the user wants to see it.
+fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
+    let mut is_wanted = false;
     let worst = result.errors.worst_node;
     ui.add_space(space(1));
     ui.horizontal(|ui| {
@@ -205,15 +218,11 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult, actions: &mut Vec<Action>) {
                 worst.row + 1,
                 worst.node + 1
             );
-            if ui
-                .small_button("Show")
-                .on_hover_text(format!("Go to {place}"))
-                .clicked()
-            {
-                actions.push(Action::GoTo(worst));
-            }
+            let show = ui.small_button("Show").on_hover_text(format!("Go to {place}"));
+            is_wanted = show.clicked();
         });
     });
+    is_wanted.then_some(worst)
 }
 
 /// How many weights the data determine, where the method estimates it.
@@ -267,18 +276,30 @@ fn format_short_time(time: Duration) -> String {
 
 const PATH_BUTTON_WIDTH: f32 = space(24);
 
-fn file_ui(ui: &mut Ui, task: FileTask, actions: &mut Vec<Action>) {
+/// Two buttons that ask for the path of a file; `task` tells what is to be done with it then.
+fn file_ui(
+    ui: &mut Ui,
+    words: FileWords,
+    is_read: bool,
+    task: impl Fn() -> Option<FileTask>,
+    effects: &mut Vec<Effect>,
+) {
     ui.horizontal(|ui| {
         let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button(task.name()).min_size([width, space(7)].into());
-        if ui.add(button).on_hover_text(task.description()).clicked() {
-            actions.push(Action::ChooseFile(task));
+        let button = ghost_button(words.name).min_size([width, space(7)].into());
+        if ui.add(button).on_hover_text(words.description).clicked() {
+            effects.extend(task().map(Effect::ChooseFile));
         }
         let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
         let is_enabled = path.enabled();
-        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, task.path_name()));
+        let verb = if is_read {
+            "Type the path of a"
+        } else {
+            "Type a path for the"
+        };
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, format!("{verb} {}", words.kind)));
         if path.on_hover_text("Type the path instead of choosing it").clicked() {
-            actions.push(Action::TypePath(task));
+            effects.extend(task().map(Effect::TypePath));
         }
     });
 }

@@ -2,43 +2,41 @@ use std::time::Duration;
 
 use eframe::egui::{Align, Color32, Layout, RichText, Sense, Ui, Vec2};
 
+use super::{Phase, RunView, Shared};
 use crate::{
-    app::{
-        shared::{Phase, RunView, State},
-        theme::{Theme, space, type_size},
-    },
+    app::theme::{Theme, space, type_size},
     export::{format_duration, format_number, format_percent},
     training::StopReason,
 };
 
 /// What is going on: phase, epoch, error, speed, time left, and why it stopped.
-pub fn status_line_ui(ui: &mut Ui, state: &State) {
+pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
         ui.spacing_mut().item_spacing.x = space(4);
-        let (colour, text) = phase_in_words(state, ui);
+        let (colour, text) = phase_in_words(shared, ui);
         let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
         ui.painter().circle_filled(dot.center(), 4.0, colour);
         ui.spacing_mut().item_spacing.x = space(4);
         ui.label(RichText::new(text).size(type_size().note));
-        let Some(run) = state
+        let Some(run) = shared
             .shown_run()
-            .or(state.run.as_ref().filter(|_| state.phase.is_busy()))
+            .or(shared.run.as_ref().filter(|_| shared.phase.is_busy()))
         else {
             return;
         };
-        for part in progress_in_words(run, state.phase) {
+        for part in progress_in_words(run, shared.phase) {
             ui.label(RichText::new(part).size(type_size().note).color(palette.dim));
         }
-        if state.phase.is_busy() {
+        if shared.phase.is_busy() {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| progress_bar_ui(ui, run));
         }
     });
 }
 
-fn phase_in_words(state: &State, ui: &Ui) -> (Color32, String) {
+fn phase_in_words(shared: &Shared, ui: &Ui) -> (Color32, String) {
     let palette = Theme::of(ui).palette;
-    match state.phase {
+    match shared.phase {
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
         Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),

@@ -10,14 +10,13 @@ use std::{
 
 use rfd::FileHandle;
 
-use super::file_task::FileTask;
-use crate::export::figures::PictureFormat;
+use crate::app::{shared::FileTask, threads::Wake};
 
 /// An answer sooner than this was no person's: the desktop has no dialog to show.
 const NO_PERSON: Duration = Duration::from_millis(250);
 
 /// What became of a question for a path.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum Answer {
     /// The user chose this file.
     Chosen(FileTask, PathBuf),
@@ -57,34 +56,31 @@ impl Dialogs {
 
     /// Asks for the path of a file; `wake` is called when the answer is there. Must run on the window's thread, which
     /// some desktops require.
-    pub fn ask(&self, task: FileTask, suggestion: &std::path::Path, wake: impl FnOnce() + Send + 'static) {
+    pub fn ask(&self, task: FileTask, wake: Wake) {
         let send = self.outgoing.clone();
-        let no_dialog = Answer::NoDialog(task);
+        let no_dialog = Answer::NoDialog(task.clone());
         if self.kind == DialogKind::None {
             // The receiver lives as long as `self`.
             let _ = send.send(no_dialog);
             return;
         }
-        let extension = task.extension();
-        let mut dialog = rfd::AsyncFileDialog::new()
-            .set_title(format!("{} {}", task.verb(), task.file_kind()))
-            .add_filter(extension.to_uppercase(), &[extension]);
+        let suggestion = task.suggested_path();
+        let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+        for extension in task.words.extensions {
+            dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
+        }
         if let Some(folder) = suggestion.parent() {
             dialog = dialog.set_directory(folder);
         }
-        if let FileTask::SavePicture(_) = task {
-            dialog = dialog.add_filter("SVG", &[PictureFormat::Svg.extension()]);
-        }
         let asked = Instant::now();
-        let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match task {
-            FileTask::Save(_) | FileTask::SaveExperiment(..) | FileTask::SaveTrade(_) | FileTask::SavePicture(_) => {
-                if let Some(name) = suggestion.file_name() {
-                    dialog = dialog.set_file_name(name.to_string_lossy());
-                }
-                Box::pin(dialog.save_file())
-            }
+        let choice: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = if task.is_read() {
             // The terminal gives checkpoints any name.
-            FileTask::OpenCheckpoint => Box::pin(dialog.add_filter("All files", &["*"]).pick_file()),
+            Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
+        } else {
+            if let Some(name) = suggestion.file_name() {
+                dialog = dialog.set_file_name(name.to_string_lossy());
+            }
+            Box::pin(dialog.save_file())
         };
         let wait = move || {
             let answer = match pollster::block_on(choice) {

@@ -1,0 +1,158 @@
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
+    thread,
+};
+
+use ndarray::Array2;
+
+use crate::{
+    app::{
+        shared::{Effect, Notice, RightCard, RunList},
+        test_view::{Frame, TestView},
+        threads::{Report, Wake, next_event, yield_to_window},
+    },
+    export::NetworkFile,
+};
+
+/// The Compare view.
+pub struct CompareView {
+    /// What is drawn in the two places.
+    pub places: [Place; 2],
+    /// Snapshot of both test sets.
+    pub snapshot: usize,
+    /// What is shown of both networks.
+    pub card: RightCard,
+    /// The run that the user is asked about before it is removed.
+    pub removing: Option<u64>,
+    wake: Wake,
+}
+
+/// One of the two places.
+#[derive(Debug, Default)]
+pub struct Place {
+    /// The run in it.
+    id: Option<u64>,
+    /// What is drawn of it, once it is prepared.
+    pub compared: Option<Compared>,
+    /// Where that comes from.
+    news: Option<Receiver<Result<Box<Compared>, String>>>,
+}
+
+/// A run as it is drawn.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// Its test set.
+    pub test: TestView,
+    /// What its network makes of it: samples × 3·M2.
+    pub decoupled_mm: Arc<Array2<f64>>,
+    /// The snapshot on show: actual, decoupled, difference.
+    pub frames: [Frame; 3],
+}
+
+impl Compared {
+    fn new(file: &NetworkFile) -> Result<Self, String> {
+        let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
+        let decoupled_mm = Arc::new(file.network.decouple(&test.set));
+        let mut compared = Self {
+            test,
+            decoupled_mm,
+            frames: Default::default(),
+        };
+        compared.show(0);
+        Ok(compared)
+    }
+
+    /// Makes the frames of `snapshot`, or of the last one if there are fewer.
+    fn show(&mut self, snapshot: usize) {
+        let snapshot = self.test.nearest_snapshot(snapshot);
+        let actual = self.test.frame(self.test.set.targets(), snapshot);
+        let decoupled = self.test.frame(self.decoupled_mm.view(), snapshot);
+        let error = actual.error_of(&decoupled);
+        self.frames = [actual, decoupled, error];
+    }
+}
+
+impl CompareView {
+    /// Nothing compared yet. `wake` is called when there is something to be drawn.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            places: Default::default(),
+            snapshot: 0,
+            card: RightCard::default(),
+            removing: None,
+            wake,
+        }
+    }
+
+    /// Shows this snapshot of both test sets.
+    pub(super) fn show_snapshot(&mut self, snapshot: usize) {
+        self.snapshot = snapshot;
+        for compared in self.places.iter_mut().filter_map(|place| place.compared.as_mut()) {
+            compared.show(snapshot);
+        }
+    }
+
+    /// How many snapshots the larger of the two test sets has.
+    pub(super) fn snapshots(&self) -> usize {
+        let compared = self.places.iter().filter_map(|place| place.compared.as_ref());
+        compared
+            .map(|compared| compared.test.snapshots.len())
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.
+    pub(super) fn follow(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
+        for (number, place) in self.places.iter_mut().enumerate() {
+            let run = runs.pinned(number);
+            if place.id != run.map(|run| run.id) {
+                *place = Place::default();
+                if let Some(run) = run {
+                    (place.id, place.news) = (Some(run.id), prepare(&run.file, &self.wake));
+                }
+            }
+            let Some(news) = &place.news else { continue };
+            let prepared = match next_event(news) {
+                Ok(Some(prepared)) => prepared,
+                Ok(None) => continue,
+                Err(_) => Err("The surfaces of this run could not be prepared: try again.".to_owned()),
+            };
+            place.news = None;
+            match prepared {
+                Ok(mut compared) => {
+                    if self.snapshot > 0 {
+                        compared.show(self.snapshot);
+                    }
+                    place.compared = Some(*compared);
+                }
+                Err(reason) => {
+                    effects.extend([Effect::PinRun(number, None), Effect::Tell(Notice::Failed(reason))]);
+                }
+            }
+        }
+    }
+}
+
+/// Draws the test set of a run and what its network makes of it, on a thread of its own.
+fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Option<Receiver<Result<Box<Compared>, String>>> {
+    let (outgoing, news) = channel();
+    let report = Report::new(outgoing, Arc::clone(wake));
+    let file = Arc::clone(file);
+    let work = move || {
+        yield_to_window();
+        report.send(Compared::new(&file).map(Box::new));
+    };
+    // Without a thread the other end is gone, which the next look at the news shows.
+    let _ = thread::Builder::new().name("compared run".to_owned()).spawn(work);
+    Some(news)
+}
+
+impl fmt::Debug for CompareView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("CompareView").finish_non_exhaustive()
+    }
+}
