@@ -62,6 +62,17 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
+    // What is compared is saved as it is in view, by the names of the runs.
+    let saved = folder.path().join("compared.svg");
+    driver.save("Surfaces, PNG or SVG…", &saved);
+    driver.click("Dismiss");
+    let svg = fs::read_to_string(saved).unwrap();
+    let titles = [
+        "A: Six hidden nodes, decoupled".to_owned(),
+        format!("B: {SECOND}, decoupled"),
+    ];
+    assert_eq!(titles.map(|title| count(&svg, &title)), [1, 1]);
+    assert_eq!(count(&svg, "z (mm)"), 3, "two axes and one key");
     let check = |driver: &Driver| {
         let [a, b] = shown.each_ref().map(|file| file.errors);
         for (letter, errors) in [("A", a), ("B", b)] {

@@ -8,7 +8,7 @@ use glam::Vec2;
 use super::ribbon;
 use crate::{
     app::theme::{Palette, Theme, rgb, type_size},
-    figure::surface::{self, Bounds, Card, Disc, DiscShape, Dots, Ink, Line, OrbitCamera, Surface, Text, ViewMode},
+    figure::surface::{self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Surface, Text, ViewMode},
 };
 
 /// A laid-out surface and what it was made of.
@@ -70,12 +70,18 @@ impl Painted {
     pub(super) fn paint(&self, painter: &Painter, palette: &Palette, marked: Option<usize>) {
         paint_frame(painter, palette, &self.lines, &self.texts);
         painter.add(Shape::Mesh(Arc::clone(&self.mesh)));
-        for disc in self.dots.discs(marked) {
-            let Disc { at, radius, .. } = disc;
-            let colour = ink(disc.ink, palette).gamma_multiply(disc.opacity);
-            match disc.shape {
-                DiscShape::Filled => painter.circle_filled(to_egui(at), radius, colour),
-                DiscShape::Ring(width) => painter.circle_stroke(to_egui(at), radius, Stroke::new(width, colour)),
+        for Disc {
+            at,
+            radius,
+            ring,
+            ink,
+            opacity,
+        } in self.dots.discs(marked)
+        {
+            let (at, colour) = (to_egui(at), colour(ink, palette).gamma_multiply(opacity));
+            match ring {
+                Some(width) => painter.circle_stroke(at, radius, Stroke::new(width, colour)),
+                None => painter.circle_filled(at, radius, colour),
             };
         }
     }
@@ -85,7 +91,7 @@ impl Painted {
 pub(super) fn paint_frame(painter: &Painter, palette: &Palette, lines: &[Line], texts: &[Text]) {
     for line in lines {
         let ends = [line.from, line.to].map(to_egui);
-        painter.line_segment(ends, Stroke::new(1.0, ink(line.ink, palette)));
+        painter.line_segment(ends, Stroke::new(1.0, colour(line.ink, palette)));
     }
     let pixel = painter.pixels_per_point();
     for Text { bounds, text } in texts {
@@ -134,7 +140,7 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
     mesh
 }
 
-fn ink(ink: Ink, palette: &Palette) -> Color32 {
+fn colour(ink: Ink, palette: &Palette) -> Color32 {
     match ink {
         Ink::Grid => palette.line,
         Ink::Edge => palette.line.lerp_to_gamma(palette.dim, 0.45),

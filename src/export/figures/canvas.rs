@@ -176,19 +176,16 @@ impl Canvas {
         ));
     }
 
-    pub fn pale_disc(&mut self, at: At, radius: f64, fill: Rgb, opacity: f64) {
-        let ([x, y], radius, fill, opacity) = (at.map(number), number(radius), hex(fill), number(opacity));
-        self.put(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" fill-opacity="{opacity}"/>"#
-        ));
-    }
-
-    pub fn pale_ring(&mut self, at: At, radius: f64, stroke: Stroke, opacity: f64) {
-        let ([x, y], radius, style) = (at.map(number), number(radius), stroke_style(stroke));
-        let opacity = number(opacity);
-        self.put(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="none" {style} stroke-opacity="{opacity}"/>"#
-        ));
+    /// A filled circle, or a ring with a line of this width.
+    pub fn circle(&mut self, at: At, radius: f64, ring: Option<f64>, colour: Rgb, opacity: f64) {
+        let ([x, y], radius, colour, opacity) = (at.map(number), number(radius), hex(colour), number(opacity));
+        let style = match ring.map(number) {
+            Some(width) => {
+                format!(r#"fill="none" stroke="{colour}" stroke-width="{width}" stroke-opacity="{opacity}""#)
+            }
+            None => format!(r#"fill="{colour}" fill-opacity="{opacity}""#),
+        };
+        self.put(format_args!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
     }
 
     pub fn ring(&mut self, at: At, radius: f64, stroke: Stroke) {

@@ -13,8 +13,7 @@ use super::{
 use crate::figure::{
     ColourMap,
     surface::{
-        Bounds, Card, ColourScale, ContourLine, Disc, DiscShape, Drawing, Ink, Line, Mesh, Quantity, Surface,
-        SurfaceFigure, Text,
+        Bounds, Card, ColourScale, ContourLine, Disc, Drawing, Ink, Line, Mesh, Quantity, Surface, SurfaceFigure, Text,
     },
 };
 
@@ -166,20 +165,14 @@ impl Pen<'_> {
         for Disc {
             at,
             radius,
-            shape,
+            ring,
             ink,
             opacity,
         } in drawing.dots.discs(marked_node)
         {
-            let (at, radius, ink) = (self.at(at), f64::from(radius) * SCALE, rgb(ink));
-            let opacity = f64::from(opacity);
-            match shape {
-                DiscShape::Filled => self.canvas.pale_disc(at, radius, ink, opacity),
-                DiscShape::Ring(width) => {
-                    let stroke = Stroke::new(ink, f64::from(width) * SCALE);
-                    self.canvas.pale_ring(at, radius, stroke, opacity);
-                }
-            }
+            let [radius, opacity] = [radius, opacity].map(f64::from);
+            let ring = ring.map(|width| f64::from(width) * SCALE);
+            self.canvas.circle(self.at(at), radius * SCALE, ring, rgb(ink), opacity);
         }
     }
 

@@ -4,7 +4,7 @@ use std::ops::{Range, RangeInclusive};
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{contour::cross_cell, field::Field, plan_axes::PlanAxes, projection::Projection};
+use super::{contour::cross_cell, field::Field, light::Shade, plan_axes::PlanAxes, projection::Projection};
 use crate::figure::{
     colour_map::{ColourMap, Rgb, is_light},
     ticks::{multiples, step_for},
@@ -12,8 +12,6 @@ use crate::figure::{
 
 /// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
 const MARGIN_OPACITY: f32 = 0.6;
-const AMBIENT: f32 = 0.66;
-const DIRECT: f32 = 0.38;
 const CONTOUR_LEVELS: usize = 10;
 const CONTOUR_OPACITY: f32 = 0.34;
 
@@ -206,36 +204,6 @@ fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
     let step = step_for(range, CONTOUR_LEVELS);
     let is_within = |level: &f64| level - range.start() > 1e-3 * step && range.end() - level > 1e-3 * step;
     multiples(range, step).into_iter().filter(is_within).collect()
-}
-
-/// Lambert's law, with a light that follows the viewer: from above, over the left shoulder.
-struct Shade<'a> {
-    units: &'a [Vec3],
-    nx: usize,
-    ny: usize,
-    light: Vec3,
-}
-
-impl<'a> Shade<'a> {
-    fn new(units: &'a [Vec3], ny: usize, eye: Vec3) -> Self {
-        let towards_eye = Vec3::new(eye.x, eye.y, 0.0).normalize_or(Vec3::X);
-        let left = Vec3::new(towards_eye.y, -towards_eye.x, 0.0);
-        let light = (towards_eye * 0.35 + left * 0.55 + Vec3::Z * 0.9).normalize();
-        Self {
-            units,
-            nx: units.len() / ny,
-            ny,
-            light,
-        }
-    }
-
-    fn at(&self, ix: usize, iy: usize) -> f32 {
-        let unit = |ix: usize, iy: usize| self.units[ix * self.ny + iy];
-        let slope_x = unit((ix + 1).min(self.nx - 1), iy) - unit(ix.saturating_sub(1), iy);
-        let slope_y = unit(ix, (iy + 1).min(self.ny - 1)) - unit(ix, iy.saturating_sub(1));
-        // NaN falls through `max` as darkness, on points that are not drawn.
-        AMBIENT + DIRECT * slope_x.cross(slope_y).normalize_or(Vec3::Z).dot(self.light).max(0.0)
-    }
 }
 
 /// Cells of an axis, farthest first: from both ends towards the eye.

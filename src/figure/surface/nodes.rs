@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2};
 use super::{
     field::Field,
     mesh::Stage,
-    shapes::{Bounds, Disc, DiscShape, Ink},
+    shapes::{Bounds, Disc, Ink},
 };
 use crate::surface::Grid;
 
@@ -89,7 +89,7 @@ impl Dots {
             [(Ink::Rim, radius + 0.75, 0.45 * opacity), (ink, radius, opacity)].map(|(ink, radius, opacity)| Disc {
                 at: dot.at,
                 radius,
-                shape: DiscShape::Filled,
+                ring: None,
                 ink,
                 opacity,
             })
@@ -97,14 +97,14 @@ impl Dots {
         let marked = marked.and_then(|node| self.position(node)).into_iter();
         let mark = marked.flat_map(|at| {
             [
-                (Ink::Accent, 3.0, DiscShape::Filled, 1.0),
-                (Ink::Ground, 6.5, DiscShape::Ring(3.5), 0.8),
-                (Ink::Text, 6.5, DiscShape::Ring(1.5), 1.0),
+                (Ink::Accent, 3.0, None, 1.0),
+                (Ink::Ground, 6.5, Some(3.5), 0.8),
+                (Ink::Text, 6.5, Some(1.5), 1.0),
             ]
-            .map(|(ink, radius, shape, opacity)| Disc {
+            .map(|(ink, radius, ring, opacity)| Disc {
                 at,
                 radius,
-                shape,
+                ring,
                 ink,
                 opacity,
             })

@@ -52,21 +52,12 @@ pub struct Disc {
     pub at: Vec2,
     /// Its radius; of a ring, in the middle of its line.
     pub radius: f32,
-    /// Filled or a ring.
-    pub shape: DiscShape,
+    /// Width of the line of a ring; `None` for a filled disc.
+    pub ring: Option<f32>,
     /// Its colour.
     pub ink: Ink,
     /// 1 hides what lies behind it.
     pub opacity: f32,
-}
-
-/// Shape of a [`Disc`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DiscShape {
-    /// Filled.
-    Filled,
-    /// A line of this width around the centre.
-    Ring(f32),
 }
 
 /// A rectangle.

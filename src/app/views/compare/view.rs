@@ -9,7 +9,7 @@ use super::{
 use crate::{
     app::{
         plotting::{legend_ui, legend_width},
-        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View},
+        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_surfaces_ui},
         surface_view::{ColourBar, SurfaceView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
@@ -45,7 +45,7 @@ impl View for CompareView {
         let upper = upper.with_max_y(upper.max.y - gap);
         let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
         let width = 0.5 * (cards.width() - gap);
-        let figure = self.figure(shared.look);
+        let figure = self.figure(shared);
         let mut surfaces = figure.surfaces.iter();
         for place in 0..2 {
             let surface = self.places[place].compared.as_ref().and_then(|_| surfaces.next());
@@ -66,6 +66,7 @@ impl View for CompareView {
             scrolled_ui(ui, "compared figures", |ui| {
                 section_heading_ui(ui, "Errors on the test sets");
                 figures_ui(ui, &shared.runs);
+                export_surfaces_ui(ui, figure, "compared-surfaces.png", effects);
             });
         });
         ui.allocate_rect(whole, Sense::hover());
@@ -74,17 +75,20 @@ impl View for CompareView {
 
 impl CompareView {
     /// The surfaces of the runs that are prepared, with one scale.
-    fn figure(&self, look: Look) -> SurfaceFigure {
-        let surface = |compared: &Compared| {
-            let [_, decoupled, error] = &compared.frames;
-            match self.card {
-                RightCard::Decoupled => compared.test.heights("Decoupled", decoupled, look.mode),
-                RightCard::Error => compared.test.errors("Error", error, look.mode),
-            }
+    fn figure(&self, shared: &Shared) -> SurfaceFigure {
+        let look = shared.look;
+        let surface = |place: usize| {
+            let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
+            let [_, decoupled, error] = frames;
+            let name = shared.runs.pinned(place).map_or("", |run| &run.name);
+            let (letter, mode) = (PLACES[place], look.mode);
+            Some(match self.card {
+                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, mode),
+                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, mode),
+            })
         };
-        let prepared = self.places.iter().filter_map(|place| place.compared.as_ref());
         SurfaceFigure {
-            surfaces: prepared.map(surface).collect(),
+            surfaces: (0..self.places.len()).filter_map(surface).collect(),
             camera: look.camera,
             marked_node: None,
         }

@@ -5,7 +5,7 @@ use eframe::egui::{Align, Layout, Rect, Response, RichText, Sense, Ui, UiBuilder
 use super::{Analysis, IdentifiabilityView, facts::facts_ui, form, singular_values::singular_values_ui};
 use crate::{
     app::{
-        shared::{Effect, Look, Shared, View},
+        shared::{Effect, Look, Shared, View, export_surfaces_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
@@ -95,6 +95,7 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
                 note_ui(ui, problem);
             }
             facts_ui(ui, analysis);
+            export_surfaces_ui(ui, figure, "identifiability.png", effects);
         });
     });
     ui.allocate_rect(whole, Sense::hover());

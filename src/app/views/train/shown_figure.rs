@@ -11,14 +11,11 @@ use super::{
 use crate::{
     app::{
         plotting::plot_style::thinned,
-        shared::{FileTask, FileWords, RunResult, RunView, Shared},
+        shared::{FileTask, FileWords, RunResult, RunView, SURFACES, Shared},
         test_view::Frame,
     },
-    export::figures::{
-        Hue, Marker, Picture, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, draw_surfaces,
-        node_plot,
-    },
-    figure::surface::{SurfaceFigure, ViewMode},
+    export::figures::{Hue, Marker, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, node_plot},
+    figure::surface::ViewMode,
     training::EpochRecord,
 };
 
@@ -31,45 +28,17 @@ pub enum ShownPicture {
     Chart,
 }
 
-/// A figure not yet drawn, which takes a while.
-#[derive(Clone, Debug)]
-enum Undrawn {
-    /// Surfaces.
-    Surfaces(SurfaceFigure),
-    /// A chart.
-    Plot(Plot),
-}
-
-impl Undrawn {
-    fn draw(&self) -> Picture {
-        match self {
-            Self::Surfaces(figure) => draw_surfaces(figure),
-            Self::Plot(plot) => plot.draw(),
-        }
-    }
-}
-
 impl ShownPicture {
     /// What the file is called.
     pub fn words(self) -> FileWords {
-        let (name, kind, description) = match self {
-            Self::Surfaces => (
-                "Surfaces, PNG or SVG…",
-                "picture of the surfaces",
-                "The surfaces as they are in view, with the camera and the error card, for print: on a light ground, as PNG \
-                 or SVG as the name ends.",
-            ),
-            Self::Chart => (
-                "Chart, PNG or SVG…",
-                "picture of the chart",
-                "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
-            ),
-        };
-        FileWords {
-            name,
-            kind,
-            description,
-            extensions: &["png", "svg"],
+        match self {
+            Self::Surfaces => SURFACES,
+            Self::Chart => FileWords {
+                name: "Chart, PNG or SVG…",
+                kind: "picture of the chart",
+                description: "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
+                extensions: &["png", "svg"],
+            },
         }
     }
 
@@ -77,10 +46,7 @@ impl ShownPicture {
     pub fn task(self, view: &TrainView, shared: &Shared) -> Option<FileTask> {
         let run = shared.shown_run()?;
         let result = run.result.as_ref()?;
-        let picture = match self {
-            Self::Surfaces => Undrawn::Surfaces(surface_figure(view, shared)),
-            Self::Chart => Undrawn::Plot(chart(view, run, result)?),
-        };
+        let words = self.words();
         let what = match (self, shared.look.mode, view.tab) {
             (Self::Surfaces, ViewMode::ThreeD, _) => "surfaces",
             (Self::Surfaces, ViewMode::Top, _) => "surfaces-top",
@@ -90,12 +56,16 @@ impl ShownPicture {
             (Self::Chart, _, BottomTab::Regression) => "regression",
             (Self::Chart, _, BottomTab::Nodes) => "nodes",
         };
-        let words = self.words();
+        let name = file_name(what, words, &run.settings);
+        if self == Self::Surfaces {
+            return Some(FileTask::surfaces(surface_figure(view, shared), name));
+        }
+        let plot = chart(view, run, result)?;
         let write = move |path: &Path| -> Result<(), PictureError> {
             let format = PictureFormat::of_path(path)?;
-            picture.draw().save(format, path)
+            plot.draw().save(format, path)
         };
-        Some(FileTask::save(words, file_name(what, words, &run.settings), write))
+        Some(FileTask::save(words, name, write))
     }
 }
 
