@@ -258,12 +258,15 @@ fn saved_surfaces_are_seen_by_the_camera_in_view() {
         first == saved_surfaces(&mut driver),
         "the same view gives the same picture"
     );
-    driver.get("Actual surface").focus();
-    driver.settle();
-    driver.press(Key::ArrowLeft);
+    let press = |driver: &mut Driver, key| {
+        driver.get("Actual surface").focus();
+        driver.settle();
+        driver.press(key);
+    };
+    press(&mut driver, Key::ArrowLeft);
     let turned = saved_surfaces(&mut driver);
     assert!(first != turned, "the camera was turned");
-    driver.press(Key::Home);
+    press(&mut driver, Key::Home);
     assert!(first == saved_surfaces(&mut driver), "the camera was turned back");
     driver.click("Top view");
     let from_above = saved_surfaces(&mut driver);
