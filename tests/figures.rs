@@ -3,14 +3,9 @@
 #![cfg(feature = "figures")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use decoupler::{
-    export::figures::{
-        HeatMap, Hue, Marker, Picture, PictureFormat, Plot, PlotAxis, PlotPoint, Series, SurfaceFigure, SurfaceLook,
-        SurfacePanel, node_plot,
-    },
-    surface::SurfaceMap,
+use decoupler::export::figures::{
+    HeatMap, Hue, Marker, Picture, PictureFormat, Plot, PlotAxis, PlotPoint, Series, node_plot,
 };
-use glam::DVec3;
 use image::GenericImageView as _;
 use ndarray::Array2;
 
@@ -49,18 +44,6 @@ fn discs(picture: &Picture) -> Vec<[f64; 2]> {
     };
     let lines = picture.svg().lines().filter(|line| line.starts_with("<circle"));
     lines.map(|line| [number(line, "cx"), number(line, "cy")]).collect()
-}
-
-/// Colours of filled rectangles and how many there are of each, the most frequent first.
-fn colours(picture: &Picture) -> Vec<(String, usize)> {
-    let mut colours = std::collections::BTreeMap::new();
-    for line in picture.svg().lines().filter(|line| line.contains("crispEdges")) {
-        let fill = line.split("fill=\"").nth(1).unwrap();
-        *colours.entry(fill[..7].to_owned()).or_insert(0) += 1;
-    }
-    let mut colours: Vec<_> = colours.into_iter().collect();
-    colours.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    colours
 }
 
 #[test]
@@ -130,53 +113,6 @@ fn png_has_300_dots_an_inch_and_text_from_the_programs_own_fonts() {
     let strip = (png.height() - 80..png.height()).flat_map(|y| (0..png.width()).map(move |x| (x, y)));
     let ink = strip.filter(|&(x, y)| png.get_pixel(x, y).0[0] < 100).count();
     assert!(ink > 200, "{ink} dark pixels");
-}
-
-#[test]
-fn both_surfaces_have_one_scale_of_colours() {
-    let places: Vec<f64> = (0..4).map(f64::from).collect();
-    let map = SurfaceMap::new(&places, &places).unwrap();
-    let level = |title: &str, z_mm: f64| SurfacePanel {
-        title: title.to_owned(),
-        values_mm: vec![z_mm; map.grid().len()],
-        nodes_mm: vec![DVec3::new(0.0, 0.0, z_mm)],
-    };
-    let figure = |panels| SurfaceFigure {
-        grid: map.grid().clone(),
-        interpolation: map.interpolation(),
-        panels,
-        range_mm: 4.0..=5.0,
-        look: SurfaceLook::Top,
-    };
-    let same = figure(vec![level("Actual", 4.5), level("Decoupled", 4.5)]).draw();
-    let other = figure(vec![level("Actual", 4.5), level("Decoupled", 5.0)]).draw();
-    let caption = "Between the nodes: thin-plate spline (the biharmonic spline with a plane).";
-    assert_eq!(count(&same, caption), 1);
-    let [at_4_5, at_5] = [&same, &other].map(colours);
-    let (colour, cells) = &at_4_5[0];
-    assert!(*cells > 100 && cells % 2 == 0, "{at_4_5:?}");
-    let here: Vec<_> = at_5.iter().filter(|(_, count)| 2 * count >= *cells).collect();
-    assert_eq!(here.len(), 2, "each panel has the colour of its own height: {at_5:?}");
-    assert!(
-        here.iter().any(|(other, _)| other == colour),
-        "4.5 mm has one colour in both figures"
-    );
-    for look in [SurfaceLook::Top, SurfaceLook::ThreeD] {
-        let mut panel = level("Actual", 4.5);
-        panel.values_mm[0] = f64::NAN;
-        panel.values_mm[40] = f64::NAN;
-        let picture = SurfaceFigure {
-            look,
-            ..figure(vec![panel, level("Decoupled", 9.0)])
-        };
-        let picture = picture.draw();
-        assert_eq!(count(&picture, "NaN"), 0);
-        assert_eq!(
-            count(&picture, "(mm)"),
-            2 * if look == SurfaceLook::Top { 2 } else { 3 } + 1
-        );
-        picture.png().unwrap();
-    }
 }
 
 #[test]

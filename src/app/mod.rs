@@ -24,7 +24,7 @@ mod views;
 mod widgets;
 mod window;
 
-use crate::export::ticks;
+use crate::figure::ticks;
 
 pub use shared::{
     Columns, Contents, Effect, FileTask, FileWords, Look, Notice, PLACES, Phase, Preview, Purpose, RightCard, RunList,

@@ -20,8 +20,6 @@ mod samples;
 mod sealed;
 mod soundness;
 mod tables;
-#[cfg(feature = "figures")]
-pub(crate) mod ticks;
 mod trade_file;
 #[cfg(feature = "figures")]
 mod trade_plot;

@@ -146,3 +146,22 @@ fn everything_keeps_to_a_narrow_window() {
         assert!(rect.max.x <= 1024.0 && rect.width() > 40.0, "{label}: {rect}");
     }
 }
+
+#[test]
+fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("identifiability.svg");
+    let mut driver = open();
+    driver.save("Surfaces, PNG or SVG…", &path);
+    let svg = std::fs::read_to_string(path).unwrap();
+    let says = |text: &str| svg.matches(&format!(">{text}</text>")).count();
+    assert_eq!(
+        [says("Worst-seen deformation"), says("Sensitivity of each node")],
+        [1, 1]
+    );
+    assert_eq!(
+        [says("pattern"), says("1/mm")],
+        [2, 1],
+        "an axis and a key, a key from above"
+    );
+}

@@ -3,8 +3,9 @@
 use std::{thread, time::Duration};
 
 use decoupler::{
-    app::{Phase, surface_view::ViewMode},
+    app::Phase,
     evaluation::{Run, SimulatedSettings},
+    figure::surface::ViewMode,
     training::{Method, MomentumSettings, StopReason},
 };
 use eframe::egui::{Key, Modifiers};

@@ -8,6 +8,7 @@ mod notice;
 mod run_list;
 mod run_view;
 mod state;
+mod surface_file;
 mod training_status;
 mod view;
 
@@ -19,5 +20,6 @@ pub use notice::Notice;
 pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;
 pub use state::{Phase, Preview, Shared};
+pub use surface_file::{SURFACES, export_surfaces_ui};
 use training_status::training_status_ui;
 pub use view::{Columns, View};

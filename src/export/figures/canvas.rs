@@ -104,12 +104,27 @@ impl Canvas {
         self.put(format_args!(r#"<polyline points="{points}" fill="none" {style}/>"#));
     }
 
-    /// A filled shape; a hairline of its own colour closes the seam to its neighbours.
-    pub fn facet(&mut self, corners: &[At], fill: Rgb) {
-        let (points, fill) = (coordinates(corners), hex(fill));
-        self.put(format_args!(
-            r#"<polygon points="{points}" fill="{fill}" stroke="{fill}" stroke-width=".3"/>"#
-        ));
+    /// Begins a group of [`Self::facet`]s.
+    pub fn begin_facets(&mut self) {
+        self.put(r#"<g fill="currentColor" stroke="currentColor" stroke-width=".3">"#);
+    }
+
+    /// Ends a group.
+    pub fn end_group(&mut self) {
+        self.put("</g>");
+    }
+
+    /// A piece of a surface. A hairline of its own colour closes the seam to its neighbours; where it lets shine through
+    /// what lies behind it, its edges are sharp instead, for the hairlines would show.
+    pub fn facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
+        let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
+        if opacity == "1" {
+            self.put(format_args!(r#"<path color="{fill}" d="M{points}z"/>"#));
+        } else {
+            self.put(format_args!(
+                r#"<path color="{fill}" d="M{points}z" fill-opacity="{opacity}" stroke="none" shape-rendering="crispEdges"/>"#
+            ));
+        }
     }
 
     /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
@@ -126,6 +141,18 @@ impl Canvas {
         self.put(format_args!(
             r#"<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="{fill}" shape-rendering="crispEdges"/>"#
         ));
+    }
+
+    /// Straight lines that do not cover each other.
+    pub fn segments(&mut self, ends: &[[At; 2]], stroke: Stroke, opacity: f64) {
+        let pieces = ends.iter().map(|&[from, to]| format!("M{}L{}", pair(from), pair(to)));
+        let (path, style) = (pieces.collect::<String>(), stroke_style(stroke));
+        let opacity = if opacity < 1.0 {
+            format!(r#" stroke-opacity="{}""#, number(opacity))
+        } else {
+            String::new()
+        };
+        self.put(format_args!(r#"<path d="{path}" fill="none" {style}{opacity}/>"#));
     }
 
     pub fn outline(&mut self, area: Area, stroke: Stroke) {
@@ -147,6 +174,18 @@ impl Canvas {
         self.put(format_args!(
             r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" {edge}/>"#
         ));
+    }
+
+    /// A filled circle, or a ring with a line of this width.
+    pub fn circle(&mut self, at: At, radius: f64, ring: Option<f64>, colour: Rgb, opacity: f64) {
+        let ([x, y], radius, colour, opacity) = (at.map(number), number(radius), hex(colour), number(opacity));
+        let style = match ring.map(number) {
+            Some(width) => {
+                format!(r#"fill="none" stroke="{colour}" stroke-width="{width}" stroke-opacity="{opacity}""#)
+            }
+            None => format!(r#"fill="{colour}" fill-opacity="{opacity}""#),
+        };
+        self.put(format_args!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
     }
 
     pub fn ring(&mut self, at: At, radius: f64, stroke: Stroke) {
@@ -219,8 +258,12 @@ fn number(value: f64) -> String {
 }
 
 fn coordinates(points: &[At]) -> String {
-    let pairs = points.iter().map(|point| point.map(number).join(","));
+    let pairs = points.iter().map(|&point| pair(point));
     pairs.collect::<Vec<_>>().join(" ")
+}
+
+fn pair(point: At) -> String {
+    point.map(number).join(",")
 }
 
 fn hex([red, green, blue]: Rgb) -> String {

@@ -1,9 +1,7 @@
 //! The colours of figures: dark enough for paper.
 
-use colorgrad::Gradient;
-
-/// Red, green, blue.
-pub(super) type Rgb = [u8; 3];
+use crate::figure::ColourMap;
+pub(super) use crate::figure::Rgb;
 
 pub(super) const INK: Rgb = [0x1b, 0x24, 0x30];
 pub(super) const DIM: Rgb = [0x5b, 0x64, 0x72];
@@ -46,15 +44,7 @@ impl Hue {
 
 /// Viridis over 0..=1; beyond, its ends.
 pub(super) fn viridis(position: f64) -> Rgb {
-    let [red, green, blue, _] = colorgrad::preset::viridis()
-        .at(position.clamp(0.0, 1.0) as f32)
-        .to_rgba8();
-    [red, green, blue]
-}
-
-/// The colour under a light of this strength, 1 being full.
-pub(super) fn lit(colour: Rgb, light: f64) -> Rgb {
-    colour.map(|part| (f64::from(part) * light).round() as u8)
+    ColourMap::viridis().at(position as f32)
 }
 
 /// Ink on light colours, white on dark ones.

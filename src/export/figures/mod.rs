@@ -13,8 +13,6 @@ mod nodes;
 mod picture;
 mod plot;
 mod plot_axis;
-mod relief;
-mod surface_panel;
 mod surfaces;
 
 pub use colours::Hue;
@@ -23,5 +21,4 @@ pub use nodes::node_plot;
 pub use picture::{Picture, PictureError, PictureFormat};
 pub use plot::{Marker, Plot, PlotPoint, Series, Span};
 pub use plot_axis::{AxisScale, PlotAxis};
-pub use surface_panel::SurfacePanel;
-pub use surfaces::{SurfaceFigure, SurfaceLook};
+pub use surfaces::draw_surfaces;

@@ -7,9 +7,10 @@ use super::{ExperimentLook, Outcome, open_cell::open_cell};
 use crate::{
     app::{
         shared::{Effect, Shared},
-        theme::{Theme, semibold, space, type_size},
+        theme::{Theme, rgb, semibold, space, type_size},
     },
     export::{format_number, format_percent},
+    figure::ColourMap,
 };
 
 /// Median Z error over both axes of a sweep: dark is small. A click marks the cell, two open it in the Train view.
@@ -62,7 +63,7 @@ pub fn heat_map_ui(
         if response.double_clicked() {
             open_cell(shared, outcome, at, effects);
         }
-        let fill = value.map(|value| Theme::of(ui).heights.at(log_share(value, medians())));
+        let fill = value.map(|value| rgb(ColourMap::viridis().at(log_share(value, medians()))));
         ui.painter().rect_filled(rect, 2.0, fill.unwrap_or(palette.raised));
         if let (Some(value), Some(fill)) = (value, fill)
             && widest + space(2) < width
@@ -124,7 +125,8 @@ fn scale_ui(ui: &mut Ui, outcome: &Outcome) {
                 pos2(left, bar.top()),
                 vec2(bar.width() / STEPS as f32 + 0.5, bar.height()),
             );
-            ui.painter().rect_filled(piece, 0.0, Theme::of(ui).heights.at(share));
+            ui.painter()
+                .rect_filled(piece, 0.0, rgb(ColourMap::viridis().at(share)));
         }
         ui.label(text(format_percent(largest)));
         ui.label(text("logarithmic".to_owned()));

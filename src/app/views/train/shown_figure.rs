@@ -6,69 +6,39 @@ use super::{
     charts::{self, BottomTab},
     export_kind::file_name,
     state::TrainView,
+    surfaces::surface_figure,
 };
 use crate::{
     app::{
         plotting::plot_style::thinned,
-        shared::{FileTask, FileWords, RunResult, RunView, Shared},
-        surface_view::ViewMode,
+        shared::{FileTask, FileWords, RunResult, RunView, SURFACES, Shared},
         test_view::Frame,
     },
-    export::figures::{
-        Hue, Marker, Picture, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, SurfaceFigure,
-        SurfaceLook, SurfacePanel, node_plot,
-    },
+    export::figures::{Hue, Marker, PictureError, PictureFormat, Plot, PlotAxis, PlotPoint, Series, Span, node_plot},
+    figure::surface::ViewMode,
     training::EpochRecord,
 };
 
 /// Which of the pictures in view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShownPicture {
-    /// Actual and decoupled surface of the snapshot.
+    /// Actual surface of the snapshot, and the decoupled one or the error beside it.
     Surfaces,
     /// The chart below them.
     Chart,
 }
 
-/// A figure not yet drawn, which takes a while.
-#[derive(Clone, Debug)]
-enum Undrawn {
-    /// Surfaces.
-    Surfaces(SurfaceFigure),
-    /// A chart.
-    Plot(Plot),
-}
-
-impl Undrawn {
-    fn draw(&self) -> Picture {
-        match self {
-            Self::Surfaces(figure) => figure.draw(),
-            Self::Plot(plot) => plot.draw(),
-        }
-    }
-}
-
 impl ShownPicture {
     /// What the file is called.
     pub fn words(self) -> FileWords {
-        let (name, kind, description) = match self {
-            Self::Surfaces => (
-                "Surfaces, PNG or SVG…",
-                "picture of the surfaces",
-                "Actual and decoupled surface as they are in view, for print: on a light ground, as PNG or SVG as the name \
-                 ends.",
-            ),
-            Self::Chart => (
-                "Chart, PNG or SVG…",
-                "picture of the chart",
-                "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
-            ),
-        };
-        FileWords {
-            name,
-            kind,
-            description,
-            extensions: &["png", "svg"],
+        match self {
+            Self::Surfaces => SURFACES,
+            Self::Chart => FileWords {
+                name: "Chart, PNG or SVG…",
+                kind: "picture of the chart",
+                description: "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
+                extensions: &["png", "svg"],
+            },
         }
     }
 
@@ -76,10 +46,7 @@ impl ShownPicture {
     pub fn task(self, view: &TrainView, shared: &Shared) -> Option<FileTask> {
         let run = shared.shown_run()?;
         let result = run.result.as_ref()?;
-        let picture = match self {
-            Self::Surfaces => Undrawn::Surfaces(surfaces(view, shared, run)?),
-            Self::Chart => Undrawn::Plot(chart(view, run, result)?),
-        };
+        let words = self.words();
         let what = match (self, shared.look.mode, view.tab) {
             (Self::Surfaces, ViewMode::ThreeD, _) => "surfaces",
             (Self::Surfaces, ViewMode::Top, _) => "surfaces-top",
@@ -89,35 +56,17 @@ impl ShownPicture {
             (Self::Chart, _, BottomTab::Regression) => "regression",
             (Self::Chart, _, BottomTab::Nodes) => "nodes",
         };
-        let words = self.words();
+        let name = file_name(what, words, &run.settings);
+        if self == Self::Surfaces {
+            return Some(FileTask::surfaces(surface_figure(view, shared), name));
+        }
+        let plot = chart(view, run, result)?;
         let write = move |path: &Path| -> Result<(), PictureError> {
             let format = PictureFormat::of_path(path)?;
-            picture.draw().save(format, path)
+            plot.draw().save(format, path)
         };
-        Some(FileTask::save(words, file_name(what, words, &run.settings), write))
+        Some(FileTask::save(words, name, write))
     }
-}
-
-fn surfaces(view: &TrainView, shared: &Shared, run: &RunView) -> Option<SurfaceFigure> {
-    let panel = |title: &str, frame: &Frame| SurfacePanel {
-        title: title.to_owned(),
-        values_mm: frame.grid_mm.clone(),
-        nodes_mm: frame.nodes_mm.clone(),
-    };
-    let (decoupled, _) = view.drawn.frames.decoupled.as_ref()?;
-    Some(SurfaceFigure {
-        grid: run.test.surface.grid().clone(),
-        interpolation: run.test.surface.interpolation(),
-        panels: vec![
-            panel("Actual", &view.drawn.frames.actual),
-            panel("Decoupled", decoupled),
-        ],
-        range_mm: run.test.z_range_mm(),
-        look: match shared.look.mode {
-            ViewMode::ThreeD => SurfaceLook::ThreeD,
-            ViewMode::Top => SurfaceLook::Top,
-        },
-    })
 }
 
 fn chart(view: &TrainView, run: &RunView, result: &RunResult) -> Option<Plot> {

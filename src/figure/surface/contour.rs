@@ -1,4 +1,4 @@
-//! Lines of equal value within one cell of the grid (marching squares). Free of the toolkit.
+//! Lines of equal value within one cell of the grid (marching squares).
 
 /// Calls `draw` with the ends of each piece of the line `value = level`. An end is given as
 /// `(corner a, corner b, part)`: on the side from a to b, `part` of the way. Corners go round the cell.

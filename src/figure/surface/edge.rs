@@ -2,12 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Painter, Pos2, Vec2};
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 
-use super::labels::Labels;
-use super::projection::Projection;
-use crate::app::ticks::{multiples, round_steps, tick_text};
+use super::{labels::Labels, projection::Projection};
+use crate::figure::ticks::{multiples, round_steps, tick_text};
 
 /// Length of a tick, in points.
 pub(super) const TICK: f32 = 4.0;
@@ -31,8 +29,7 @@ impl Edge {
         axis: usize,
         from_mm: DVec3,
         range: RangeInclusive<f64>,
-        labels: &Labels,
-        painter: &Painter,
+        labels: &Labels<'_>,
     ) -> Self {
         let mut edge = Self {
             axis,
@@ -45,9 +42,9 @@ impl Edge {
             edge.point(projection, *range.start()),
             edge.point(projection, *range.end()),
         );
-        let along = (end - start).normalized();
-        let middle = to_egui(projection.bounds().middle());
-        let across = along.rot90();
+        let along = (end - start).normalize_or_zero();
+        let middle = projection.bounds().middle();
+        let across = Vec2::new(along.y, -along.x);
         edge.away = if across.dot(start + 0.5 * (end - start) - middle) < 0.0 {
             -across
         } else {
@@ -62,7 +59,7 @@ impl Edge {
         let points_per_mm = 0.8 * f64::from(length) / width;
         edge.step = round_steps(width / 12.0)
             .find(|&step| {
-                let widest = [range.start(), range.end()].map(|&value| labels.size(painter, &tick_text(value, step)));
+                let widest = [range.start(), range.end()].map(|&value| labels.size(&tick_text(value, step)));
                 let size = widest[0].max(widest[1]);
                 let apart = ((size.x + 8.0) / along.x.abs().max(1e-3)).min((size.y + 5.0) / along.y.abs().max(1e-3));
                 step * points_per_mm >= f64::from(apart.max(20.0))
@@ -72,10 +69,10 @@ impl Edge {
         edge
     }
 
-    pub(super) fn point(&self, projection: &Projection, value: f64) -> Pos2 {
+    pub(super) fn point(&self, projection: &Projection, value: f64) -> Vec2 {
         let mut place_mm = self.from_mm;
         place_mm[self.axis] = value;
-        to_egui(projection.point(place_mm))
+        projection.point(place_mm)
     }
 
     pub(super) fn length(&self, projection: &Projection) -> f32 {
@@ -85,12 +82,4 @@ impl Edge {
         );
         (self.point(projection, high) - self.point(projection, low)).length()
     }
-}
-
-pub(super) fn to_egui(point: glam::Vec2) -> Pos2 {
-    Pos2::new(point.x, point.y)
-}
-
-pub(super) fn to_glam(point: Pos2) -> glam::Vec2 {
-    glam::Vec2::new(point.x, point.y)
 }

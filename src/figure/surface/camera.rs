@@ -1,4 +1,4 @@
-//! A camera that circles the plot. Free of the toolkit: it knows angles, not pointers.
+//! A camera that circles the plot.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
-//! From millimetres to points on the screen. Free of the toolkit.
+//! From millimetres to points on the screen.
 
 use glam::{DVec3, Mat4, Vec2, Vec3, camera::rh};
 
-use super::camera::OrbitCamera;
+use super::{camera::OrbitCamera, shapes::Bounds};
 
 /// Distance of the eye in half diagonals of the box: a mild perspective.
 const EYE_DISTANCE: f32 = 4.0;
@@ -10,34 +10,6 @@ const EYE_DISTANCE: f32 = 4.0;
 const LEAST_SIDE: f32 = 0.3;
 /// Heights of the box in units of its longer horizontal side: within these, the picture gets the shape of its card.
 const HEIGHT: std::ops::RangeInclusive<f32> = 0.4..=1.35;
-
-/// A rectangle on the screen, y downwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
-    pub(super) min: Vec2,
-    pub(super) max: Vec2,
-}
-
-impl Bounds {
-    pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
-        let empty = Self {
-            min: Vec2::splat(f32::INFINITY),
-            max: Vec2::splat(f32::NEG_INFINITY),
-        };
-        points.into_iter().fold(empty, |bounds, p| Self {
-            min: bounds.min.min(p),
-            max: bounds.max.max(p),
-        })
-    }
-
-    pub(super) fn size(&self) -> Vec2 {
-        self.max - self.min
-    }
-
-    pub(super) fn middle(&self) -> Vec2 {
-        0.5 * (self.min + self.max)
-    }
-}
 
 /// The box of the axes: millimetres on three axes, and its shape in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
