@@ -6,14 +6,18 @@
 use std::sync::Arc;
 
 use decoupler::{
-    export::figures::{Picture, draw_surfaces},
+    export::figures::Picture,
     figure::{
-        ColourMap,
+        ColourMap, Figure,
         surface::{Bounds, Card, Drawing, Line, OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
     surface::SurfaceMap,
 };
 use glam::{DVec3, Vec2};
+
+fn draw(figure: &SurfaceFigure) -> Picture {
+    Figure::from(figure.clone()).draw()
+}
 
 /// A surface over 4 × 5 nodes a millimetre apart.
 fn surface(title: &str, quantity: Quantity, value: impl Fn(f64, f64) -> f64) -> Surface {
@@ -126,7 +130,7 @@ fn the_camera_turns_what_is_in_space_and_nothing_else() {
         );
         let seen = |camera| {
             let surfaces = vec![surface.clone()];
-            draw_surfaces(&SurfaceFigure {
+            draw(&SurfaceFigure {
                 camera,
                 ..figure(surfaces)
             })
@@ -138,14 +142,14 @@ fn the_camera_turns_what_is_in_space_and_nothing_else() {
 #[test]
 fn surfaces_of_one_scale_have_one_key_and_errors_their_own() {
     let heights = figure(vec![dent("Actual"), dent("Decoupled")]);
-    let picture = draw_surfaces(&heights);
+    let picture = draw(&heights);
     assert_eq!(["Actual", "Decoupled"].map(|title| says(&picture, title)), [1, 1]);
     assert_eq!(says(&picture, "z (mm)"), 3, "two axes and a key");
     let note = "Between the nodes: thin-plate spline (the biharmonic spline with a plane).";
     assert_eq!(says(&picture, note), 1);
 
     let three = figure(vec![dent("Actual"), dent("Decoupled"), error()]);
-    let picture = draw_surfaces(&three);
+    let picture = draw(&three);
     assert_eq!([says(&picture, "z (mm)"), says(&picture, "error (mm)")], [3, 2]);
     let negative = picture.svg().matches(">−0.").count();
     assert!(negative >= 2, "{negative} negative ticks on axis and key");
@@ -178,7 +182,7 @@ fn fills(picture: &Picture) -> Vec<String> {
 #[test]
 fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
     let level = |z: f64| from_above(surface("", Quantity::Height, |_, _| z));
-    let drawn = |surfaces| fills(&draw_surfaces(&figure(surfaces)));
+    let drawn = |surfaces| fills(&draw(&figure(surfaces)));
     let [alone, both] = [vec![level(4.5)], vec![level(4.5), level(4.5)]].map(drawn);
     assert_eq!((alone.len(), &alone), (1, &both));
     let [red, green, blue] = ColourMap::viridis().at(0.5);
@@ -195,7 +199,7 @@ fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
 #[test]
 fn the_marked_node_is_marked_in_print() {
     let marked = |marked_node| {
-        draw_surfaces(&SurfaceFigure {
+        draw(&SurfaceFigure {
             marked_node,
             ..figure(vec![from_above(dent("Actual"))])
         })
@@ -210,7 +214,7 @@ fn the_marked_node_is_marked_in_print() {
 fn nodes_beyond_the_axes_are_named() {
     let mut surface = from_above(dent("Actual"));
     Arc::make_mut(&mut surface.nodes)[0].x = -7.0;
-    let picture = draw_surfaces(&figure(vec![surface]));
+    let picture = draw(&figure(vec![surface]));
     assert_eq!(says(&picture, "1 node beyond the axes is drawn at their edge"), 1);
 }
 
@@ -239,7 +243,7 @@ fn odd_surfaces_are_drawn() {
             for range in [4.0..=5.0, 5.0..=5.0, f64::NAN..=f64::NAN, 5.0..=4.0] {
                 let (range, surface) = (range, surface.clone());
                 let surface = Surface { mode, range, ..surface };
-                let picture = draw_surfaces(&figure(vec![surface.clone(), surface]));
+                let picture = draw(&figure(vec![surface.clone(), surface]));
                 assert_eq!(
                     picture.svg().matches("NaN").count() + picture.svg().matches("inf").count(),
                     0
@@ -248,5 +252,5 @@ fn odd_surfaces_are_drawn() {
             }
         }
     }
-    draw_surfaces(&figure(Vec::new())).png().unwrap();
+    draw(&figure(Vec::new())).png().unwrap();
 }

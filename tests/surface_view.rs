@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use decoupler::app::surface_view::{ColourBar, SurfaceView};
 use decoupler::app::theme::{self, Theme};
-use decoupler::export::figures::{PictureFormat, draw_surfaces};
+use decoupler::export::figures::PictureFormat;
+use decoupler::figure::Figure;
 use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
 use decoupler::surface::SurfaceMap;
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
@@ -232,7 +233,8 @@ fn gallery() {
             let mut figure = figure.clone();
             figure.surfaces.iter_mut().for_each(|surface| surface.mode = mode);
             let path = |renderer: &str| format!("target/gallery/{name}-{mode_name}-{renderer}.png");
-            draw_surfaces(&figure)
+            Figure::from(figure.clone())
+                .draw()
                 .save(PictureFormat::Png, path("print").as_ref())
                 .unwrap();
             for is_dark in [true, false] {

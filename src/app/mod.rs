@@ -35,7 +35,7 @@ pub use training_worker::{RunId, WriteRun};
 pub use views::{
     Analysis, AnalysisError, AxisForm, AxisKind, BottomTab, CompareView, Compared, DecoderResult, DecodersState, Drawn,
     Ending, ExperimentLook, ExperimentsView, Form, FormError, Frames, IdentifiabilityView, ListError, Outcome,
-    Question, Running, SortBy, Thoroughness, Topic, TradeEnding, TradeForm, TradeFormError, TradeLimits, TradeLook,
-    TradeOffView, TradeOutcome, TradePlan, TradeRunning, TrainView, Views, WhichPresets,
+    Question, Running, SortBy, Thoroughness, Topic, TradeEnding, TradeForm, TradeFormError, TradeLook, TradeOffView,
+    TradeOutcome, TradePlan, TradeRunning, TrainView, Views, WhichPresets,
 };
 pub use window::{DecouplerWindow, DialogKind, OpenError, open};

@@ -20,10 +20,11 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        atomic_write, check_writable, describe_conditions, draw_experiment,
+        atomic_write, check_writable, describe_conditions,
         figures::{PictureError, PictureFormat},
         format_duration, write_cells, write_experiment_markdown, write_trials,
     },
+    figure::experiment_figure,
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
     training::StoppingRules,
@@ -241,7 +242,7 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), PictureErro
         let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
         write_experiment_markdown(&title, &conditions, results, verdicts, writer)
     })?;
-    let picture = draw_experiment(results);
+    let picture = experiment_figure(results).draw();
     picture.save(PictureFormat::Svg, &svg)?;
     picture.save(PictureFormat::Png, &png)
 }

@@ -92,6 +92,14 @@ fn two_runs_are_compared_and_survive_a_restart() {
         }
     };
     check(&driver);
+    let picture = folder.path().join("losses.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = fs::read_to_string(picture).unwrap();
+    for curve in ["A: Six hidden nodes, test", &format!("B: {SECOND}, training")] {
+        assert!(picture.contains(curve), "{curve} is in the picture as in the window");
+        assert!(driver.has(curve), "{curve}: {:#?}", driver.texts());
+    }
     driver.click("Next snapshot");
     assert_eq!(driver.views().compare.snapshot, 1);
     driver.click_button("Error");

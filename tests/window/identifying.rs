@@ -59,6 +59,14 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     sensor.scale = "10×10_5×40".parse().unwrap();
     shows_condition_of(&driver, &sensor);
     driver.settle();
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("values.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = std::fs::read_to_string(picture).unwrap();
+    for word in ["worst row", "other rows", "deformation pattern, best seen first"] {
+        assert!(picture.contains(word), "{word}");
+    }
 
     driver.click("Use this sensor in the Train view");
     assert_eq!((driver.shown(), driver.state().draft.source.sensor), ("Train", sensor));

@@ -21,8 +21,8 @@ pub use experiments::{
 };
 pub use identifiability::{Analysis, AnalysisError, IdentifiabilityView, Question};
 pub use trade_off::{
-    Thoroughness, TradeEnding, TradeForm, TradeFormError, TradeLimits, TradeLook, TradeOffView, TradeOutcome,
-    TradePlan, TradeRunning, WhichPresets,
+    Thoroughness, TradeEnding, TradeForm, TradeFormError, TradeLook, TradeOffView, TradeOutcome, TradePlan,
+    TradeRunning, WhichPresets,
 };
 pub use train::{BottomTab, DecoderResult, DecodersState, Drawn, Frames, TrainView};
 

@@ -22,7 +22,8 @@ pub(super) type At = [f64; 2];
 pub(super) struct Stroke {
     pub colour: Rgb,
     pub width: f64,
-    pub is_dashed: bool,
+    /// Lengths of dashes and gaps; empty for a solid line.
+    pub dashes: &'static str,
 }
 
 impl Stroke {
@@ -30,14 +31,7 @@ impl Stroke {
         Self {
             colour,
             width,
-            is_dashed: false,
-        }
-    }
-
-    pub fn dashed(self) -> Self {
-        Self {
-            is_dashed: true,
-            ..self
+            dashes: "",
         }
     }
 }
@@ -66,6 +60,12 @@ impl Area {
 
     pub fn bottom(&self) -> f64 {
         self.top + self.height
+    }
+
+    /// The corners, clockwise from the upper left one.
+    pub fn corners(&self) -> [At; 4] {
+        let (left, top, right, bottom) = (self.left, self.top, self.right(), self.bottom());
+        [[left, top], [right, top], [right, bottom], [left, bottom]]
     }
 
     pub fn centre(&self) -> At {
@@ -102,6 +102,12 @@ impl Canvas {
     pub fn polyline(&mut self, points: &[At], stroke: Stroke) {
         let (points, style) = (coordinates(points), stroke_style(stroke));
         self.put(format_args!(r#"<polyline points="{points}" fill="none" {style}/>"#));
+    }
+
+    /// A filled shape.
+    pub fn polygon(&mut self, corners: &[At], fill: Rgb) {
+        let (points, fill) = (coordinates(corners), hex(fill));
+        self.put(format_args!(r#"<polygon points="{points}" fill="{fill}"/>"#));
     }
 
     /// Begins a group of [`Self::facet`]s.
@@ -156,23 +162,14 @@ impl Canvas {
     }
 
     pub fn outline(&mut self, area: Area, stroke: Stroke) {
-        let (left, top) = (area.left, area.top);
-        let corners = [
-            [left, top],
-            [area.right(), top],
-            [area.right(), area.bottom()],
-            [left, area.bottom()],
-            [left, top],
-        ];
-        self.polyline(&corners, stroke);
+        let [a, b, c, d] = area.corners();
+        self.polyline(&[a, b, c, d, a], stroke);
     }
 
-    pub fn disc(&mut self, at: At, radius: f64, fill: Rgb, edge: Option<Stroke>) {
-        let [x, y] = at.map(number);
-        let (radius, fill) = (number(radius), hex(fill));
-        let edge = edge.map(stroke_style).unwrap_or_default();
+    pub fn disc(&mut self, at: At, radius: f64, fill: Rgb) {
+        let ([x, y], radius, fill) = (at.map(number), number(radius), hex(fill));
         self.put(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" {edge}/>"#
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}"/>"#
         ));
     }
 
@@ -272,10 +269,9 @@ fn hex([red, green, blue]: Rgb) -> String {
 
 fn stroke_style(stroke: Stroke) -> String {
     let (colour, width) = (hex(stroke.colour), number(stroke.width));
-    let dashes = if stroke.is_dashed {
-        r#" stroke-dasharray="3 2""#
-    } else {
-        ""
+    let dashes = match stroke.dashes {
+        "" => String::new(),
+        dashes => format!(r#" stroke-dasharray="{dashes}""#),
     };
     format!(r#"stroke="{colour}" stroke-width="{width}"{dashes}"#)
 }

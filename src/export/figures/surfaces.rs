@@ -6,12 +6,12 @@ use glam::Vec2;
 
 use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
-    colours::{DIM, GRID, Hue, INK, Rgb},
+    colours::{DIM, GRID, INK, Rgb, rgb as hue_rgb},
     picture::Picture,
-    plot::Plot,
+    plot_figure::PAGE_WIDTH,
 };
 use crate::figure::{
-    ColourMap,
+    ColourMap, Hue,
     surface::{
         Bounds, Card, ColourScale, ContourLine, Disc, Drawing, Ink, Line, Mesh, Quantity, Surface, SurfaceFigure, Text,
     },
@@ -34,12 +34,12 @@ const WHITE: Rgb = [0xff; 3];
 
 /// Draws surfaces side by side, as wide as a page. A key to the colours stands at the right of the last card that it
 /// belongs to.
-pub fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
+pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();
     let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
     let keys = (0..scales.len()).filter(|&card| has_key(card)).count();
     let key_width = f64::from(ColourScale::WIDTH) * SCALE;
-    let width = (Plot::WIDE_PT - keys as f64 * key_width) / scales.len().max(1) as f64;
+    let width = (PAGE_WIDTH - keys as f64 * key_width) / scales.len().max(1) as f64;
     let height = (TALL_PER_WIDE * width).clamp(HEIGHT[0], HEIGHT[1]);
     let (mut left, mut notes) = (0.0, Vec::new());
     let mut pieces = Vec::new();
@@ -58,7 +58,7 @@ pub fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     }
     let below = TITLE + height;
     let lines = if notes.is_empty() { 1.0 } else { 2.0 };
-    let mut canvas = Canvas::new(Plot::WIDE_PT, below + lines * LINE);
+    let mut canvas = Canvas::new(PAGE_WIDTH, below + lines * LINE);
     for (card, (left, surface, drawing)) in pieces.iter().enumerate() {
         let area = Area {
             left: *left,
@@ -87,7 +87,7 @@ pub fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         canvas.text(
             [left + 12.0, below + 0.5 * LINE],
             Anchor::Start,
-            Hue::Orange.rgb(),
+            hue_rgb(Hue::Orange),
             &note,
         );
     }
@@ -136,8 +136,8 @@ fn rgb(ink: Ink) -> Rgb {
         Ink::Label | Ink::Text => INK,
         Ink::Ground | Ink::Node => WHITE,
         Ink::Rim => [0; 3],
-        Ink::Warning => Hue::Orange.rgb(),
-        Ink::Accent => Hue::Blue.rgb(),
+        Ink::Warning => hue_rgb(Hue::Orange),
+        Ink::Accent => hue_rgb(Hue::Blue),
     }
 }
 

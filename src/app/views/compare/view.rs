@@ -1,20 +1,18 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{
-    CompareView, Compared,
-    curves::{colours, curves_keys, curves_ui},
-    figures_table::figures_ui,
-    list::run_list_ui,
-};
+use super::{CompareView, Compared, figures_table::figures_ui, list::run_list_ui};
 use crate::{
     app::{
-        plotting::{legend_ui, legend_width},
-        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_surfaces_ui},
+        plotting::titled_plots_ui,
+        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_pictures_ui},
         surface_view::{ColourBar, SurfaceView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
     },
-    figure::surface::{Surface, SurfaceFigure, ViewMode},
+    figure::{
+        Figure, PlotFigure, compared_losses_figure,
+        surface::{Surface, SurfaceFigure, ViewMode},
+    },
 };
 
 impl View for CompareView {
@@ -61,12 +59,23 @@ impl View for CompareView {
         }
         let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
         let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| losses_ui(ui, &shared.runs));
+        let losses = losses(&shared.runs);
+        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| match &losses {
+            Some(losses) => titled_plots_ui(ui, "Loss", losses),
+            None => placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart."),
+        });
         card_ui(ui, right, |ui| {
             scrolled_ui(ui, "compared figures", |ui| {
                 section_heading_ui(ui, "Errors on the test sets");
                 figures_ui(ui, &shared.runs);
-                export_surfaces_ui(ui, figure, "compared-surfaces.png", effects);
+                let surfaces = (!figure.surfaces.is_empty()).then(|| figure.into());
+                let losses = losses.map(Figure::from);
+                export_pictures_ui(
+                    ui,
+                    (surfaces, "compared-surfaces.png"),
+                    (losses, "compared-loss.png"),
+                    effects,
+                );
             });
         });
         ui.allocate_rect(whole, Sense::hover());
@@ -107,7 +116,7 @@ impl CompareView {
         let (runs, look) = (&shared.runs, shared.look);
         ui.horizontal(|ui| {
             ui.set_min_height(space(7));
-            let colour = colours(&theme.palette)[place];
+            let colour = [theme.palette.accent, theme.palette.warning][place];
             ui.label(
                 RichText::new(PLACES[place])
                     .font(semibold(type_size().title))
@@ -159,17 +168,12 @@ fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, look: Look, effects:
     }
 }
 
-fn losses_ui(ui: &mut Ui, runs: &RunList) {
-    let keys = curves_keys(&Theme::of(ui).palette, runs);
-    ui.horizontal(|ui| {
-        ui.label(RichText::new("Loss").font(semibold(type_size().title)));
-        let spare = ui.available_width() - ui.spacing().item_spacing.x - legend_width(ui, &keys);
-        ui.add_space(spare.max(space(3)));
-        legend_ui(ui, &keys);
+/// The errors of each epoch of the runs that are chosen.
+fn losses(runs: &RunList) -> Option<PlotFigure> {
+    let [a, b] = [0, 1].map(|place| {
+        let run = runs.pinned(place)?;
+        Some((format!("{}: {}", PLACES[place], run.name), &*run.file.training.history))
     });
-    if keys.is_empty() {
-        placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart.");
-    } else {
-        curves_ui(ui, runs);
-    }
+    let runs = [&a, &b].map(|run| run.as_ref().map(|(name, history)| (&**name, *history)));
+    (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
 }

@@ -2,17 +2,21 @@ use std::{ops::RangeInclusive, sync::Arc};
 
 use eframe::egui::{Align, Layout, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{Analysis, IdentifiabilityView, facts::facts_ui, form, singular_values::singular_values_ui};
+use super::{Analysis, IdentifiabilityView, facts::facts_ui, form};
 use crate::{
     app::{
-        shared::{Effect, Look, Shared, View, export_surfaces_ui},
+        plotting::titled_plots_ui,
+        shared::{Effect, Look, Shared, View, export_pictures_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui},
     },
     export::format_number,
-    figure::surface::{Quantity, Surface, SurfaceFigure, ViewMode},
+    figure::{
+        singular_values_figure,
+        surface::{Quantity, Surface, SurfaceFigure, ViewMode},
+    },
 };
 
 impl View for IdentifiabilityView {
@@ -86,8 +90,9 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
+    let singular_values = singular_values_figure(&analysis.rows, analysis.worst, analysis.hidden_below_per_mm());
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        singular_values_ui(ui, analysis);
+        titled_plots_ui(ui, "Singular values", &singular_values);
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "identifiability facts", |ui| {
@@ -95,7 +100,12 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
                 note_ui(ui, problem);
             }
             facts_ui(ui, analysis);
-            export_surfaces_ui(ui, figure, "identifiability.png", effects);
+            export_pictures_ui(
+                ui,
+                (Some(figure.into()), "identifiability.png"),
+                (Some(singular_values.into()), "singular-values.png"),
+                effects,
+            );
         });
     });
     ui.allocate_rect(whole, Sense::hover());
