@@ -25,7 +25,7 @@ mod views;
 mod widgets;
 mod window;
 
-use crate::export::ticks;
+use crate::figure::ticks;
 
 pub use shared::{Effect, Notice, Phase, Shared};
 pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeEnding, TradePlan, Views};

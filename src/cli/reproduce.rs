@@ -21,10 +21,11 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        atomic_write, check_writable, describe_conditions, draw_experiment,
+        atomic_write, check_writable, describe_conditions,
         figures::{PictureError, PictureFormat},
         format_duration, write_cells, write_experiment_markdown, write_trials,
     },
+    figure::experiment_figure,
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
     training::StoppingRules,
@@ -231,7 +232,7 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureErr
         verdicts,
     } = reproduced;
     let [cells, trials, markdown, svg, png] = files(folder, *table);
-    let picture = draw_experiment(results);
+    let picture = experiment_figure(results).draw();
     let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
     let write_markdown =
         |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);

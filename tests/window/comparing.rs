@@ -3,8 +3,9 @@
 use std::{fs, path::Path};
 
 use decoupler::{
-    app::{BottomTab, Phase, surface_view::ViewMode},
+    app::{BottomTab, Phase},
     export::{NetworkFile, format_number},
+    figure::surface::ViewMode,
 };
 use eframe::egui::{Event, Key};
 
@@ -63,6 +64,17 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
+    // What is compared is saved as it is in view, by the names of the runs.
+    let saved = folder.path().join("compared.svg");
+    driver.save("Surfaces, PNG or SVG…", &saved);
+    driver.click("Dismiss");
+    let svg = fs::read_to_string(saved).unwrap();
+    let titles = [
+        "A: Six hidden nodes, decoupled".to_owned(),
+        format!("B: {SECOND}, decoupled"),
+    ];
+    assert_eq!(titles.map(|title| count(&svg, &title)), [1, 1]);
+    assert_eq!(count(&svg, "z (mm)"), 3, "two axes and one key");
     let check = |driver: &Driver| {
         let [a, b] = shown.each_ref().map(|file| file.errors);
         for (letter, errors) in [("A", a), ("B", b)] {
@@ -82,6 +94,14 @@ fn two_runs_are_compared_and_survive_a_restart() {
         }
     };
     check(&driver);
+    let picture = folder.path().join("losses.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = fs::read_to_string(picture).unwrap();
+    for curve in ["A: Six hidden nodes, test", &format!("B: {SECOND}, training")] {
+        assert!(picture.contains(curve), "{curve} is in the picture as in the window");
+        assert!(driver.has(curve), "{curve}: {:#?}", driver.texts());
+    }
     driver.click("Next snapshot");
     assert_eq!(driver.views().compare.snapshot, 1);
     driver.click_button("Error");
@@ -260,4 +280,63 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     assert!(driver.says("give a name that ends in .png or .svg"));
     let png = image::open(at("a.png")).unwrap();
     assert!(png.width() > 2000);
+}
+
+/// The surfaces in view as the window saves them.
+fn saved_surfaces(driver: &mut Driver) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("surfaces.svg");
+    driver.save("Type a path for the picture of the surfaces", &path);
+    assert!(driver.says("Saved "), "{:#?}", driver.texts());
+    driver.click("Dismiss");
+    fs::read_to_string(path).unwrap()
+}
+
+/// How often a picture says a text.
+fn count(svg: &str, text: &str) -> usize {
+    svg.matches(&format!(">{text}</text>")).count()
+}
+
+#[test]
+fn saved_surfaces_are_seen_by_the_camera_in_view() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let first = saved_surfaces(&mut driver);
+    assert!(
+        first == saved_surfaces(&mut driver),
+        "the same view gives the same picture"
+    );
+    let press = |driver: &mut Driver, key| {
+        driver.get("Actual surface").focus();
+        driver.settle();
+        driver.press(key);
+    };
+    press(&mut driver, Key::ArrowLeft);
+    let turned = saved_surfaces(&mut driver);
+    assert!(first != turned, "the camera was turned");
+    press(&mut driver, Key::Home);
+    assert!(first == saved_surfaces(&mut driver), "the camera was turned back");
+    driver.click("Top view");
+    let from_above = saved_surfaces(&mut driver);
+    assert_eq!(
+        [&first, &from_above].map(|svg| count(svg, "z (mm)")),
+        [3, 1],
+        "two axes and a key, the key alone"
+    );
+}
+
+#[test]
+fn the_error_card_in_view_is_saved_with_its_own_colours() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let titles = ["Actual", "Decoupled", "Error", "error (mm)"];
+    let says = |driver: &mut Driver| {
+        let svg = saved_surfaces(driver);
+        titles.map(|text| count(&svg, text))
+    };
+    assert_eq!(says(&mut driver), [1, 1, 0, 0]);
+    driver.click_button("Error");
+    assert_eq!(says(&mut driver), [1, 0, 1, 2], "the error's axis and key");
 }

@@ -59,6 +59,14 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     sensor.scale = "10×10_5×40".parse().unwrap();
     shows_condition_of(&driver, &sensor);
     driver.settle();
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("values.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = std::fs::read_to_string(picture).unwrap();
+    for word in ["worst row", "other rows", "deformation pattern, best seen first"] {
+        assert!(picture.contains(word), "{word}");
+    }
 
     driver.click("Use this sensor in the Train view");
     assert_eq!((driver.shown(), driver.state().draft.source.sensor), ("Train", sensor));
@@ -145,4 +153,23 @@ fn everything_keeps_to_a_narrow_window() {
         let rect = driver.get(label).rect();
         assert!(rect.max.x <= 1024.0 && rect.width() > 40.0, "{label}: {rect}");
     }
+}
+
+#[test]
+fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("identifiability.svg");
+    let mut driver = open();
+    driver.save("Surfaces, PNG or SVG…", &path);
+    let svg = std::fs::read_to_string(path).unwrap();
+    let says = |text: &str| svg.matches(&format!(">{text}</text>")).count();
+    assert_eq!(
+        [says("Worst-seen deformation"), says("Sensitivity of each node")],
+        [1, 1]
+    );
+    assert_eq!(
+        [says("pattern"), says("1/mm")],
+        [2, 1],
+        "an axis and a key, a key from above"
+    );
 }

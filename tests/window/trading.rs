@@ -156,8 +156,8 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     measure(&mut driver);
     let saved = [
         ("All points as CSV…", "points.csv", &b"noise,preset,decoder"[..]),
-        ("Decoding chart as SVG…", "decoding.svg", b"<svg"),
-        ("Training chart as PNG…", "training.png", b"\x89PNG"),
+        ("Charts as SVG…", "charts.svg", b"<svg"),
+        ("Charts as PNG…", "charts.png", b"\x89PNG"),
     ];
     for (button, name, expected) in saved {
         let path = folder.path().join(name);
@@ -175,8 +175,15 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     let points = &driver.views().trade_off.outcome.as_ref().unwrap().levels[0].points;
     let z = points[0].report.errors.z_percent.unwrap();
     assert!(table.lines().nth(1).unwrap().contains(&format!(",{z:?},")), "{table}");
-    let svg = fs::read_to_string(folder.path().join("decoding.svg")).unwrap();
-    for text in ["newton, best preset", "time to decode a frame (µs)", "Z error (%)"] {
+    let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
+    for text in [
+        ">Newton<",
+        ">best preset<",
+        ">best preset, 32 bits<",
+        "time to decode a frame (µs)",
+        "training time (s)",
+        "Z error (%)",
+    ] {
         assert!(svg.contains(text), "{text}");
     }
 }

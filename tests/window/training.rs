@@ -3,8 +3,9 @@
 use std::fs;
 
 use decoupler::{
-    app::{Effect, Phase, surface_view::ViewMode},
+    app::{Effect, Phase},
     evaluation::{Run, SimulatedSettings},
+    figure::surface::ViewMode,
     training::{Method, MomentumSettings, StopReason},
 };
 use eframe::egui::{Key, Modifiers};

@@ -1,8 +1,16 @@
-//! What all charts have in common: axes, marks, legends. It knows no view.
+//! Figures on the screen: each is the value that is also printed. It knows no view.
 
+mod colours;
+mod heat_map;
 mod legend;
-pub mod plot_style;
+mod plot;
+mod plot_figure;
 mod strip;
+#[cfg(test)]
+mod tests;
 
-pub use legend::{Key, Mark, legend_ui, legend_width};
+pub use colours::hue_colour;
+pub use heat_map::{CellPointed, heat_map_ui};
+pub use legend::{legend_ui, legend_width};
+pub use plot_figure::{Pointer, legend_behind_ui, plots_ui, titled_plots_ui};
 pub use strip::{StripChart, strip_ui};

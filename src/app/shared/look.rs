@@ -1,4 +1,4 @@
-use crate::app::surface_view::{OrbitCamera, ViewMode};
+use crate::figure::surface::{OrbitCamera, ViewMode};
 
 /// How surfaces are looked at, in whatever view.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,8 @@
 use super::{Look, RunList, RunResult, RunView};
 use crate::{
-    app::{
-        surface_view::{OrbitCamera, ViewMode},
-        test_view::TestView,
-    },
+    app::test_view::TestView,
     evaluation::{Baselines, SimulatedSettings},
+    figure::surface::{OrbitCamera, ViewMode},
     training::StopReason,
 };
 

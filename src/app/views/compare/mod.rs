@@ -1,6 +1,5 @@
 //! The Compare view: the run list, and two of its runs side by side.
 
-mod curves;
 mod figures_table;
 mod list;
 mod scene_words;

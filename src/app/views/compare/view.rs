@@ -1,19 +1,18 @@
-use std::ops::RangeInclusive;
-
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{
-    CompareView, Compared,
-    curves::{colours, curves_keys, curves_ui},
-    figures_table::figures_ui,
-    list::run_list_ui,
-};
-use crate::app::{
-    plotting::{legend_ui, legend_width},
-    shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View},
-    surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
-    theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
+use super::{CompareView, Compared, figures_table::figures_ui, list::run_list_ui};
+use crate::{
+    app::{
+        plotting::titled_plots_ui,
+        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_pictures_ui},
+        surface_view::{ColourBar, SurfaceView},
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
+    },
+    figure::{
+        Figure, PlotFigure, compared_losses_figure,
+        surface::{Surface, SurfaceFigure, ViewMode},
+    },
 };
 
 impl View for CompareView {
@@ -44,22 +43,39 @@ impl View for CompareView {
         let upper = upper.with_max_y(upper.max.y - gap);
         let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
         let width = 0.5 * (cards.width() - gap);
-        let range_mm = self.common_range_mm();
+        let figure = self.figure(shared);
+        let mut surfaces = figure.surfaces.iter();
         for place in 0..2 {
+            let surface = self.places[place].compared.as_ref().and_then(|_| surfaces.next());
             let left = cards.left() + (width + gap) * place as f32;
             let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
-            card_ui(ui, card, |ui| self.side_ui(ui, shared, place, &range_mm, effects));
+            card_ui(ui, card, |ui| self.side_ui(ui, shared, place, surface, effects));
         }
-        if self.places.iter().any(|place| place.compared.is_some()) {
-            scale_ui(ui, scale.shrink2(Vec2::new(0.0, space(4))), self.card, range_mm);
+        if let [colours, ..] = &figure.scales()[..] {
+            let (slot, theme) = (scale.shrink2(Vec2::new(0.0, space(4))), Theme::of(ui));
+            let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+            let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
+            bar.on_hover_text(figure.note());
         }
         let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
         let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| losses_ui(ui, &shared.runs));
+        let losses = losses(&shared.runs);
+        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| match &losses {
+            Some(losses) => titled_plots_ui(ui, "Loss", losses),
+            None => placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart."),
+        });
         card_ui(ui, right, |ui| {
             scrolled_ui(ui, "compared figures", |ui| {
                 section_heading_ui(ui, "Errors on the test sets");
                 figures_ui(ui, &shared.runs);
+                let surfaces = (!figure.surfaces.is_empty()).then(|| figure.into());
+                let losses = losses.map(Figure::from);
+                export_pictures_ui(
+                    ui,
+                    (surfaces, "compared-surfaces.png"),
+                    (losses, "compared-loss.png"),
+                    effects,
+                );
             });
         });
         ui.allocate_rect(whole, Sense::hover());
@@ -67,15 +83,25 @@ impl View for CompareView {
 }
 
 impl CompareView {
-    /// One scale for both, so that colours and heights mean the same.
-    fn common_range_mm(&self) -> RangeInclusive<f64> {
-        let compared = self.places.iter().filter_map(|place| place.compared.as_ref());
-        let ranges = compared.map(|compared| match self.card {
-            RightCard::Decoupled => compared.test.z_range_mm(),
-            RightCard::Error => compared.frames[2].symmetric_range_mm(),
-        });
-        let union = |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
-        ranges.reduce(union).unwrap_or(0.0..=1.0)
+    /// The surfaces of the runs that are prepared, with one scale.
+    fn figure(&self, shared: &Shared) -> SurfaceFigure {
+        let look = shared.look;
+        let surface = |place: usize| {
+            let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
+            let [_, decoupled, error] = frames;
+            let name = shared.runs.pinned(place).map_or("", |run| &run.name);
+            let (letter, mode) = (PLACES[place], look.mode);
+            Some(match self.card {
+                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, mode),
+                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, mode),
+            })
+        };
+        SurfaceFigure {
+            surfaces: (0..self.places.len()).filter_map(surface).collect(),
+            camera: look.camera,
+            marked_node: None,
+        }
+        .with_common_scales()
     }
 
     fn side_ui(
@@ -83,14 +109,14 @@ impl CompareView {
         ui: &mut Ui,
         shared: &Shared,
         place: usize,
-        range_mm: &RangeInclusive<f64>,
+        surface: Option<&Surface>,
         effects: &mut Vec<Effect>,
     ) {
         let theme = Theme::of(ui);
         let (runs, look) = (&shared.runs, shared.look);
         ui.horizontal(|ui| {
             ui.set_min_height(space(7));
-            let colour = colours(&theme.palette)[place];
+            let colour = [theme.palette.accent, theme.palette.warning][place];
             ui.label(
                 RichText::new(PLACES[place])
                     .font(semibold(type_size().title))
@@ -118,8 +144,8 @@ impl CompareView {
                 }
             });
         });
-        match &self.places[place].compared {
-            Some(compared) => surface_ui(ui, (place, compared, self.card), range_mm, look, effects),
+        match surface {
+            Some(surface) => surface_ui(ui, place, surface, look, effects),
             None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
             None => {
                 let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
@@ -129,47 +155,11 @@ impl CompareView {
     }
 }
 
-fn colours_of(card: RightCard) -> Colours {
-    match card {
-        RightCard::Decoupled => Colours::Height,
-        RightCard::Error => Colours::Error,
-    }
-}
-
-fn scale_ui(ui: &mut Ui, rect: Rect, card: RightCard, range: RangeInclusive<f64>) {
-    let mut slot = ui.new_child(UiBuilder::new().max_rect(rect));
-    let colours = colours_of(card);
-    let theme = Theme::of(ui);
-    let bar = ColourBar {
-        title: colours.title(),
-        range,
-        colours,
-        theme,
-    };
-    bar.show(&mut slot, rect.height());
-}
-
-fn surface_ui(
-    ui: &mut Ui,
-    (place, compared, card): (usize, &Compared, RightCard),
-    range_mm: &RangeInclusive<f64>,
-    look: Look,
-    effects: &mut Vec<Effect>,
-) {
-    let [_, decoupled, error] = &compared.frames;
-    let frame = match card {
-        RightCard::Decoupled => decoupled,
-        RightCard::Error => error,
-    };
+fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, look: Look, effects: &mut Vec<Effect>) {
     let view = SurfaceView {
         label: ["Surface of A", "Surface of B"][place],
-        grid: compared.test.surface.grid(),
-        values_mm: &frame.grid_mm,
-        nodes_mm: &frame.nodes_mm,
-        range_mm: range_mm.clone(),
-        colours: colours_of(card),
-        mode: look.mode,
-        highlight: None,
+        surface,
+        marked_node: None,
         theme: Theme::of(ui),
     };
     let camera = view.show(ui, look.camera).camera;
@@ -178,17 +168,12 @@ fn surface_ui(
     }
 }
 
-fn losses_ui(ui: &mut Ui, runs: &RunList) {
-    let keys = curves_keys(&Theme::of(ui).palette, runs);
-    ui.horizontal(|ui| {
-        ui.label(RichText::new("Loss").font(semibold(type_size().title)));
-        let spare = ui.available_width() - ui.spacing().item_spacing.x - legend_width(ui, &keys);
-        ui.add_space(spare.max(space(3)));
-        legend_ui(ui, &keys);
+/// The errors of each epoch of the runs that are chosen.
+fn losses(runs: &RunList) -> Option<PlotFigure> {
+    let [a, b] = [0, 1].map(|place| {
+        let run = runs.pinned(place)?;
+        Some((format!("{}: {}", PLACES[place], run.name), &*run.file.training.history))
     });
-    if keys.is_empty() {
-        placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart.");
-    } else {
-        curves_ui(ui, runs);
-    }
+    let runs = [&a, &b].map(|run| run.as_ref().map(|(name, history)| (&**name, *history)));
+    (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
 }

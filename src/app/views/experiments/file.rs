@@ -5,10 +5,11 @@ use crate::{
     app::shared::{FileTask, FileWords},
     evaluation::experiments::{ExperimentResults, verdicts},
     export::{
-        atomic_write, describe_conditions, draw_experiment,
+        atomic_write, describe_conditions,
         figures::{PictureError, PictureFormat},
         write_cells, write_experiment_markdown, write_trials,
     },
+    figure::experiment_figure,
 };
 
 /// What can be written about an experiment.
@@ -82,7 +83,7 @@ impl ExperimentFile {
         match self {
             Self::Cells => atomic_write(path, |writer| write_cells(results, writer))?,
             Self::Trials => atomic_write(path, |writer| write_trials(results, writer))?,
-            Self::Figure(format) => draw_experiment(results).save(format, path)?,
+            Self::Figure(format) => experiment_figure(results).draw().save(format, path)?,
             Self::Markdown => {
                 let conditions = describe_conditions(&results.experiment);
                 let verdicts = verdicts(results);

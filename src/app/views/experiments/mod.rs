@@ -7,7 +7,6 @@ mod form;
 mod heat_map;
 mod open_cell;
 mod panel;
-mod plots;
 mod results_card;
 mod state;
 mod status;

@@ -18,6 +18,7 @@ use crate::{
         experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
     },
     export::ExperimentTable,
+    figure::{Figure, experiment_figure},
     training::EpochRecord,
 };
 
@@ -134,6 +135,8 @@ pub struct Outcome {
     pub results: Arc<ExperimentResults>,
     /// For reading.
     pub table: ExperimentTable,
+    /// For looking at.
+    pub figure: Figure,
     /// The figures behind it.
     pub summaries: Vec<CellSummary>,
     /// What they say about the paper's claims.
@@ -150,6 +153,7 @@ impl Outcome {
         let results = ExperimentResults::new(experiment);
         Self {
             table: ExperimentTable::new(&results),
+            figure: experiment_figure(&results),
             summaries: results.summaries(),
             verdicts: Vec::new(),
             results: Arc::new(results),
@@ -184,6 +188,7 @@ impl Outcome {
 
     fn refresh(&mut self) {
         self.table = ExperimentTable::new(&self.results);
+        self.figure = experiment_figure(&self.results);
         self.summaries = self.results.summaries();
         self.verdicts = verdicts(&self.results);
     }

@@ -4,8 +4,8 @@ use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
-    heat_map::heat_map_ui,
-    panel, plots,
+    heat_map::sweep_ui,
+    panel,
     results_card::{results_card_height, results_card_ui},
     status,
     verdict_list::verdicts_ui,
@@ -13,11 +13,12 @@ use super::{
 };
 use crate::{
     app::{
+        plotting::{Pointer, legend_ui, plots_ui},
         shared::{Effect, Notice, Shared, View},
         theme::space,
         widgets::{card_ui, placeholder_ui, pressed, scrolled_ui, section_heading_ui},
     },
-    evaluation::experiments::PaperTable,
+    figure::Figure,
 };
 
 impl View for ExperimentsView {
@@ -113,10 +114,13 @@ fn picture_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    match topic {
-        Topic::Table(PaperTable::HiddenNodes) => plots::hidden_nodes_ui(ui, outcome),
-        Topic::Table(PaperTable::CrossValidation) => plots::repeats_ui(ui, outcome),
-        Topic::Table(PaperTable::ArrayScales) => plots::side_by_side_ui(ui, outcome),
-        Topic::Sweep => heat_map_ui(ui, outcome, look, shared, effects),
+    match &outcome.figure {
+        Figure::HeatMap(map) => sweep_ui(ui, (outcome, &**map), look, shared, effects),
+        Figure::Plots(plots) => {
+            legend_ui(ui, &plots.keys);
+            plots_ui(ui, topic.name(), plots, Pointer::Moves);
+        }
+        // No experiment has any.
+        Figure::Surfaces(_) => {}
     }
 }

@@ -193,8 +193,8 @@ fn frame(
     let nodes_mm: Vec<DVec3> = nodes_mm.map(|(seen, node, at)| at.with_z(value(seen, node))).collect();
     let values: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
     Frame {
-        grid_mm: surface.evaluate(&values),
-        nodes_mm,
+        grid_mm: surface.evaluate(&values).into(),
+        nodes_mm: nodes_mm.into(),
     }
 }
 

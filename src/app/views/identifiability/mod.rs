@@ -4,7 +4,6 @@
 mod analysis;
 mod facts;
 mod form;
-mod singular_values;
 mod state;
 mod view;
 mod worker;

@@ -1,17 +1,22 @@
-use std::ops::RangeInclusive;
+use std::{ops::RangeInclusive, sync::Arc};
 
-use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{Analysis, IdentifiabilityView, facts::facts_ui, form, singular_values::singular_values_ui};
+use super::{Analysis, IdentifiabilityView, facts::facts_ui, form};
 use crate::{
     app::{
-        shared::{Effect, Look, Shared, View},
-        surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
+        plotting::titled_plots_ui,
+        shared::{Effect, Look, Shared, View, export_pictures_ui},
+        surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_number,
+    figure::{
+        singular_values_figure,
+        surface::{Quantity, Surface, SurfaceFigure, ViewMode},
+    },
 };
 
 impl View for IdentifiabilityView {
@@ -72,36 +77,22 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
     let upper = upper.with_max_y(upper.max.y - gap);
     let width = 0.5 * (upper.width() - gap);
     let place = shown.place_of_axis(analysis.question.scene.movement.axes());
-    let sides = [
-        Side {
-            title: "Worst-seen deformation",
-            label: "Worst-seen deformation of each row",
-            frame: &analysis.patterns[place],
-            colours: Colours::Pattern,
-            range: -1.0..=1.0,
-            mode: shared.look.mode,
-        },
-        Side {
-            title: "Sensitivity of each node",
-            label: "Sensitivity of each node",
-            frame: &analysis.sensitivities[place],
-            colours: Colours::Sensitivity,
-            range: sensitivity_range(analysis),
-            mode: ViewMode::Top,
-        },
-    ];
+    let figure = identifiability_figure(shown, analysis, place, shared.look);
+    let labels = ["Worst-seen deformation of each row", "Sensitivity of each node"];
     let mut pointed = (shown.axis, shown.node);
-    for (number, side) in sides.iter().enumerate() {
-        let left = upper.left() + (width + gap) * number as f32;
+    for (card, (surface, label)) in figure.surfaces.iter().zip(labels).enumerate() {
+        let left = upper.left() + (width + gap) * card as f32;
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
         card_ui(ui, card, |ui| {
-            side.show_ui(ui, shared.look, analysis, &mut pointed, effects);
+            let scale = surface_ui(ui, (surface, label), shared.look, analysis, &mut pointed, effects);
+            scale.on_hover_text(figure.note());
         });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
+    let singular_values = singular_values_figure(&analysis.rows, analysis.worst, analysis.hidden_below_per_mm());
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        singular_values_ui(ui, analysis);
+        titled_plots_ui(ui, "Singular values", &singular_values);
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "identifiability facts", |ui| {
@@ -109,6 +100,12 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
                 note_ui(ui, problem);
             }
             facts_ui(ui, analysis);
+            export_pictures_ui(
+                ui,
+                (Some(figure.into()), "identifiability.png"),
+                (Some(singular_values.into()), "singular-values.png"),
+                effects,
+            );
         });
     });
     ui.allocate_rect(whole, Sense::hover());
@@ -117,92 +114,99 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
 
 /// From no sensitivity to the largest of any axis.
 fn sensitivity_range(analysis: &Analysis) -> RangeInclusive<f64> {
-    let nodes = analysis.sensitivities.iter().flat_map(|frame| &frame.nodes_mm);
+    let nodes = analysis.sensitivities.iter().flat_map(|frame| frame.nodes_mm.iter());
     let largest = nodes.map(|node| node.z).filter(|z| z.is_finite()).fold(0.0, f64::max);
     0.0..=largest.max(f64::MIN_POSITIVE)
 }
 
-/// One of the two pictures.
-struct Side<'a> {
-    title: &'static str,
-    label: &'static str,
-    frame: &'a Frame,
-    colours: Colours,
-    range: RangeInclusive<f64>,
-    mode: ViewMode,
+/// The worst-seen pattern and the sensitivity of the nodes.
+fn identifiability_figure(shown: &IdentifiabilityView, analysis: &Analysis, place: usize, look: Look) -> SurfaceFigure {
+    let surface = |title: &str, frame: &Frame, quantity, range, mode| Surface {
+        title: title.to_owned(),
+        map: Arc::clone(&analysis.surface),
+        values: Arc::clone(&frame.grid_mm),
+        nodes: Arc::clone(&frame.nodes_mm),
+        quantity,
+        range,
+        mode,
+    };
+    let (pattern, sensitivity) = (&analysis.patterns[place], &analysis.sensitivities[place]);
+    let pattern = surface(
+        "Worst-seen deformation",
+        pattern,
+        Quantity::Pattern,
+        -1.0..=1.0,
+        look.mode,
+    );
+    let (quantity, range) = (Quantity::Sensitivity, sensitivity_range(analysis));
+    let sensitivity = surface("Sensitivity of each node", sensitivity, quantity, range, ViewMode::Top);
+    SurfaceFigure {
+        surfaces: vec![pattern, sensitivity],
+        camera: look.camera,
+        marked_node: shown.node,
+    }
 }
 
-impl Side<'_> {
-    /// `axis` is the one on show, `node` the one marked on both pictures.
-    fn show_ui(
-        &self,
-        ui: &mut Ui,
-        look: Look,
-        analysis: &Analysis,
-        (axis, node): &mut (usize, Option<usize>),
-        effects: &mut Vec<Effect>,
-    ) {
-        let theme = Theme::of(ui);
-        ui.horizontal(|ui| {
-            ui.set_min_height(space(7));
-            ui.label(RichText::new(self.title).font(semibold(type_size().title)));
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| match self.colours {
-                Colours::Pattern => {
-                    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                    let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
-                    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
-                }
-                _ => axes_ui(ui, axis, analysis),
-            });
+/// One of the two pictures: `axis` is the one on show, `node` the one marked on both. Returns the scale of its colours.
+fn surface_ui(
+    ui: &mut Ui,
+    (surface, label): (&Surface, &str),
+    look: Look,
+    analysis: &Analysis,
+    (axis, node): &mut (usize, Option<usize>),
+    effects: &mut Vec<Effect>,
+) -> Response {
+    let theme = Theme::of(ui);
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| match surface.quantity {
+            Quantity::Pattern => {
+                let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+                let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+            }
+            _ => axes_ui(ui, axis, analysis),
         });
-        let space_left = ui.available_rect_before_wrap();
-        let (picture, scale) = space_left.split_left_right_at_x(space_left.right() - ColourBar::WIDTH);
-        let mut slot = ui.new_child(UiBuilder::new().max_rect(picture));
-        let view = SurfaceView {
-            label: self.label,
-            grid: analysis.surface.grid(),
-            values_mm: &self.frame.grid_mm,
-            nodes_mm: &self.frame.nodes_mm,
-            range_mm: self.range.clone(),
-            colours: self.colours,
-            mode: self.mode,
-            highlight: *node,
-            theme,
-        };
-        let shown = view.show(&mut slot, look.camera);
-        if shown.camera != look.camera {
-            let camera = shown.camera;
-            effects.push(Effect::Look(Look { camera, ..look }));
-        }
-        if shown.response.contains_pointer() && shown.hovered_node != *node {
-            *node = shown.hovered_node;
-            ui.ctx().request_repaint();
-        }
-        shown.node_tooltip_ui(|ui, node| self.node_ui(ui, analysis, node));
-        let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
-        let bar = ColourBar {
-            title: self.colours.title(),
-            range: self.range.clone(),
-            colours: self.colours,
-            theme,
-        };
-        bar.show(&mut slot, scale.height());
+    });
+    let space_left = ui.available_rect_before_wrap();
+    let (picture, scale) = space_left.split_left_right_at_x(space_left.right() - ColourBar::WIDTH);
+    let mut slot = ui.new_child(UiBuilder::new().max_rect(picture));
+    let marked_node = *node;
+    let view = SurfaceView {
+        label,
+        surface,
+        marked_node,
+        theme,
+    };
+    let shown = view.show(&mut slot, look.camera);
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
     }
+    if shown.response.contains_pointer() && shown.hovered_node != *node {
+        *node = shown.hovered_node;
+        ui.ctx().request_repaint();
+    }
+    shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
+    let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
+    let colours = surface.scale();
+    ColourBar { scale: &colours, theme }.show(&mut slot, scale.height())
+}
 
-    fn node_ui(&self, ui: &mut Ui, analysis: &Analysis, node: usize) {
-        let per_row = analysis.question.sensor.scale.nodes_per_row();
-        let (Some(at), Some(row)) = (self.frame.nodes_mm.get(node), analysis.rows.get(node / per_row)) else {
-            return;
-        };
-        let name = format!("Row {}, node {}", row.row + 1, node % per_row + 1);
-        ui.label(RichText::new(name).font(semibold(type_size().note)));
-        let value = format_number(at.z);
-        let text = match self.colours {
-            Colours::Pattern => format!("{value} of the largest deflection"),
-            _ => format!("readings change by {value} per mm"),
-        };
-        ui.label(RichText::new(text).size(type_size().note));
-    }
+fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
+    let per_row = analysis.question.sensor.scale.nodes_per_row();
+    let (Some(at), Some(row)) = (surface.nodes.get(node), analysis.rows.get(node / per_row)) else {
+        return;
+    };
+    let name = format!("Row {}, node {}", row.row + 1, node % per_row + 1);
+    ui.label(RichText::new(name).font(semibold(type_size().note)));
+    let value = format_number(at.z);
+    let text = match surface.quantity {
+        Quantity::Pattern => format!("{value} of the largest deflection"),
+        _ => format!("readings change by {value} per mm"),
+    };
+    ui.label(RichText::new(text).size(type_size().note));
 }
 
 /// Which coordinate is shown, where several are unknown.

@@ -2,10 +2,7 @@
 
 use eframe::egui::{Align, Label, Layout, RichText, Ui};
 
-use super::{
-    TradeLook,
-    names::{frame_time, point_facts, point_name},
-};
+use super::TradeLook;
 use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
@@ -13,12 +10,13 @@ use crate::{
     },
     evaluation::{TradeLevel, TradePoint},
     export::format_percent,
+    figure::trade_words::{frame_time, point_facts, point_name},
 };
 
 /// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
 /// so.
 pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_load: bool) -> Option<usize> {
-    let [fastest, most_accurate] = look.chosen(level);
+    let [fastest, most_accurate] = level.answers(&look.limits);
     section_heading_ui(ui, "Which one to take");
     let hint = "The least time for a frame with at most this error of z.";
     quantity_ui(ui, "Fastest under", hint, &mut look.limits.percent, 1e-15..=1e6, "%");

@@ -1,13 +1,15 @@
 use std::path::Path;
 
+use super::TradeLook;
 use crate::{
     app::shared::{FileTask, FileWords},
-    evaluation::{TradeCost, TradeLevel},
+    evaluation::TradeLevel,
     export::{
         atomic_write,
         figures::{PictureError, PictureFormat},
-        trade_plot, write_trade,
+        write_trade,
     },
+    figure::trade_off_figure,
 };
 
 /// What can be written about a measurement.
@@ -15,38 +17,30 @@ use crate::{
 pub enum TradeFile {
     /// Every point of every level of noise, as CSV.
     Points,
-    /// The chart of the level on show.
-    Figure(TradeCost, PictureFormat),
+    /// Both charts of the level on show.
+    Charts(PictureFormat),
 }
 
 impl TradeFile {
     /// In the order offered.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 3] = [
         Self::Points,
-        Self::Figure(TradeCost::Decoding, PictureFormat::Svg),
-        Self::Figure(TradeCost::Decoding, PictureFormat::Png),
-        Self::Figure(TradeCost::Training, PictureFormat::Svg),
-        Self::Figure(TradeCost::Training, PictureFormat::Png),
+        Self::Charts(PictureFormat::Svg),
+        Self::Charts(PictureFormat::Png),
     ];
 
     /// What the file is called.
     pub fn words(self) -> FileWords {
-        let (name, extensions) = match self {
-            Self::Points => ("All points as CSV…", &["csv"]),
-            Self::Figure(TradeCost::Decoding, PictureFormat::Svg) => ("Decoding chart as SVG…", &["svg"]),
-            Self::Figure(TradeCost::Decoding, PictureFormat::Png) => ("Decoding chart as PNG…", &["png"]),
-            Self::Figure(TradeCost::Training, PictureFormat::Svg) => ("Training chart as SVG…", &["svg"]),
-            Self::Figure(TradeCost::Training, PictureFormat::Png) => ("Training chart as PNG…", &["png"]),
-        };
-        let (kind, description) = match self {
+        let charts = "Both charts of the level of noise on show, on a light ground, at publication size.";
+        let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
             Self::Points => (
+                "All points as CSV…",
                 "points",
                 "Every point at every level of noise with all its digits, as CSV.",
+                &["csv"],
             ),
-            Self::Figure(..) => (
-                "chart",
-                "The chart of the level of noise on show, on a light ground, at publication size.",
-            ),
+            Self::Charts(PictureFormat::Svg) => ("Charts as SVG…", "charts", charts, &["svg"]),
+            Self::Charts(PictureFormat::Png) => ("Charts as PNG…", "charts", charts, &["png"]),
         };
         FileWords {
             name,
@@ -56,23 +50,20 @@ impl TradeFile {
         }
     }
 
-    /// The file about `levels`, of which that in the place `shown` is on show.
-    pub fn task(self, levels: Vec<TradeLevel>, shown: usize) -> FileTask {
-        let word = match self {
-            Self::Points => "trade",
-            Self::Figure(TradeCost::Decoding, _) => "trade_decoding",
-            Self::Figure(TradeCost::Training, _) => "trade_training",
-        };
+    /// The file about `levels`, looked at so.
+    pub fn task(self, levels: Vec<TradeLevel>, look: &TradeLook) -> FileTask {
         let words = self.words();
-        let suggestion = format!("{word}.{}", words.extensions[0]);
-        FileTask::save(words, suggestion, move |path| self.write(&levels, shown, path))
-    }
-
-    fn write(self, levels: &[TradeLevel], shown: usize, path: &Path) -> Result<(), PictureError> {
-        match (self, levels.get(shown)) {
-            (Self::Figure(cost, format), Some(level)) => trade_plot(level, cost).draw().save(format, path)?,
-            _ => atomic_write(path, |writer| write_trade(levels, writer))?,
-        }
-        Ok(())
+        let suggestion = format!("trade_off.{}", words.extensions[0]);
+        let charts = levels
+            .get(look.level)
+            .map(|level| trade_off_figure(level, &look.limits));
+        let write = move |path: &Path| -> Result<(), PictureError> {
+            match (self, &charts) {
+                (Self::Charts(format), Some(charts)) => charts.draw().save(format, path)?,
+                _ => atomic_write(path, |writer| write_trade(&levels, writer))?,
+            }
+            Ok(())
+        };
+        FileTask::save(words, suggestion, write)
     }
 }

@@ -9,7 +9,7 @@ use crate::{
         job::{Job, Wake},
         shared::{Effect, Shared, View as _},
     },
-    evaluation::{SimulatedSettings, TradeLevel, TradePoint, fastest_under, most_accurate_under},
+    evaluation::{SimulatedSettings, TradeLevel, TradeLimits, TradePoint},
 };
 
 /// The Trade-off view.
@@ -35,15 +35,6 @@ pub struct TradeLook {
     pub marked: Option<usize>,
     /// The limits of the two questions.
     pub limits: TradeLimits,
-}
-
-/// The limits of "fastest under" and "most accurate under".
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TradeLimits {
-    /// Z error in percent.
-    pub percent: f64,
-    /// Time of a frame in microseconds.
-    pub microseconds: f64,
 }
 
 /// A measurement under way.
@@ -80,15 +71,6 @@ impl TradeOutcome {
     pub fn points(&self) -> (usize, usize) {
         let done = self.levels.iter().map(|level| level.points.len()).sum();
         (done, self.plan.points())
-    }
-}
-
-impl Default for TradeLimits {
-    fn default() -> Self {
-        Self {
-            percent: 1.0,
-            microseconds: 10.0,
-        }
     }
 }
 
@@ -180,19 +162,5 @@ impl TradeOffView {
         self.outcome
             .as_ref()
             .and_then(|outcome| outcome.levels.get(self.look.level))
-    }
-}
-
-impl TradeLook {
-    /// The points that answer "fastest under" and "most accurate under", by their places in `level`.
-    pub(super) fn chosen(&self, level: &TradeLevel) -> [Option<usize>; 2] {
-        let place = |chosen: Option<&TradePoint>| {
-            let chosen = chosen?;
-            level.points.iter().position(|point| std::ptr::eq(point, chosen))
-        };
-        [
-            place(fastest_under(&level.points, self.limits.percent)),
-            place(most_accurate_under(&level.points, self.limits.microseconds)),
-        ]
     }
 }

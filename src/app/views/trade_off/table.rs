@@ -5,14 +5,14 @@ use eframe::egui::{
     WidgetText, accesskit::Role, pos2, vec2,
 };
 
-use super::{
-    chart::colour,
-    names::{frame_time, point_name, training_time},
-};
 use crate::{
-    app::theme::{Theme, semibold, space, type_size},
+    app::{
+        plotting::hue_colour,
+        theme::{Theme, semibold, space, type_size},
+    },
     evaluation::{TradeCost, TradeLevel, TradePoint},
     export::format_number,
+    figure::trade_words::{frame_time, point_name, training_time},
 };
 
 /// A column of figures.
@@ -128,7 +128,7 @@ fn row_ui(
     }
     let dot = pos2(line.left() + space(2), line.center().y);
     ui.painter()
-        .circle_filled(dot, 3.0, colour(point.report.kind, &palette));
+        .circle_filled(dot, 3.0, hue_colour(point.report.kind.colour().into(), &palette));
     let is_chosen = on_fronts.contains(&true);
     let font = |is_strong: bool| {
         if is_strong {

@@ -1,29 +1,23 @@
 use std::time::Instant;
 
 use eframe::egui::{
-    Align, ComboBox, Context, Key, Layout, Modifiers, Rect, RichText, Sense, TextWrapMode, Ui, Vec2,
+    Align, ComboBox, Context, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, Vec2,
     containers::menu::MenuButton,
 };
 
 use super::{
-    TradeEnding, TradeLook, TradeOffView, TradeOutcome,
-    chart::{chart_ui, keys},
-    choices::choices_ui,
-    file::TradeFile,
-    names::noise_name,
-    panel,
-    table::table_ui,
-    worker::TradeEvent,
+    TradeEnding, TradeLook, TradeOffView, TradeOutcome, chart::charts_ui, choices::choices_ui, file::TradeFile,
+    names::noise_name, panel, table::table_ui, worker::TradeEvent,
 };
 use crate::{
     app::{
-        plotting::{legend_ui, legend_width},
+        plotting::legend_ui,
         shared::{Effect, Notice, Shared, View},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui, state_ui},
     },
-    evaluation::{TradeCost, TradeLevel},
     export::format_duration,
+    figure::trade_off_figure,
 };
 
 impl View for TradeOffView {
@@ -89,8 +83,13 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
     card_ui(ui, upper.with_max_y(upper.max.y - gap), |ui| {
         head_ui(ui, outcome, &mut look, effects);
-        legends_ui(ui, level);
-        if let Some(clicked) = charts_ui(ui, level, &look, (trade.running.is_some(), can_load)) {
+        if level.points.is_empty() {
+            placeholder_ui(ui, waiting(trade.running.is_some()));
+            return;
+        }
+        let figure = trade_off_figure(level, &look.limits);
+        legend_ui(ui, &figure.keys);
+        if let Some(clicked) = charts_ui(ui, (level, &figure), look.marked, can_load) {
             look.marked = Some(clicked);
             loaded = can_load.then_some(clicked);
         }
@@ -118,7 +117,7 @@ fn head_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook, effects: &
         ui.set_min_height(space(7));
         ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            export_ui(ui, outcome, look.level, effects);
+            export_ui(ui, outcome, look, effects);
             level_ui(ui, outcome, look);
         });
     });
@@ -152,7 +151,7 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
     dim_ui(ui, "Noise");
 }
 
-fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, shown: usize, effects: &mut Vec<Effect>) {
+fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &TradeLook, effects: &mut Vec<Effect>) {
     ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
         let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
@@ -160,7 +159,7 @@ fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, shown: usize, effects: &mut Ve
             for file in TradeFile::ALL {
                 let words = file.words();
                 if ui.button(words.name).on_hover_text(words.description).clicked() {
-                    effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), shown)));
+                    effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), look)));
                 }
             }
         });
@@ -168,41 +167,13 @@ fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, shown: usize, effects: &mut Ve
     });
 }
 
-/// In as many rows as they need, then what the shapes mean.
-fn legends_ui(ui: &mut Ui, level: &TradeLevel) {
-    let keys = keys(level, &Theme::of(ui).palette);
-    let rows = (legend_width(ui, &keys) / ui.available_width()).ceil().max(1.0) as usize;
-    for row in keys.chunks(keys.len().div_ceil(rows)) {
-        legend_ui(ui, row);
+/// Why a level of noise has no points.
+fn waiting(is_running: bool) -> &'static str {
+    if is_running {
+        "The points of this noise appear as they are measured."
+    } else {
+        "The measurement ended before this noise."
     }
-    dim_ui(
-        ui,
-        "Discs: paper preset; diamonds: best preset; hollow: 32 bits; rings: the answers below; dotted: their limits.",
-    );
-}
-
-/// Returns the point that is clicked.
-fn charts_ui(ui: &mut Ui, level: &TradeLevel, look: &TradeLook, (is_running, can_load): (bool, bool)) -> Option<usize> {
-    let place = ui.available_rect_before_wrap();
-    if level.points.is_empty() {
-        let text = if is_running {
-            "The points of this noise appear as they are measured."
-        } else {
-            "The measurement ended before this noise."
-        };
-        placeholder_ui(ui, text);
-        return None;
-    }
-    let gap = space(3);
-    let width = 0.5 * (place.width() - gap);
-    let mut clicked = None;
-    for (number, cost) in TradeCost::ALL.into_iter().enumerate() {
-        let left = place.left() + (width + gap) * number as f32;
-        let rect = Rect::from_min_size([left, place.top()].into(), Vec2::new(width, place.height()));
-        let mut slot = ui.new_child(eframe::egui::UiBuilder::new().max_rect(rect));
-        clicked = clicked.or(chart_ui(&mut slot, look, level, cost, can_load));
-    }
-    clicked
 }
 
 /// What is going on, in the line at the bottom.

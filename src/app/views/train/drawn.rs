@@ -2,7 +2,6 @@ use std::{cell::OnceCell, sync::Arc};
 
 use ndarray::Array2;
 
-use super::test_pairs::z_pairs_mm;
 use crate::{
     app::{
         shared::Shared,
@@ -10,6 +9,7 @@ use crate::{
     },
     dataset::Dataset,
     evaluation::node_rms_mm,
+    figure::z_pairs_mm,
 };
 
 /// What is drawn of the test set on show. It is made anew only when that, the result or the snapshot changes.

@@ -1,6 +1,6 @@
 //! The Train view: one training and what it makes of the sensor.
 
-mod charts;
+mod chart;
 mod charts_card;
 mod configuration;
 mod decoders;
@@ -12,11 +12,10 @@ mod run_buttons;
 mod shown_figure;
 mod state;
 mod surfaces;
-mod test_pairs;
 mod view;
 mod workbench;
 
-pub use charts::BottomTab;
+pub use chart::BottomTab;
 pub use decoders::DecoderResult;
 pub use export_kind::ExportKind;
 pub use state::TrainView;

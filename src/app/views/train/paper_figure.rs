@@ -1,5 +1,5 @@
-use super::charts::BottomTab;
-use crate::{app::surface_view::ViewMode, evaluation::SimulatedSettings, sensor::SensorModel};
+use super::chart::BottomTab;
+use crate::{evaluation::SimulatedSettings, figure::surface::ViewMode, sensor::SensorModel};
 
 /// A figure of the paper that the window can show: its configuration, trained and looked at in its way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,5 @@
 use super::{
-    charts::BottomTab,
+    chart::BottomTab,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::Drawn,
     paper_figure::PaperFigure,

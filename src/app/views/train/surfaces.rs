@@ -1,17 +1,16 @@
-use std::ops::RangeInclusive;
-
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
 use super::{drawn::Frames, state::TrainView};
 use crate::{
     app::{
         shared::{Effect, Look, RightCard, Shared},
-        surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
-        test_view::{Frame, TestView},
+        surface_view::{ColourBar, SurfaceView},
+        test_view::TestView,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, segmented_ui},
     },
     export::format_number,
+    figure::surface::{Surface, SurfaceFigure, ViewMode},
 };
 
 /// Both surfaces side by side, and the scale of their colours.
@@ -21,9 +20,28 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
     let width = 0.5 * (cards.width() - gap);
     let left = Rect::from_min_size(cards.min, Vec2::new(width, cards.height()));
     let right = Rect::from_min_max(left.right_top() + Vec2::new(gap, 0.0), cards.max);
-    card_ui(ui, left, |ui| actual_card_ui(ui, view, shared, effects));
-    card_ui(ui, right, |ui| right_card_ui(ui, view, shared, effects));
-    colour_scales_ui(ui, scales, view, shared);
+    let figure = surface_figure(view, shared);
+    card_ui(ui, left, |ui| actual_card_ui(ui, &figure, view, shared, effects));
+    card_ui(ui, right, |ui| right_card_ui(ui, &figure, view, shared, effects));
+    colour_scales_ui(ui, scales, &figure);
+}
+
+/// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
+pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
+    let (frames, mode) = (&view.drawn.frames, shared.look.mode);
+    let surfaces = shared.test().into_iter().flat_map(|test| {
+        let actual = test.heights("Actual", &frames.actual, mode);
+        let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
+            RightCard::Decoupled => test.heights("Decoupled", decoupled, mode),
+            RightCard::Error => test.errors("Error", error, mode),
+        });
+        std::iter::once(actual).chain(beside)
+    });
+    SurfaceFigure {
+        surfaces: surfaces.collect(),
+        camera: shared.look.camera,
+        marked_node: view.node,
+    }
 }
 
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.
@@ -38,7 +56,13 @@ fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
 }
 
-fn actual_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+fn actual_card_ui(
+    ui: &mut Ui,
+    figure: &SurfaceFigure,
+    view: &mut TrainView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Actual", space(29));
@@ -49,17 +73,18 @@ fn actual_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &
             effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
         });
     });
-    let Some(test) = shared.test() else { return };
-    let card = Card {
-        label: "Actual surface",
-        frame: &view.drawn.frames.actual,
-        colours: Colours::Height,
-        range_mm: test.z_range_mm(),
-    };
-    card.show_ui(ui, (test, &view.drawn.frames), &mut view.node, shared.look, effects);
+    if let Some(surface) = figure.surfaces.first() {
+        surface_ui(ui, surface, view, shared, effects);
+    }
 }
 
-fn right_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+fn right_card_ui(
+    ui: &mut Ui,
+    figure: &SurfaceFigure,
+    view: &mut TrainView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         title_ui(ui, "Network", space(36));
@@ -69,100 +94,50 @@ fn right_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             view.right = picked.unwrap_or(view.right);
         });
     });
-    let (Some(test), Some((decoupled, error))) = (shared.test(), &view.drawn.frames.decoupled) else {
-        placeholder_ui(
+    match figure.surfaces.get(1) {
+        Some(surface) => surface_ui(ui, surface, view, shared, effects),
+        None => placeholder_ui(
             ui,
             "Press Train: the surface that the network decouples takes shape here while it learns.",
-        );
-        return;
-    };
-    let card = match view.right {
-        RightCard::Decoupled => Card {
-            label: "Decoupled surface",
-            frame: decoupled,
-            colours: Colours::Height,
-            range_mm: test.z_range_mm(),
-        },
-        RightCard::Error => Card {
-            label: "Error surface",
-            frame: error,
-            colours: Colours::Error,
-            range_mm: error.symmetric_range_mm(),
-        },
-    };
-    card.show_ui(ui, (test, &view.drawn.frames), &mut view.node, shared.look, effects);
+        ),
+    }
 }
 
 /// The scale that both surfaces share; beside it that of the errors while they are shown.
-fn colour_scales_ui(ui: &mut Ui, rect: Rect, view: &TrainView, shared: &Shared) {
-    let Some(test) = shared.test() else { return };
-    let theme = Theme::of(ui);
-    let height = |range| ColourBar {
-        title: Colours::Height.title(),
-        range,
-        colours: Colours::Height,
-        theme,
-    };
-    let mut scales = vec![height(test.z_range_mm())];
-    if let (RightCard::Error, Some((_, error))) = (view.right, &view.drawn.frames.decoupled) {
-        let colours = Colours::Error;
-        scales.push(ColourBar {
-            title: colours.title(),
-            range: error.symmetric_range_mm(),
-            colours,
-            theme,
-        });
-    }
+fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
+    let scales = figure.scales();
     let part = rect.height() / scales.len() as f32;
-    for (index, scale) in scales.into_iter().enumerate() {
+    for (index, scale) in scales.iter().enumerate() {
         let top = rect.top() + part * index as f32;
         let slot = Rect::from_x_y_ranges(rect.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
         let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-        scale.show(&mut slot_ui, slot.height());
-    }
-}
-
-struct Card<'a> {
-    label: &'static str,
-    frame: &'a Frame,
-    colours: Colours,
-    range_mm: RangeInclusive<f64>,
-}
-
-impl Card<'_> {
-    /// `node` is the one marked on every picture.
-    fn show_ui(
-        self,
-        ui: &mut Ui,
-        (test, frames): (&TestView, &Frames),
-        node: &mut Option<usize>,
-        look: Look,
-        effects: &mut Vec<Effect>,
-    ) {
         let theme = Theme::of(ui);
-        let view = SurfaceView {
-            label: self.label,
-            grid: test.surface.grid(),
-            values_mm: &self.frame.grid_mm,
-            nodes_mm: &self.frame.nodes_mm,
-            range_mm: self.range_mm,
-            colours: self.colours,
-            mode: look.mode,
-            highlight: *node,
-            theme,
-        };
-        let shown = view.show(ui, look.camera);
-        if shown.camera != look.camera {
-            let camera = shown.camera;
-            effects.push(Effect::Look(Look { camera, ..look }));
-        }
-        // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
-        if shown.response.contains_pointer() && shown.hovered_node != *node {
-            *node = shown.hovered_node;
-            ui.ctx().request_repaint();
-        }
-        shown.node_tooltip_ui(|ui, node| node_values_ui(ui, frames, test, node));
+        let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+        bar.on_hover_text(figure.note());
     }
+}
+
+fn surface_ui(ui: &mut Ui, surface: &Surface, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let (Some(test), look) = (shared.test(), shared.look) else {
+        return;
+    };
+    let shown = SurfaceView {
+        label: &format!("{} surface", surface.title),
+        surface,
+        marked_node: view.node,
+        theme: Theme::of(ui),
+    }
+    .show(ui, look.camera);
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
+    }
+    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
+    if shown.response.contains_pointer() && shown.hovered_node != view.node {
+        view.node = shown.hovered_node;
+        ui.ctx().request_repaint();
+    }
+    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, &view.drawn.frames, test, node));
 }
 
 /// The node under the pointer and its values, in two lines that hide little.
