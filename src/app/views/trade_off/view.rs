@@ -1,8 +1,7 @@
 use std::time::Instant;
 
 use eframe::egui::{
-    Align, ComboBox, Context, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, Vec2,
-    containers::menu::MenuButton,
+    Align, ComboBox, Context, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, containers::menu::MenuButton,
 };
 
 use super::{
