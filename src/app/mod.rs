@@ -27,16 +27,6 @@ mod window;
 
 use crate::export::ticks;
 
-pub use shared::{
-    Columns, Contents, Effect, FileTask, FileWords, Look, Notice, PLACES, Phase, Preview, Purpose, RightCard, RunList,
-    RunResult, RunView, Shared, View,
-};
-pub use test_view::{Frame, TestView};
-pub use training_worker::{RunId, WriteRun};
-pub use views::{
-    Analysis, AnalysisError, AxisForm, AxisKind, BottomTab, CompareView, Compared, DecoderResult, DecodersState, Drawn,
-    Ending, ExperimentLook, ExperimentsView, Form, FormError, Frames, IdentifiabilityView, ListError, Outcome,
-    Question, Running, SortBy, Thoroughness, Topic, TradeEnding, TradeForm, TradeFormError, TradeLimits, TradeLook,
-    TradeOffView, TradeOutcome, TradePlan, TradeRunning, TrainView, Views, WhichPresets,
-};
+pub use shared::{Effect, Notice, Phase, Shared};
+pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeEnding, TradePlan, Views};
 pub use window::{DecouplerWindow, DialogKind, OpenError, open};

@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use rayon::prelude::*;
 
@@ -69,9 +69,19 @@ impl Run {
         let Some((split, test)) = settings.draw_unless(is_cancelled)? else {
             return Ok(None);
         };
-        Self::with_sets(settings.into(), split, test, is_cancelled, |tasks| {
+        let run = Self::with_sets(settings.into(), split, test, is_cancelled, |tasks| {
             take_up(settings.into(), states, tasks)
-        })
+        })?;
+        Ok(run.map(Self::with_time_of_saved))
+    }
+
+    /// Trainings side by side do not know how long they took together.
+    fn with_time_of_saved(mut self) -> Self {
+        self.wall_time = match &self.starts[..] {
+            [only] if only.rows().len() == 1 => Some(only.elapsed()),
+            _ => None,
+        };
+        self
     }
 
     /// Resumes a run on the sets it was started on; see [`Self::resume`].
@@ -84,9 +94,8 @@ impl Run {
         split: Split,
         test: Dataset,
     ) -> Result<Self, RunError> {
-        whole(Self::with_sets(settings, split, test, &|| false, |tasks| {
-            take_up(settings, states, tasks)
-        }))
+        let run = Self::with_sets(settings, split, test, &|| false, |tasks| take_up(settings, states, tasks));
+        Ok(whole(run)?.with_time_of_saved())
     }
 
     /// Prepares a run whose trainings are those of `begin`; `None` once `is_cancelled`.
@@ -132,8 +141,11 @@ impl Run {
         if is_cancelled() {
             return Ok(None);
         }
+        let begun = Instant::now();
         let starts = begin(tasks.values())?;
+        let wall_time = Some(begun.elapsed());
         Ok(Some(Self {
+            wall_time,
             settings,
             test: Arc::new(test),
             scalings: tasks.map(|task| task.scaling.clone()),

@@ -1,4 +1,7 @@
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -23,6 +26,8 @@ pub struct Run {
     pub(super) test: Arc<Dataset>,
     pub(super) scalings: PerRow<(Inputs, MinMax)>,
     pub(super) starts: Vec<StartTrainer>,
+    /// See [`Self::wall_time`].
+    pub(super) wall_time: Option<Duration>,
     /// Errors of the training mean and of the linear map, target by target.
     pub(super) target_baselines: [TargetRow; 2],
     /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
@@ -47,16 +52,29 @@ impl Run {
     /// Runs one epoch of every restart that has not ended, in parallel. Returns the reason for stopping once every
     /// restart has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
+        let begun = Instant::now();
         match self.starts.as_mut_slice() {
             // Stays on this thread, which saves a hand-over every epoch.
-            [only] => only.step(),
-            all => {
-                all.par_iter_mut().for_each(|start| {
-                    start.step();
-                });
-                self.stop_reason()
+            [only] => {
+                only.step();
             }
+            all => all.par_iter_mut().for_each(|start| {
+                start.step();
+            }),
         }
+        self.wall_time = self.wall_time.map(|time| time.saturating_add(begun.elapsed()));
+        self.stop_reason()
+    }
+
+    /// Time that all restarts together have taken by the clock, without pauses; `None` if the run was resumed and the
+    /// time before is not known. [`StartTrainer::elapsed`] adds up the times of trainings that ran side by side.
+    pub fn wall_time(&self) -> Option<Duration> {
+        self.wall_time
+    }
+
+    /// Sets the time of a resumed run, if it was saved.
+    pub(crate) fn set_wall_time(&mut self, saved: Option<Duration>) {
+        self.wall_time = saved.or(self.wall_time);
     }
 
     /// Stops every restart at the user's request.

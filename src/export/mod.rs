@@ -3,6 +3,7 @@
 
 mod atomic;
 mod checkpoint_file;
+mod document;
 #[cfg(feature = "figures")]
 mod experiment_figure;
 #[cfg(feature = "figures")]
@@ -13,9 +14,12 @@ mod experiment_words;
 pub mod figures;
 mod format;
 mod heading;
+mod kept_files;
 mod limited;
 mod network_document;
 mod network_file;
+mod old_run_list;
+mod run_folder;
 mod samples;
 mod sealed;
 mod soundness;
@@ -27,16 +31,17 @@ mod trade_file;
 mod trade_plot;
 mod unfinished;
 mod workload_words;
-mod workspace_file;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
-pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
+pub use checkpoint_file::CheckpointFile;
+pub use document::{DocumentError, DocumentKind};
 #[cfg(feature = "figures")]
 pub use experiment_figure::draw_experiment;
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use format::{format_duration, format_number, format_percent};
-pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
+pub use network_file::{NetworkFile, TrainingRecord};
+pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
@@ -47,4 +52,3 @@ pub use trade_plot::trade_plot;
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
 pub use workload_words::describe_workload;
-pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

@@ -1,16 +1,18 @@
 //! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
 
-use std::fs;
+use std::{fs, path::Path};
 
 use decoupler::{
     app::{BottomTab, Phase, surface_view::ViewMode},
     export::{NetworkFile, format_number},
 };
-use eframe::egui::Key;
+use eframe::egui::{Event, Key};
 
 use crate::driver::{Driver, small, trained};
 
 const FIRST: &str = "10×6_3×18 h6 lm";
+/// Folder in which the window keeps its runs.
+const PLACE: &str = "runs";
 const SECOND: &str = "10×6_3×18 h4 lm";
 
 fn kept(driver: &Driver) -> usize {
@@ -41,15 +43,15 @@ fn wait_for_both(driver: &mut Driver) {
     });
 }
 
-/// Waits until the file in which runs are kept was read.
+/// Waits until the folder in which runs are kept was read.
 fn wait_for_file(driver: &mut Driver) {
-    driver.wait("the file", |driver| driver.state().runs.path.is_some());
+    driver.wait("the folder", |driver| driver.state().runs.path.is_some());
 }
 
 #[test]
 fn two_runs_are_compared_and_survive_a_restart() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("data").join("workspace.json");
+    let path = folder.path().join("data").join(PLACE);
     let mut driver = Driver::open_keeping(&path);
     trained_twice(&mut driver);
     driver.click(&format!("{FIRST} as A"));
@@ -101,7 +103,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
 #[test]
 fn a_run_is_removed_only_when_that_is_confirmed() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
+    let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
     trained_twice(&mut driver);
     driver.click(&format!("{FIRST} as A"));
@@ -120,48 +122,87 @@ fn a_run_is_removed_only_when_that_is_confirmed() {
 }
 
 #[test]
-fn a_damaged_list_is_told_of_and_kept_aside() {
+fn a_damaged_run_is_named_and_the_others_are_there() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    fs::write(&path, "{\"format\": \"decoupler workspace\", \"vers").unwrap();
+    let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
-    wait_for_file(&mut driver);
-    let aside = folder.path().join("workspace.json.damaged-1");
-    assert!(driver.says(&aside.display().to_string()), "{:#?}", driver.texts());
-    assert!(aside.exists());
-    drop(driver);
-    let mut driver = Driver::open_keeping(&path);
-    wait_for_file(&mut driver);
-    assert!(driver.notice().is_none(), "told once: {:?}", driver.notice());
     driver.configure_small();
     train_and_keep(&mut driver, 1);
     drop(driver);
+    let damaged = path.join("run-12.json");
+    fs::write(&damaged, "{\"format\": \"decoupler netw").unwrap();
     let mut driver = Driver::open_keeping(&path);
     wait_for_file(&mut driver);
-    assert_eq!(kept(&driver), 1, "the new list is kept");
-    assert!(driver.notice().is_none());
+    assert!(driver.says(&damaged.display().to_string()), "{:#?}", driver.texts());
+    assert_eq!(kept(&driver), 1);
+    driver.click("Dismiss");
+    driver.click_button("Compare");
+    driver.settle();
+    assert!(driver.notice().is_none(), "told once: {:?}", driver.notice());
+    assert!(damaged.exists(), "nothing is lost");
+}
+
+/// Waits until something in the folder holds this text.
+fn wait_for_text(driver: &mut Driver, folder: &Path, text: &str) {
+    let holds = |path: &Path| fs::read_to_string(path).is_ok_and(|found| found.contains(text));
+    driver.wait(text, |_| {
+        let files = fs::read_dir(folder).into_iter().flatten().flatten();
+        files.map(|file| file.path()).any(|path| holds(&path))
+    });
 }
 
 #[test]
-fn a_second_window_leaves_the_list_to_the_first() {
+fn two_windows_see_each_others_runs_names_pins_and_removals() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    let mut first = Driver::open_keeping(&path);
-    wait_for_file(&mut first);
-    let mut second = Driver::open_keeping(&path);
-    second.wait("what it is told", |driver| driver.notice().is_some());
-    assert!(
-        second.says("Another window keeps the run list"),
-        "{:#?}",
-        second.texts()
-    );
-    second.click_button("Compare");
-    assert!(second.has("Not kept after this session."));
-    drop(second);
+    let path = folder.path().join(PLACE);
+    let [mut first, mut second] = [(); 2].map(|()| Driver::open_keeping(&path));
     first.configure_small();
-    train_and_keep(&mut first, 1);
-    drop(first);
-    assert!(fs::read_to_string(&path).unwrap().contains(FIRST));
+    first.train();
+    wait_for_text(&mut first, &path, FIRST);
+    second.click_button("Compare");
+    second.wait("the run of the first window", |driver| {
+        driver.has(&format!("{FIRST} as A"))
+    });
+    second.enter("Name of run 1", "Renamed");
+    wait_for_text(&mut second, &path, "Renamed");
+    second.click("Renamed as A");
+    second.wait("its surface", |driver| driver.has("Surface of A"));
+    drop(second);
+
+    first.click_button("Compare");
+    first.wait("the name", |driver| driver.has("Renamed as A"));
+    first.wait("what was pinned", |driver| driver.has("Surface of A"));
+
+    let mut third = Driver::open_keeping(&path);
+    third.click_button("Compare");
+    third.wait("the run", |driver| driver.has("Remove Renamed"));
+    third.click("Remove Renamed");
+    third.click_button("Remove");
+    drop(third);
+    first.harness().event(Event::WindowFocused(true));
+    first.wait("the removal", |driver| !driver.has("Renamed as A"));
+    first.settle();
+    assert!(!first.has("Surface of A"));
+    assert!(first.harness().run() <= 2, "an idle view draws nothing");
+}
+
+#[test]
+fn any_number_of_a_kept_run_leaves_room_for_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let network = fs::read_to_string(fixtures.join("network_version_1.json")).unwrap();
+    let old = format!(
+        r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":{},"name":"Old","network":{network}}}],"pinned":[null,null]}}"#,
+        u64::MAX
+    );
+    fs::write(folder.path().join("workspace.json"), old).unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join(PLACE));
+    driver.configure_small();
+    driver.train();
+    driver.click_button("Compare");
+    driver.wait("both runs", |driver| {
+        driver.has("Old as A") && driver.has(&format!("{FIRST} as A"))
+    });
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Several starts, checkpoints, and going on with another method.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Duration};
 
 use decoupler::{
     app::{Notice, Phase},
@@ -53,8 +53,7 @@ fn start_endless(driver: &mut Driver) {
 /// Presses Pause and waits until the last epoch under way is shown.
 fn pause(driver: &mut Driver) {
     driver.click("⏸ Pause");
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    driver.harness().run_steps(2);
+    driver.wait_for_hold();
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
@@ -210,6 +209,29 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     assert!(driver.has("Continue"));
 }
 
+/// Starts run side by side: the time by the clock is saved, and without it there is none to show.
+#[test]
+fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6)).unwrap();
+    let mut driver = Driver::open();
+    for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
+        file.wall_time = saved.map(Duration::from_secs);
+        file.save(&path).unwrap();
+        give_path(&mut driver, OPEN, &path);
+        driver.wait("the training", |driver| {
+            let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
+            result.is_some_and(|result| result.wall_time == file.wall_time)
+        });
+        let texts = driver.texts();
+        for (name, value) in [("Training, all starts", all), ("An epoch", an_epoch)] {
+            let place = texts.iter().rposition(|text| text == name).unwrap();
+            assert_eq!(texts[place + 1], value, "{texts:#?}");
+        }
+    }
+}
+
 #[test]
 fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -227,7 +249,7 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         ("is cut off", sound[..sound.len() / 2].to_owned()),
         ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
         ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
-        ("has version 9", sound.replacen("\"version\":2", "\"version\":9", 1)),
+        ("has version 9", sound.replacen("\"version\":3", "\"version\":9", 1)),
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();

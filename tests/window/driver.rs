@@ -55,7 +55,9 @@ impl Driver {
         // Before the first frame, as the real window does, so that its fonts are there.
         let set_up = move |ctx: &Context| {
             // At the end of a test the window outlives the driver.
-            ctx.set_request_repaint_callback(move |info| drop(asks.send(info.delay)));
+            ctx.set_request_repaint_callback(move |info| {
+                let _ = asks.send(info.delay);
+            });
             let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
             let window = match runs {
                 Some(path) => window.keeping_runs(path),
@@ -143,7 +145,7 @@ impl Driver {
     /// Whether the window comes to draw no more frames: it asks for none, at no delay.
     pub(crate) fn comes_to_rest(&mut self) -> bool {
         self.harness.run();
-        self.asked.try_iter().for_each(drop);
+        while self.asked.try_recv().is_ok() {}
         self.harness.step();
         self.asked.try_iter().next().is_none()
     }
@@ -297,6 +299,15 @@ impl Driver {
         self.click("▶ Train");
         self.wait("the end of the training", |driver| {
             matches!(driver.state().phase, Phase::Ended(_))
+        });
+    }
+
+    /// Waits until the training that was held or has ended shows its last epoch: only then is a frame's time measured.
+    #[track_caller]
+    pub(crate) fn wait_for_hold(&mut self) {
+        self.wait("the hold", |driver| {
+            let result = driver.state().result();
+            result.is_some_and(|result| result.frame_time.is_some())
         });
     }
 

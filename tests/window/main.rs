@@ -15,6 +15,7 @@ mod identifying;
 mod looking;
 mod pictures;
 mod scenes;
+mod snapshots;
 mod trading;
 mod training;
 

@@ -322,9 +322,8 @@ fn files_written_before_there_were_scenes_still_open() {
         r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":1,"name":"Old","network":{network}}}],"pinned":[1,null]}}"#
     );
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    fs::write(&path, workspace).unwrap();
-    let mut driver = Driver::open_keeping(&path);
+    fs::write(folder.path().join("workspace.json"), workspace).unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
     driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
     assert_eq!(driver.notice(), None);
     let kept = &driver.state().runs.workspace.runs[0].file.settings;

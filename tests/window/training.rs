@@ -1,6 +1,6 @@
 //! Training, watched, held, ended and gone wrong.
 
-use std::{thread, time::Duration};
+use std::fs;
 
 use decoupler::{
     app::{Effect, Phase, surface_view::ViewMode},
@@ -140,16 +140,20 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
     assert!(!driver.is_enabled("▶ Train") && !driver.is_enabled("Hidden nodes"));
     driver.click("⏸ Pause");
     driver.wait("the pause", |driver| driver.has("Paused"));
-    // The epoch that was under way when the button was pressed.
-    thread::sleep(Duration::from_millis(500));
-    driver.harness().run_steps(2);
+    driver.wait_for_hold();
     let held = driver.epochs();
-    for _ in 0..50 {
-        thread::sleep(Duration::from_millis(5));
-        driver.harness().step();
-    }
-    assert_eq!(driver.epochs(), held);
-    driver.settle();
+    // What the training thread knows once it has answered what came after Pause.
+    let folder = tempfile::tempdir().unwrap();
+    let curves = folder.path().join("curves.csv");
+    driver.save("Type a path for the loss curves", &curves);
+    let lines = fs::read_to_string(curves).unwrap().lines().count();
+    assert_eq!(
+        (driver.epochs(), lines),
+        (held, held + 2),
+        "a heading, the start, and the epochs"
+    );
+    driver.click("Dismiss");
+    assert!(driver.comes_to_rest());
     assert!(!driver.is_enabled("▶ Train") && driver.is_enabled("■ Stop"));
 
     driver.click("▶ Resume");

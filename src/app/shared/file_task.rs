@@ -44,7 +44,9 @@ pub enum Purpose {
 
 /// Writes a file, or says why not.
 #[derive(Clone)]
-pub struct Contents(Arc<dyn Fn(&Path) -> Result<(), String> + Send + Sync>);
+pub struct Contents(Arc<Write>);
+
+type Write = dyn Fn(&Path) -> Result<(), String> + Send + Sync;
 
 impl Contents {
     /// Writes the file.

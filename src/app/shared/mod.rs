@@ -13,7 +13,7 @@ mod view;
 
 pub use super::training_worker::RunResult;
 pub use effect::Effect;
-pub use file_task::{Contents, FileTask, FileWords, Purpose};
+pub use file_task::{FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
 pub use notice::Notice;
 pub use run_list::{PLACES, RunList, RunsWorker};

@@ -4,7 +4,10 @@ use eframe::egui::{Align, Color32, Layout, RichText, Sense, Ui, Vec2};
 
 use super::{Phase, RunView, Shared};
 use crate::{
-    app::theme::{Theme, space, type_size},
+    app::{
+        theme::{Theme, space, type_size},
+        widgets::state_ui,
+    },
     export::{format_duration, format_number, format_percent},
     training::StopReason,
 };
@@ -13,12 +16,8 @@ use crate::{
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
-        ui.spacing_mut().item_spacing.x = space(4);
         let (colour, text) = phase_in_words(shared, ui);
-        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-        ui.painter().circle_filled(dot.center(), 4.0, colour);
-        ui.spacing_mut().item_spacing.x = space(4);
-        ui.label(RichText::new(text).size(type_size().note));
+        state_ui(ui, colour, &text);
         let Some(run) = shared
             .shown_run()
             .or(shared.run.as_ref().filter(|_| shared.phase.is_busy()))
@@ -69,8 +68,10 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             result.starts_ended, run.settings.starts
         ));
     }
-    if epochs_run > 0 {
-        let per_epoch = result.elapsed.div_f64(epochs_run as f64);
+    if let Some(time) = result.wall_time
+        && epochs_run > 0
+    {
+        let per_epoch = time.div_f64(epochs_run as f64);
         parts.push(format!("{} an epoch", format_duration(per_epoch)));
         if phase.is_busy() {
             parts.push(format!(
@@ -78,7 +79,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
                 format_duration(time_left(per_epoch, epochs.saturating_sub(epochs_run)))
             ));
         } else {
-            parts.push(format!("{} in all", format_duration(result.elapsed)));
+            parts.push(format!("{} in all", format_duration(time)));
         }
     }
     parts

@@ -41,8 +41,6 @@ pub(super) struct Labour<'a> {
     is_paused: bool,
     /// Whether the window was told what is to be kept of the run.
     is_kept: bool,
-    /// Time spent in training, all starts side by side.
-    elapsed: Duration,
     /// The start last reported, and how many of its epochs.
     reported: (usize, usize),
     next_report: Instant,
@@ -59,7 +57,6 @@ impl<'a> Labour<'a> {
             id: None,
             is_paused: false,
             is_kept: false,
-            elapsed: Duration::ZERO,
             reported: (0, 0),
             next_report: Instant::now(),
             next_starts: Instant::now(),
@@ -154,7 +151,6 @@ impl<'a> Labour<'a> {
             Ok(None) => return self.report.send(Event::Abandoned),
             Err(error) => return self.report.send(event(Err(error))),
         };
-        self.elapsed = run.leader().elapsed();
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
         (self.run, self.id) = (Some(run), Some(began.id));
@@ -182,9 +178,7 @@ impl<'a> Labour<'a> {
 
     fn train_one_epoch(&mut self) {
         let Some(run) = &mut self.run else { return };
-        let begun = Instant::now();
         let ended = run.step().is_some();
-        self.elapsed += begun.elapsed();
         if ended || Instant::now() >= self.next_report {
             self.report_progress();
         }
@@ -227,7 +221,7 @@ impl<'a> Labour<'a> {
                     .iter()
                     .filter(|start| start.stop_reason().is_some())
                     .count(),
-                elapsed: self.elapsed,
+                wall_time: run.wall_time(),
                 frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
                 networks: is_standing.then(|| Arc::new(run.network())),
             },

@@ -70,7 +70,7 @@ pub struct RunId(u64);
 
 impl RunId {
     /// That of no other training.
-    pub(super) fn new() -> Self {
+    pub fn new() -> Self {
         static BEGUN: AtomicU64 = AtomicU64::new(0);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }
@@ -138,8 +138,8 @@ pub struct RunResult {
     pub epochs_run: usize,
     /// How many starts have ended.
     pub starts_ended: usize,
-    /// Time spent in training.
-    pub elapsed: Duration,
+    /// Time of the training by the clock, all starts side by side, if it is known.
+    pub wall_time: Option<Duration>,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
     /// The networks; there when the training pauses or ends.

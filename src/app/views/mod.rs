@@ -14,18 +14,15 @@ use std::sync::Arc;
 
 use super::{job::Wake, shared::View};
 
-pub use compare::{CompareView, Compared};
-pub use experiments::{
-    AxisForm, AxisKind, Ending, ExperimentLook, ExperimentsView, Form, FormError, ListError, Outcome, Running, SortBy,
-    Topic,
-};
-pub use identifiability::{Analysis, AnalysisError, IdentifiabilityView, Question};
-pub use trade_off::{
-    Thoroughness, TradeEnding, TradeForm, TradeFormError, TradeLimits, TradeLook, TradeOffView, TradeOutcome,
-    TradePlan, TradeRunning, WhichPresets,
+pub use identifiability::{Analysis, Question};
+pub use trade_off::{TradeEnding, TradePlan};
+pub use train::{BottomTab, DecoderResult};
+
+use self::{
+    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, trade_off::TradeOffView,
+    train::TrainView,
 };
 pub(super) use train::ExportKind;
-pub use train::{BottomTab, DecoderResult, DecodersState, Drawn, Frames, TrainView};
 
 /// All views.
 #[derive(Debug)]

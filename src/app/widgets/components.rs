@@ -271,6 +271,14 @@ pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
+/// What is going on, behind a dot of its colour; what follows in the line keeps its distance.
+pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
+    ui.spacing_mut().item_spacing.x = space(4);
+    let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+    ui.painter().circle_filled(dot.center(), 4.0, colour);
+    ui.label(RichText::new(text).size(type_size().note));
+}
+
 /// How much is done, as a bar over the available width; `name` is what is being done.
 pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32) -> Response {
     let palette = &Theme::of(ui).palette;

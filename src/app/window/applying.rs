@@ -80,6 +80,8 @@ impl DecouplerWindow {
     /// Shows the view in this place.
     pub(super) fn show(&mut self, place: usize) {
         self.shown = place;
+        // Another window may have been at work.
+        self.runs.look();
         self.views.all()[place].enter(&self.shared);
     }
 

@@ -78,11 +78,11 @@ impl DecouplerWindow {
         Ok(window)
     }
 
-    /// Takes up the run list in `path`, and keeps finished trainings there from now on. Without it they are gone when the
-    /// window closes.
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.load(path);
+        self.runs.open(path);
         self
     }
 
@@ -108,6 +108,10 @@ impl DecouplerWindow {
 
     /// Lays out the window and does what the user meant.
     pub fn show_ui(&mut self, ui: &mut Ui) {
+        // Another window may have been at work.
+        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+            self.runs.look();
+        }
         let mut effects = Vec::new();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
         // A question is to be answered first.
@@ -129,7 +133,7 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, &self.names, self.shown, |ui| {
-                    view.tools_ui(ui, shared, &mut effects)
+                    view.tools_ui(ui, shared, &mut effects);
                 })
             });
         Panel::bottom("status line")
@@ -356,5 +360,47 @@ mod tests {
         assert_eq!(window.notice, Some(Notice::Done(format!("Saved {}", path.display()))));
         let file = NetworkFile::load(&path).unwrap();
         assert_eq!(file.settings.hidden, shown.hidden);
+    }
+
+    #[test]
+    fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("network.json");
+        let mut window = window();
+        // The desktop's dialog is open.
+        let task = save_task(&window);
+        let mut other = window.shared.draft;
+        other.hidden = 4;
+        window.apply(Effect::Configure(Box::new(other)));
+        window.apply(Effect::Train);
+        wait(&mut window, |window| {
+            matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings.hidden == 4
+        });
+        window.answer(task, path.clone());
+        wait(&mut window, |window| window.notice.is_some());
+        let Some(Notice::Failed(reason)) = &window.notice else {
+            panic!("{:?}", window.notice)
+        };
+        assert!(reason.contains("another training has taken the place"), "{reason}");
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
+        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
+        wait(&mut window, |window| window.shared.test().is_some());
+        let mut impossible = window.shared.draft;
+        impossible.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        impossible.training.stopping.goal_mse = f64::NAN;
+        window.apply(Effect::Configure(Box::new(impossible)));
+        // Before the new test set is there.
+        window.apply(Effect::Train);
+        wait(&mut window, |window| window.notice.is_some());
+        wait(&mut window, |window| {
+            window
+                .shared
+                .test()
+                .is_some_and(|test| test.sensor == impossible.source.sensor)
+        });
     }
 }

@@ -47,6 +47,13 @@ impl DecouplerWindow {
         self.take_close_request();
     }
 
+    /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
+    fn refuse(&mut self, reason: String) {
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notice = Some(Notice::Failed(reason));
+        self.ask_for_what_is_missing();
+    }
+
     fn tell_written(&mut self, written: Result<PathBuf, String>) {
         self.notice = Some(match written {
             Ok(path) => {
@@ -100,10 +107,7 @@ impl DecouplerWindow {
                 shared.run = Some(RunView::new(*began));
                 shared.phase = Phase::Training;
             }
-            Event::Began(Err(error)) => {
-                shared.phase = shared.phase_at_rest();
-                self.notice = Some(Notice::Failed(error.to_string()));
-            }
+            Event::Began(Err(error)) => self.refuse(error.to_string()),
             Event::Opened(Ok(began)) => {
                 shared.draft = began.settings;
                 shared.preview = None;
@@ -115,10 +119,7 @@ impl DecouplerWindow {
                 // If it has ended, the news of it say so.
                 shared.phase = Phase::Paused;
             }
-            Event::Opened(Err(error)) => {
-                shared.phase = shared.phase_at_rest();
-                self.notice = Some(Notice::Failed(error));
-            }
+            Event::Opened(Err(reason)) => self.refuse(reason),
             Event::Continued(Ok(settings)) => {
                 if let Some(run) = &mut shared.run {
                     run.asked = SimulatedSettings {
@@ -146,7 +147,7 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
             }
-            Event::Finished(Ok(file)) => shared.runs.keep(*file, &self.runs),
+            Event::Finished(Ok(file)) => self.runs.keep(*file),
             Event::Finished(Err(reason)) => self.notice = Some(Notice::Failed(reason)),
             Event::Died(reason) => {
                 shared.phase = Phase::Died;

@@ -2,8 +2,7 @@ use directories::ProjectDirs;
 use eframe::{NativeOptions, egui};
 use thiserror::Error;
 
-use super::DecouplerWindow;
-use crate::app::DialogKind;
+use super::{DecouplerWindow, DialogKind};
 
 /// Why the window cannot open.
 #[derive(Debug, Error)]
@@ -52,7 +51,7 @@ pub fn open() -> Result<(), OpenError> {
         let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native)?;
         // Systems without a home folder keep no runs, which the run list says.
         let window = match ProjectDirs::from("", "", "decoupler") {
-            Some(folders) => window.keeping_runs(folders.data_dir().join("workspace.json")),
+            Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
             None => window,
         };
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))

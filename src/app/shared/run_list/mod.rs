@@ -1,5 +1,5 @@
-//! Every finished training is kept, and all of them survive a restart. A thread of its own reads and writes the
-//! workspace file.
+//! Every finished training is kept, and all of them survive a restart. A thread of its own keeps their
+//! folder.
 
 mod news;
 mod state;

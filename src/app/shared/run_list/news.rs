@@ -1,30 +1,22 @@
-//! The one place that changes the run list.
-
-use std::sync::Arc;
+//! The one place that changes the run list: at once what is shown, and the folder as soon as the thread can.
 
 use super::{
     RunList, RunsWorker,
-    worker::{RunsEvent, RunsRequest},
+    worker::{Listed, RunsEvent, RunsRequest},
 };
-use crate::{
-    app::shared::Notice,
-    export::{FoundWorkspace, NetworkFile, Workspace},
-};
+use crate::app::shared::Notice;
 
 impl RunList {
-    /// Takes what the thread has to tell; returns what the user is to be told.
+    /// Takes the list from the thread; returns what the user is to be told.
     pub fn take_news(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
         while let Some(event) = worker.next_event() {
             match event {
-                RunsEvent::Loaded(path, Ok(FoundWorkspace { workspace, warning })) => {
-                    self.path = Some(path);
-                    // What was damaged is replaced at once, lest it be found again.
-                    self.take_up(workspace, warning.is_some(), worker);
-                    notice = warning.map(Notice::Failed).or(notice);
-                }
-                RunsEvent::Loaded(_, Err(reason)) | RunsEvent::NotSaved(reason) => {
-                    notice = Some(Notice::Failed(reason));
+                RunsEvent::Listed(Listed { runs, path, problems }) => {
+                    (self.workspace, self.path) = (runs, path);
+                    if !problems.is_empty() {
+                        notice = Some(Notice::Failed(problems.join(". ")));
+                    }
                 }
                 RunsEvent::Died(reason) => {
                     self.path = None;
@@ -37,52 +29,24 @@ impl RunList {
         notice
     }
 
-    /// Puts the runs of the file before those that were finished while it was read.
-    fn take_up(&mut self, mut workspace: Workspace, is_repaired: bool, worker: &RunsWorker) {
-        std::mem::swap(&mut self.workspace, &mut workspace);
-        let newer = workspace.runs;
-        let has_newer = !newer.is_empty();
-        for run in newer {
-            let run = self.new_run(run.file);
-            self.workspace.runs.push(run);
-        }
-        if has_newer || is_repaired {
-            self.save(worker);
-        }
-    }
-
-    fn save(&self, worker: &RunsWorker) {
-        worker.ask(RunsRequest::Save(self.workspace.clone()));
-    }
-
-    /// Keeps a finished training in the list.
-    pub fn keep(&mut self, file: NetworkFile, worker: &RunsWorker) {
-        let run = self.new_run(Arc::new(file));
-        self.workspace.runs.push(run);
-        self.save(worker);
-    }
-
-    /// Calls the run with this number so, if that is a name.
+    /// Gives the run with this number another name, unless that is empty.
     pub fn rename(&mut self, id: u64, name: &str, worker: &RunsWorker) {
-        let run = self.workspace.runs.iter_mut().find(|run| run.id == id);
-        if let Some(run) = run.filter(|_| !name.trim().is_empty()) {
-            name.trim().clone_into(&mut run.name);
-            self.save(worker);
+        let (name, run) = (name.trim(), self.workspace.runs.iter_mut().find(|run| run.id == id));
+        if let Some(run) = run.filter(|_| !name.is_empty()) {
+            name.clone_into(&mut run.name);
+            worker.ask(RunsRequest::Rename(id, name.to_owned()));
         }
     }
 
     /// Shows a run in one of the two places, or nothing.
     pub fn pin(&mut self, place: usize, id: Option<u64>, worker: &RunsWorker) {
         self.workspace.pinned[place] = id;
-        self.save(worker);
+        worker.ask(RunsRequest::Pin(place, id));
     }
 
-    /// Keeps the run with this number no longer.
+    /// Removes the run with this number for good.
     pub fn remove(&mut self, id: u64, worker: &RunsWorker) {
         self.workspace.runs.retain(|run| run.id != id);
-        for pinned in self.workspace.pinned.iter_mut().filter(|pinned| **pinned == Some(id)) {
-            *pinned = None;
-        }
-        self.save(worker);
+        worker.ask(RunsRequest::Remove(id));
     }
 }

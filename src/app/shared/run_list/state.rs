@@ -1,9 +1,6 @@
-use std::{path::PathBuf, sync::Arc};
+use std::path::PathBuf;
 
-use crate::{
-    evaluation::SimulatedSettings,
-    export::{KeptRun, NetworkFile, Workspace},
-};
+use crate::export::{KeptRun, KeptRuns};
 
 /// The names of the two places.
 pub const PLACES: [&str; 2] = ["A", "B"];
@@ -12,7 +9,7 @@ pub const PLACES: [&str; 2] = ["A", "B"];
 #[derive(Debug, Default)]
 pub struct RunList {
     /// The runs, and which two are compared.
-    pub workspace: Workspace,
+    pub workspace: KeptRuns,
     /// Where runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
 }
@@ -26,25 +23,5 @@ impl RunList {
     /// The run in one of the two places.
     pub fn pinned(&self, place: usize) -> Option<&KeptRun> {
         self.run(self.workspace.pinned[place]?)
-    }
-
-    /// A run of these contents, not yet in the list.
-    pub fn new_run(&self, file: Arc<NetworkFile>) -> KeptRun {
-        let largest = self.workspace.runs.iter().map(|run| run.id).max();
-        KeptRun {
-            id: largest.unwrap_or(0) + 1,
-            name: self.new_name(&file.settings),
-            file,
-        }
-    }
-
-    /// Array, hidden nodes and method; numbered if there is such a name.
-    fn new_name(&self, settings: &SimulatedSettings) -> String {
-        let method = settings.training.method.short_name();
-        let name = format!("{} h{} {method}", settings.source.sensor.scale, settings.hidden);
-        let is_taken = |name: &str| self.workspace.runs.iter().any(|run| run.name == name);
-        let numbered = (2..).map(|number| format!("{name} ({number})"));
-        let mut names = std::iter::once(name.clone()).chain(numbered);
-        names.find(|name| !is_taken(name)).unwrap_or(name)
     }
 }

@@ -1,36 +1,53 @@
-//! The thread that reads and writes the workspace file. Requests go in, events
-//! come out, and each event wakes the window. When the window closes it waits for what is still to be written.
+//! The thread that keeps the run list in its folder. Requests go in, the list as it then is comes out, which wakes the
+//! window. When the window closes it waits for what is still to be written.
 
 use std::{
-    collections::VecDeque,
-    fs::{self, File},
-    path::{Path, PathBuf},
-    sync::mpsc::{Receiver, Sender, channel},
+    fmt,
+    path::PathBuf,
+    sync::{
+        Arc,
+        mpsc::{Sender, channel},
+    },
     time::Duration,
 };
 
 use crate::{
     app::job::{Job, JobError, Wake},
-    export::{FoundWorkspace, Workspace, WorkspaceError, WriteError},
+    export::{KeptRuns, NetworkFile, RunFolder},
 };
 
 /// Longest time that closing waits for the files.
 const LONGEST_WRITE: Duration = Duration::from_secs(5);
 
-/// What the window asks of the thread.
+/// Requests to the thread.
 pub(super) enum RunsRequest {
-    /// Take up the workspace in this file.
-    Load(PathBuf),
-    /// Write the workspace. Only the newest one counts.
-    Save(Workspace),
+    /// Keep the runs in this folder.
+    Open(PathBuf),
+    /// See what other windows have changed.
+    Look,
+    /// Add a finished training.
+    Keep(Arc<NetworkFile>),
+    /// Give a run another name.
+    Rename(u64, String),
+    /// Show this run in one of the two places, or nothing.
+    Pin(usize, Option<u64>),
+    /// Remove a run for good.
+    Remove(u64),
 }
 
-/// What the thread tells the window.
+/// The run list after a request.
+pub(super) struct Listed {
+    pub(super) runs: KeptRuns,
+    /// Folder in which they are kept, if they are.
+    pub(super) path: Option<PathBuf>,
+    /// Files that cannot be read or written.
+    pub(super) problems: Vec<String>,
+}
+
+/// News from the thread.
 pub(super) enum RunsEvent {
-    /// The workspace, or why runs are not kept.
-    Loaded(PathBuf, Result<FoundWorkspace, String>),
-    /// The workspace could not be written.
-    NotSaved(String),
+    /// The run list after a request.
+    Listed(Listed),
     /// The thread has ended, and why, unless it was to end.
     Died(Option<JobError>),
 }
@@ -49,11 +66,9 @@ impl RunsWorker {
         let mut job = Job::new("run list", wake);
         job.start(
             move |report| {
-                let mut labour = Labour::default();
-                while let Some(request) = labour.next(&incoming) {
-                    if let Some(event) = labour.answer(request) {
-                        report.send(event);
-                    }
+                let mut folder = RunFolder::default();
+                for request in incoming {
+                    report.send(RunsEvent::Listed(answer(request, &mut folder)));
                 }
             },
             |ended| RunsEvent::Died(ended.err()),
@@ -64,12 +79,21 @@ impl RunsWorker {
         }
     }
 
-    /// Takes up the workspace in `path`, and keeps runs there from now on.
-    pub fn load(&self, path: PathBuf) {
-        self.ask(RunsRequest::Load(path));
+    /// Shows the runs in the folder `path`, and keeps runs there from now on.
+    pub fn open(&self, path: PathBuf) {
+        self.ask(RunsRequest::Open(path));
     }
 
-    /// Asks for something.
+    /// Shows what other windows have changed.
+    pub fn look(&self) {
+        self.ask(RunsRequest::Look);
+    }
+
+    /// Adds a finished training.
+    pub fn keep(&self, file: NetworkFile) {
+        self.ask(RunsRequest::Keep(Arc::new(file)));
+    }
+
     pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The other end is gone only if the thread died, which is the last event.
@@ -91,71 +115,34 @@ impl Drop for RunsWorker {
     }
 }
 
-/// The thread's own state.
-#[derive(Default)]
-struct Labour {
-    queue: VecDeque<RunsRequest>,
-    /// Where the workspace is written, and the lock that keeps other windows from it.
-    place: Option<(PathBuf, File)>,
-}
-
-impl Labour {
-    /// The next request; waits for one. `None` once the window is closed and everything is done.
-    fn next(&mut self, incoming: &Receiver<RunsRequest>) -> Option<RunsRequest> {
-        if self.queue.is_empty() {
-            self.enqueue(incoming.recv().ok()?);
-        }
-        while let Ok(request) = incoming.try_recv() {
-            self.enqueue(request);
-        }
-        self.queue.pop_front()
-    }
-
-    fn enqueue(&mut self, request: RunsRequest) {
-        if let RunsRequest::Save(_) = request {
-            self.queue.retain(|older| !matches!(older, RunsRequest::Save(_)));
-        }
-        self.queue.push_back(request);
-    }
-
-    fn answer(&mut self, request: RunsRequest) -> Option<RunsEvent> {
-        match request {
-            RunsRequest::Load(path) => {
-                let found = self.load(&path);
-                Some(RunsEvent::Loaded(path, found))
+fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
+    // Changes are made to what is there now.
+    let mut problems = folder.look();
+    match request {
+        RunsRequest::Open(path) => match RunFolder::open(&path) {
+            Ok((opened, found)) => {
+                *folder = opened;
+                problems.extend(found);
             }
-            RunsRequest::Save(workspace) => {
-                let (path, _) = self.place.as_ref()?;
-                let saved = workspace.save(path);
-                saved.err().map(|error| RunsEvent::NotSaved(error.to_string()))
-            }
+            Err(error) => problems.push(format!("{error}; runs of this session are not kept")),
+        },
+        RunsRequest::Look => {}
+        RunsRequest::Keep(file) => problems.extend(failure(folder.keep(file))),
+        RunsRequest::Rename(id, name) => problems.extend(failure(folder.rename(id, &name))),
+        RunsRequest::Pin(place, id) => {
+            let mut pinned = folder.runs().pinned;
+            pinned[place] = id;
+            problems.extend(failure(folder.pin(pinned)));
         }
+        RunsRequest::Remove(id) => problems.extend(failure(folder.remove(id))),
     }
-
-    fn load(&mut self, path: &Path) -> Result<FoundWorkspace, String> {
-        let lock = lock(path)?;
-        let found = Workspace::load(path).map_err(|error: WorkspaceError| error.to_string())?;
-        self.place = Some((path.to_owned(), lock));
-        Ok(found)
+    Listed {
+        runs: folder.runs().clone(),
+        path: folder.path().map(PathBuf::from),
+        problems,
     }
 }
 
-/// Keeps other windows from writing the same workspace, until the file returned is closed.
-fn lock(path: &Path) -> Result<File, String> {
-    let refused = |error: WriteError| format!("{error}; runs of this session are not kept");
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|source| refused(WriteError::io(folder, source)))?;
-    }
-    let place = path.with_extension("lock");
-    let file = File::options().create(true).append(true).open(&place);
-    let file = file.map_err(|source| refused(WriteError::io(&place, source)))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(fs::TryLockError::WouldBlock) => Err(format!(
-            "Another window keeps the run list '{}': runs of this one are not kept.",
-            path.display()
-        )),
-        // Some network folders know no locks; one window at a time is then the user's care.
-        Err(fs::TryLockError::Error(_)) => Ok(file),
-    }
+fn failure<E: fmt::Display>(written: Result<(), E>) -> Option<String> {
+    written.err().map(|error| format!("{error}; the change is not kept"))
 }

@@ -6,8 +6,8 @@ use super::scene_words::unlike_paper;
 use crate::{
     app::{
         shared::{Effect, PLACES, Shared},
-        theme::{Theme, space, type_size},
-        widgets::{scrolled_ui, section_heading_ui},
+        theme::{space, type_size},
+        widgets::{dim_ui, scrolled_ui, section_heading_ui},
     },
     evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
@@ -27,10 +27,10 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
         } else {
             dim_ui(ui, "Choose one as A and one as B to see them side by side.");
         }
-        for run in runs.workspace.runs.iter().rev() {
+        for (position, run) in runs.workspace.runs.iter().enumerate().rev() {
             ui.add_space(space(2));
             ui.separator();
-            ui.push_id(run.id, |ui| run_ui(ui, shared, run, removing, effects));
+            ui.push_id(run.id, |ui| run_ui(ui, shared, (position, run), removing, effects));
         }
         ui.add_space(space(2));
         match &runs.path {
@@ -40,14 +40,15 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
     });
 }
 
-fn dim_ui(ui: &mut Ui, text: &str) -> eframe::egui::Response {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
-}
-
-fn run_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
+fn run_ui(
+    ui: &mut Ui,
+    shared: &Shared,
+    (position, run): (usize, &KeptRun),
+    removing: &mut Option<u64>,
+    effects: &mut Vec<Effect>,
+) {
     let name = &run.name;
-    name_ui(ui, run, effects);
+    name_ui(ui, position, run, effects);
     dim_ui(ui, &conditions(&run.file.settings));
     let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
     let text = format!(
@@ -77,11 +78,7 @@ fn run_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option<u64
                 .min_size([space(6), space(6)].into());
             let response = ui.add(button);
             response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_pinned, format!("{name} as {letter}")));
-            let hint = if is_pinned {
-                "Show no longer"
-            } else {
-                "Show on this side"
-            };
+            let hint = if is_pinned { "Hide" } else { "Show on this side" };
             if response.on_hover_text(hint).clicked() {
                 effects.push(Effect::PinRun(place, (!is_pinned).then_some(run.id)));
             }
@@ -102,12 +99,12 @@ fn run_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option<u64
 }
 
 /// The name, to be changed in place; what is typed counts when the field is left.
-fn name_ui(ui: &mut Ui, run: &KeptRun, effects: &mut Vec<Effect>) {
+fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect>) {
     let id = Id::unique(("run name", run.id));
     let mut name: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| run.name.clone());
     let edit = ui.add(TextEdit::singleline(&mut name).id(id).desired_width(f32::INFINITY));
     ui.ctx()
-        .accesskit_node_builder(edit.id, |node| node.set_label(format!("Name of run {}", run.id)));
+        .accesskit_node_builder(edit.id, |node| node.set_label(format!("Name of run {}", position + 1)));
     if edit.changed() {
         ui.data_mut(|data| data.insert_temp(id, name.clone()));
     }

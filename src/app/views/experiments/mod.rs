@@ -17,5 +17,5 @@ mod view;
 mod worker;
 
 pub use axis_form::{AxisForm, AxisKind, ListError};
-pub use form::{Form, FormError};
+pub use form::Form;
 pub use state::{Ending, ExperimentLook, ExperimentsView, Outcome, Running, SortBy, Topic};

@@ -1,8 +1,8 @@
-use eframe::egui::{RichText, Sense, Ui, Vec2};
+use eframe::egui::Ui;
 
 use super::{Ending, ExperimentsView};
 use crate::{
-    app::theme::{Theme, space, type_size},
+    app::{theme::Theme, widgets::state_ui},
     export::format_duration,
 };
 
@@ -27,10 +27,5 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
         }
         (None, None) => (palette.dim, "Ready: press Run".to_owned()),
     };
-    ui.horizontal_centered(|ui| {
-        ui.spacing_mut().item_spacing.x = space(4);
-        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-        ui.painter().circle_filled(dot.center(), 4.0, colour);
-        ui.label(RichText::new(text).size(type_size().note));
-    });
+    ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
 }

@@ -9,5 +9,5 @@ mod state;
 mod view;
 mod worker;
 
-pub use analysis::{Analysis, AnalysisError, Question};
+pub use analysis::{Analysis, Question};
 pub use state::IdentifiabilityView;

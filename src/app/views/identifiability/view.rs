@@ -9,7 +9,7 @@ use crate::{
         surface_view::{ColourBar, Colours, SurfaceView, ViewMode},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui},
+        widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_number,
 };
@@ -95,7 +95,7 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
         let left = upper.left() + (width + gap) * number as f32;
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
         card_ui(ui, card, |ui| {
-            side.show_ui(ui, shared.look, analysis, &mut pointed, effects)
+            side.show_ui(ui, shared.look, analysis, &mut pointed, effects);
         });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
@@ -232,10 +232,7 @@ fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
         (None, None) => (palette.dim, "Nothing computed yet".to_owned()),
     };
     ui.horizontal_centered(|ui| {
-        ui.spacing_mut().item_spacing.x = space(4);
-        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-        ui.painter().circle_filled(dot.center(), 4.0, colour);
-        ui.label(RichText::new(text).size(type_size().note));
+        state_ui(ui, colour, &text);
         if let Some(analysis) = &shown.analysis {
             let sensor = &analysis.question.sensor;
             let text = format!("{}, {} rows read", sensor.scale, analysis.rows.len());

@@ -15,4 +15,4 @@ mod worker;
 
 pub use form::{Thoroughness, TradeForm, TradeFormError, WhichPresets};
 pub use plan::TradePlan;
-pub use state::{TradeEnding, TradeLimits, TradeLook, TradeOffView, TradeOutcome, TradeRunning};
+pub use state::{TradeEnding, TradeLimits, TradeLook, TradeOffView, TradeOutcome};

@@ -20,7 +20,7 @@ use crate::{
         plotting::{legend_ui, legend_width},
         shared::{Effect, Notice, Shared, View},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui},
+        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui, state_ui},
     },
     evaluation::{TradeCost, TradeLevel},
     export::format_duration,
@@ -226,10 +226,7 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
         (_, None) => (palette.dim, "Ready: press Measure".to_owned()),
     };
     ui.horizontal_centered(|ui| {
-        ui.spacing_mut().item_spacing.x = space(4);
-        let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-        ui.painter().circle_filled(dot.center(), 4.0, colour);
-        ui.label(RichText::new(text).size(type_size().note));
+        state_ui(ui, colour, &text);
         if let Some(outcome) = &trade.outcome {
             let text = format!("{}, one thread, median of many", outcome.plan.base.source.sensor.scale);
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));

@@ -98,3 +98,74 @@ impl Drawn {
         Some(self.pairs_mm.get_or_init(|| z_pairs_mm(test, decoupled_mm)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        app::{
+            shared::{RunResult, RunView},
+            training_worker::{Began, RunId},
+        },
+        evaluation::{Run, SimulatedSettings},
+    };
+
+    fn result(run: &Run) -> RunResult {
+        let decoupled_mm = run.decouple_test();
+        RunResult {
+            errors: run.errors_of(&decoupled_mm).unwrap(),
+            decoupled_mm: Arc::new(decoupled_mm),
+            best_epoch: 0,
+            flaw: None,
+            epochs_run: 0,
+            starts_ended: 0,
+            wall_time: None,
+            frame_time: None,
+            networks: None,
+        }
+    }
+
+    #[test]
+    fn what_the_whole_test_set_is_looked_at_for_is_made_once_for_each_result() {
+        let mut settings = SimulatedSettings {
+            hidden: 2,
+            ..SimulatedSettings::default()
+        };
+        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+        (settings.source.samples, settings.source.test_samples) = (20, 8);
+        let mut run = Run::prepare(settings).unwrap();
+        let mut shared = Shared::new(true);
+        shared.run = Some(RunView::new(Began {
+            id: RunId::new(),
+            settings,
+            weights: 0,
+            test: TestView::of(&settings, Arc::clone(run.test())).unwrap(),
+            baselines: *run.baselines().unwrap(),
+        }));
+        let mut drawn = Drawn::default();
+        drawn.follow(&shared, 0);
+        assert!(drawn.pairs_mm().is_none() && drawn.frames.decoupled.is_none());
+
+        shared.run.as_mut().unwrap().result = Some(result(&run));
+        assert_eq!(drawn.follow(&shared, 0), 0);
+        let first = z_pairs_mm(run.test(), &run.decouple_test());
+        assert_eq!(drawn.pairs_mm(), Some(&first[..]));
+        let (pairs, spread) = (drawn.pairs_mm().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
+        let actual = drawn.frames.actual.nodes_mm.clone();
+        assert_eq!(drawn.follow(&shared, 1_000_000), 3, "the last of four snapshots");
+        assert_ne!(drawn.frames.actual.nodes_mm, actual);
+        assert_eq!(
+            drawn.pairs_mm().unwrap().as_ptr(),
+            pairs,
+            "not made again for a snapshot"
+        );
+        assert_eq!(drawn.spread_mm().unwrap().as_ptr(), spread);
+
+        run.step();
+        shared.run.as_mut().unwrap().result = Some(result(&run));
+        drawn.follow(&shared, 3);
+        let next = z_pairs_mm(run.test(), &run.decouple_test());
+        assert_ne!(next, first);
+        assert_eq!(drawn.pairs_mm(), Some(&next[..]));
+    }
+}

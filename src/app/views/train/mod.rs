@@ -17,7 +17,6 @@ mod view;
 mod workbench;
 
 pub use charts::BottomTab;
-pub use decoders::{DecoderResult, DecodersState};
-pub use drawn::{Drawn, Frames};
+pub use decoders::DecoderResult;
 pub use export_kind::ExportKind;
 pub use state::TrainView;

@@ -133,6 +133,13 @@ mod tests {
         scene::{Noise, NoisySets},
     };
 
+    fn unfolded() -> DecodersState {
+        DecodersState {
+            is_open: true,
+            measured: Some(DecoderResult::pending()),
+        }
+    }
+
     #[test]
     fn a_decoder_worse_than_the_mean_says_so_with_cause_and_cure() {
         let mut settings = crate::evaluation::SimulatedSettings::default();
@@ -153,9 +160,7 @@ mod tests {
             .unwrap();
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
-        let mut decoders = DecodersState::default();
-        decoders.is_open = true;
-        decoders.measured = Some(DecoderResult::pending());
+        let mut decoders = unfolded();
         let place = DecoderResult::pending()
             .iter()
             .position(|result| result.kind == DecoderKind::Ridge);
@@ -166,9 +171,7 @@ mod tests {
 
     #[test]
     fn a_decoder_that_fails_says_why_and_the_others_stand() {
-        let mut decoders = DecodersState::default();
-        decoders.is_open = true;
-        decoders.measured = Some(DecoderResult::pending());
+        let mut decoders = unfolded();
         decoders.take(0, Err("no resistance at rest".to_owned()));
         let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
         harness.get_by_label("Training mean: no resistance at rest");
@@ -178,9 +181,7 @@ mod tests {
 
     #[test]
     fn rows_that_were_not_solved_are_counted_below_the_table() {
-        let mut decoders = DecodersState::default();
-        decoders.is_open = true;
-        decoders.measured = Some(DecoderResult::pending());
+        let mut decoders = unfolded();
         // Four electrodes are too few for six nodes.
         let mut settings = Preset::Best.settings();
         settings.source.sensor.scale = "10x6_3x4".parse().unwrap();

@@ -13,7 +13,7 @@ use crate::{
             shown_figure::ShownPicture,
             state::TrainView,
         },
-        widgets::{Column, Row, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+        widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
     },
     evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
@@ -201,11 +201,6 @@ fn sentence(text: &str) -> String {
     first.chain(letters).chain(['.']).collect()
 }
 
-fn dim_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
-}
-
 /// Returns the worst node, if the user wants to see it.
 fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
     let mut is_wanted = false;
@@ -252,9 +247,11 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     } else {
         "Training"
     };
-    let mut rows = vec![(training, format_duration(result.elapsed))];
+    let told = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
+    let mut rows = vec![(training, told(result.wall_time))];
     if epochs > 0 {
-        rows.push(("An epoch", format_duration(result.elapsed.div_f64(epochs as f64))));
+        let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
+        rows.push(("An epoch", told(an_epoch)));
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
