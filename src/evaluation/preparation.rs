@@ -94,7 +94,9 @@ impl Run {
         split: Split,
         test: Dataset,
     ) -> Result<Self, RunError> {
-        let run = Self::with_sets(settings, split, test, &|| false, |tasks| take_up(settings, states, tasks));
+        let run = Self::with_sets(settings, split, test, &|| false, |tasks| {
+            take_up(settings, states, tasks)
+        });
         Ok(whole(run)?.with_time_of_saved())
     }
 
