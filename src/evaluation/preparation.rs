@@ -235,13 +235,14 @@ mod tests {
         let mut settings = SimulatedSettings::default();
         settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
         (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
-        let states = Run::prepare(settings).unwrap().states();
+        let whole = Run::prepare(settings).unwrap();
+        let (states, answers_mm) = (whole.states(), whole.decouple_test());
         let begun = |is_cancelled: &dyn Fn() -> bool| Run::prepare_unless(settings, is_cancelled).unwrap();
         let resumed =
             |is_cancelled: &dyn Fn() -> bool| Run::resume_unless(settings, states.clone(), is_cancelled).unwrap();
         for prepare in [&begun as &dyn Fn(&dyn Fn() -> bool) -> Option<Run>, &resumed] {
             let (run, parts) = cancelled_at(usize::MAX, prepare);
-            assert_eq!(run.map(|run| run.states()).as_ref(), Some(&states));
+            assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
             assert!(parts >= 4, "looked at only {parts} times");
             for part in 0..parts {
                 let (run, looks) = cancelled_at(part, prepare);
