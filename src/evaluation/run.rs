@@ -73,8 +73,10 @@ impl Run {
     }
 
     /// Sets the time of a resumed run, if it was saved.
-    pub(crate) fn set_wall_time(&mut self, saved: Option<Duration>) {
+    #[cfg(feature = "files")]
+    pub(crate) fn with_wall_time(mut self, saved: Option<Duration>) -> Self {
         self.wall_time = saved.or(self.wall_time);
+        self
     }
 
     /// Stops every restart at the user's request.

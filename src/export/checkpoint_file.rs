@@ -55,9 +55,15 @@ impl CheckpointFile {
     /// # Errors
     /// The settings are impossible, or the states do not fit them or each other.
     pub fn resume(self) -> Result<Run, RunError> {
-        let mut run = Run::resume(self.settings, self.starts)?;
-        run.set_wall_time(self.wall_time);
-        Ok(run)
+        let run = Run::resume(self.settings, self.starts)?;
+        Ok(run.with_wall_time(self.wall_time))
+    }
+
+    /// As [`Self::resume`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    #[cfg(feature = "gui")]
+    pub(crate) fn resume_unless(self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Run>, RunError> {
+        let run = Run::resume_unless(self.settings, self.starts, is_cancelled)?;
+        Ok(run.map(|run| run.with_wall_time(self.wall_time)))
     }
 
     /// Writes the file whole or not at all.

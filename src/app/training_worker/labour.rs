@@ -92,8 +92,8 @@ impl<'a> Labour<'a> {
             }
             Request::Open(path) => {
                 let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
-                let prepared = prepared.and_then(|CheckpointFile { settings, starts, .. }| {
-                    let prepared = self.prepare(|is_cancelled| Run::resume_unless(settings, starts, is_cancelled));
+                let prepared = prepared.and_then(|file| {
+                    let prepared = self.prepare(|is_cancelled| file.resume_unless(is_cancelled));
                     prepared.map_err(|error| format!("'{}': {error}", path.display()))
                 });
                 self.begin(prepared, true, Event::Opened);
