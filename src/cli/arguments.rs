@@ -8,7 +8,7 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
+    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
     train::Train,
 };
 
@@ -29,6 +29,7 @@ struct Arguments {
 enum Command {
     Train(Box<Train>),
     Decode(Decode),
+    Export(Export),
     Simulate(Box<Simulate>),
     Reproduce(Reproduce),
     Trade(Box<Trade>),
@@ -68,6 +69,7 @@ impl Arguments {
         match self.command {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Decode(decode)) => decode.run(),
+            Some(Command::Export(export)) => export.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),

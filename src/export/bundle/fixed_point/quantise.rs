@@ -1,0 +1,296 @@
+use super::{
+    FixedPointError,
+    logarithm::LogTable,
+    scaled::{Multiplier, ScaledRow},
+    tangent::TangentTable,
+};
+use crate::{
+    export::bundle::{
+        portable::{ChannelRanges, Portable, PortableNetwork},
+        twofold::Twofold,
+    },
+    network::Quantity,
+};
+
+/// Bits after the point of a scaled change of a reading.
+pub(in crate::export::bundle) const INPUT_BITS: i32 = 15;
+/// Most bits after the point of a weight.
+const MOST_WEIGHT_BITS: i32 = 20;
+/// Nanometres in a millimetre.
+const NM_PER_MM: f64 = 1e6;
+/// Bits after the point of a relative change of a conductance.
+pub(in crate::export::bundle) const CONDUCTANCE_BITS: u32 = 30;
+
+/// The networks of a file in whole numbers.
+#[derive(Clone, Debug)]
+pub(in crate::export::bundle) struct FixedNetworks {
+    pub(in crate::export::bundle) quantity: Quantity,
+    /// Readings are in units of 10^−`decimals` ohm: 0, 3, 6 or 9.
+    pub(in crate::export::bundle) decimals: i32,
+    pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
+    pub(in crate::export::bundle) tangent: TangentTable,
+    pub(in crate::export::bundle) logarithm: LogTable,
+    /// Bound on the error of a coordinate within the limits of the readings, in mm.
+    pub(in crate::export::bundle) bound_mm: f64,
+}
+
+/// One network in whole numbers.
+#[derive(Clone, Debug)]
+pub(in crate::export::bundle) struct FixedNetwork {
+    /// Reading, or binary logarithm of one, from which the change of each channel is taken.
+    pub(in crate::export::bundle) centres: Vec<i32>,
+    /// Factor of the change of each channel, and the shift after it.
+    pub(in crate::export::bundle) factors: Vec<i32>,
+    pub(in crate::export::bundle) factor_shifts: Vec<u8>,
+    /// Hidden nodes × channels.
+    pub(in crate::export::bundle) hidden_weights: Vec<i16>,
+    pub(in crate::export::bundle) hidden_biases: Vec<i64>,
+    pub(in crate::export::bundle) hidden_shifts: Vec<u8>,
+    /// Coordinates × hidden nodes.
+    pub(in crate::export::bundle) output_weights: Vec<i16>,
+    /// In nm, times 2 to the power of the shift.
+    pub(in crate::export::bundle) output_biases: Vec<i64>,
+    pub(in crate::export::bundle) output_shifts: Vec<u8>,
+    /// Limits beyond which a reading counts as outside.
+    pub(in crate::export::bundle) limits: Vec<(i32, i32)>,
+}
+
+/// The change x of a reading as slope · d + offset, where d is the whole number that the decoder computes.
+struct Change {
+    centre: i32,
+    slope: Twofold,
+    offset: Twofold,
+    /// Largest |d| within the limits, at least ½.
+    span: f64,
+    /// Largest error of d.
+    error: f64,
+}
+
+impl FixedNetworks {
+    /// Rounds the weights of `portable` to 16 bits.
+    ///
+    /// # Errors
+    /// The range of the readings is not known, a number does not fit, or the bound on the error is as large as the range
+    /// of the outputs.
+    pub(in crate::export::bundle) fn of(portable: &Portable) -> Result<Self, FixedPointError> {
+        if portable.quantity == Quantity::Raw {
+            return Err(FixedPointError::Raw);
+        }
+        let ranges = portable.ranges().ok_or(FixedPointError::NoRange)?;
+        let limits = ranges.iter().flat_map(|range| &range.limits);
+        let largest_ohm = limits.fold(0.0_f64, |largest, limits| largest.max(limits.1));
+        // A factor of 2 for readings outside.
+        let fits = |decimals: &i32| largest_ohm * 10.0_f64.powi(*decimals) <= f64::from(1 << 30);
+        let decimals = [9, 6, 3, 0].into_iter().find(fits).ok_or(FixedPointError::Reading(largest_ohm))?;
+        let (tangent, logarithm) = (TangentTable::new(), LogTable::new());
+        let tangent_error = tangent.error();
+        let mut networks = Vec::new();
+        let mut bound_mm = 0.0_f64;
+        for (network, range) in portable.networks.iter().zip(ranges) {
+            let changes: Vec<_> = (range.limits.iter().zip(&network.centre_ohm))
+                .map(|(&limits, &centre_ohm)| Change::of(portable.quantity, decimals, limits, centre_ohm))
+                .collect();
+            let (fixed, bound_nm) = FixedNetwork::of(network, range, &changes, decimals, tangent_error)?;
+            bound_mm = bound_mm.max(bound_nm / NM_PER_MM);
+            networks.push(fixed);
+        }
+        let range_mm = portable.full_scale_mm;
+        if bound_mm >= range_mm {
+            return Err(FixedPointError::Coarse { bound_mm, range_mm });
+        }
+        Ok(Self {
+            quantity: portable.quantity,
+            decimals,
+            networks,
+            tangent,
+            logarithm,
+            bound_mm,
+        })
+    }
+
+    /// Unit of the readings in ohm.
+    pub(in crate::export::bundle) fn unit_ohm(&self) -> f64 {
+        10.0_f64.powi(-self.decimals)
+    }
+
+    /// A reading in units, at most the largest number.
+    pub(in crate::export::bundle) fn reading(&self, ohm: f64) -> i32 {
+        (ohm * 10.0_f64.powi(self.decimals)).round() as i32
+    }
+
+    /// Decodes a row: coordinates in nm, or `None` if a reading is not above 0.
+    pub(in crate::export::bundle) fn decode(&self, network: usize, readings_ohm: &[f64]) -> Option<Vec<i32>> {
+        let readings: Vec<_> = readings_ohm.iter().map(|&ohm| self.reading(ohm)).collect();
+        self.decode_whole(network, &readings)
+    }
+}
+
+impl Change {
+    fn of(quantity: Quantity, decimals: i32, (low, high): (f64, f64), centre_ohm: f64) -> Self {
+        let units = 10.0_f64.powi(decimals);
+        let (low, high) = (low * units, high * units);
+        let origin = Twofold::from(centre_ohm) * Twofold::from(units);
+        let wide = |centre: f64| (high - centre).max(centre - low).max(0.5);
+        match quantity {
+            Quantity::Resistance | Quantity::Raw => {
+                let centre = (0.5 * (low + high)).round();
+                let unit = Twofold::from(1.0) / Twofold::from(units);
+                Self {
+                    centre: centre as i32,
+                    slope: unit,
+                    offset: (Twofold::from(centre) - origin) * unit,
+                    span: wide(centre),
+                    error: 0.0,
+                }
+            }
+            Quantity::Conductance => {
+                let one = f64::from(1_u32 << CONDUCTANCE_BITS);
+                let centre = (2.0 / (1.0 / low + 1.0 / high)).round().max(1.0);
+                let ratio = origin / Twofold::from(centre);
+                let span = ((centre / low - 1.0).abs()).max((centre / high - 1.0).abs());
+                Self {
+                    centre: centre as i32,
+                    slope: ratio / Twofold::from(one),
+                    offset: ratio - Twofold::from(1.0),
+                    span: (span * one).max(0.5),
+                    // Division truncates.
+                    error: 1.0,
+                }
+            }
+            Quantity::LogResistance => {
+                let one = f64::from(1 << LogTable::FRACTION_BITS);
+                let ln_2 = Twofold::from(2.0).ln();
+                let centre = (0.5 * (low.log2() + high.log2()) * one).round();
+                let of_centre = Twofold::from(centre / one) * ln_2;
+                Self {
+                    centre: centre as i32,
+                    slope: ln_2 / Twofold::from(one),
+                    offset: of_centre - origin.ln(),
+                    span: (high.log2() * one - centre).max(centre - low.log2() * one).max(0.5),
+                    error: LogTable::ERROR * one,
+                }
+            }
+        }
+    }
+
+    /// Factor that brings the span to 2¹⁵ − 1.
+    fn multiplier(&self) -> Multiplier {
+        Multiplier::of(f64::from(i16::MAX) / self.span)
+    }
+
+    /// Error of the scaled change, where the span is 1.
+    fn scaled_error(&self) -> f64 {
+        Multiplier::ERROR + 0.5 / f64::from(i16::MAX) + self.error / self.span
+    }
+}
+
+impl FixedNetwork {
+    /// Rounds a network. Also returns the bound on its error in nm.
+    fn of(
+        network: &PortableNetwork,
+        range: &ChannelRanges,
+        changes: &[Change],
+        decimals: i32,
+        tangent_error: f64,
+    ) -> Result<(Self, f64), FixedPointError> {
+        let (hidden, outputs) = network.output_weights.dim();
+        let units = 10.0_f64.powi(decimals);
+        let multipliers: Vec<_> = changes.iter().map(Change::multiplier).collect();
+        let mut fixed = Self {
+            centres: changes.iter().map(|change| change.centre).collect(),
+            factors: multipliers.iter().map(|multiplier| multiplier.factor).collect(),
+            factor_shifts: multipliers.iter().map(|multiplier| multiplier.shift).collect(),
+            hidden_weights: Vec::new(),
+            hidden_biases: Vec::new(),
+            hidden_shifts: Vec::new(),
+            output_weights: Vec::new(),
+            output_biases: Vec::new(),
+            output_shifts: Vec::new(),
+            limits: range
+                .limits
+                .iter()
+                .map(|&(low, high)| ((low * units).ceil() as i32, (high * units).floor() as i32))
+                .collect(),
+        };
+        let mut activation_errors = Vec::new();
+        for node in 0..hidden {
+            let error = fixed.push_node(network, changes, node)?;
+            activation_errors.push(error + tangent_error);
+        }
+        let mut bound_nm = 0.0_f64;
+        for coordinate in 0..outputs {
+            let error = fixed.push_coordinate(network, coordinate, &activation_errors)?;
+            bound_nm = bound_nm.max(error);
+        }
+        Ok((fixed, bound_nm))
+    }
+
+    /// Adds a hidden node. Returns the bound on the error that it passes on to the tangent's result.
+    fn push_node(&mut self, network: &PortableNetwork, changes: &[Change], node: usize) -> Result<f64, FixedPointError> {
+        let what = "the weights of a hidden node";
+        let mut bias = network.hidden_biases[node];
+        let (mut weights, mut spread, mut error) = (Vec::new(), 0.0, 0.0);
+        // The largest input is 2¹⁵ − 1 and not 2¹⁵.
+        let stretch = f64::from(1 << INPUT_BITS) / f64::from(i16::MAX);
+        for (change, &weight) in changes.iter().zip(network.hidden_weights.column(node)) {
+            bias = bias + weight * change.offset;
+            let scaled = (weight * change.slope).to_f64() * change.span;
+            weights.push(scaled * stretch);
+            spread += scaled.abs();
+            error += scaled.abs() * change.scaled_error();
+        }
+        let argument_bits = TangentTable::FRACTION_BITS as i32;
+        let row = ScaledRow::of(&weights, argument_bits - INPUT_BITS, MOST_WEIGHT_BITS, what)?;
+        let sum_bits = row.bits + INPUT_BITS;
+        let (sum_bias, of_bias) = whole_bias(bias.to_f64(), sum_bits, &row.weights, what)?;
+        error += row.error + of_bias + 0.5 / f64::from(1 << argument_bits);
+        // Within the limits the sum is at least this far from 0, where the tangent is steepest.
+        let nearest = (bias.to_f64().abs() - spread - error).max(0.0);
+        let slope = 1.0 - libm::tanh(nearest).powi(2);
+        self.hidden_weights.extend(row.weights);
+        self.hidden_biases.push(sum_bias);
+        self.hidden_shifts.push((sum_bits - argument_bits) as u8);
+        Ok((slope * error).min(2.0))
+    }
+
+    /// Adds a coordinate. Returns the bound on its error in nm.
+    fn push_coordinate(
+        &mut self,
+        network: &PortableNetwork,
+        coordinate: usize,
+        activation_errors: &[f64],
+    ) -> Result<f64, FixedPointError> {
+        let what = "the weights of a coordinate";
+        let activation_bits = TangentTable::ACTIVATION_BITS as i32;
+        let weights = network.output_weights.column(coordinate);
+        let weights_nm: Vec<_> = weights.iter().map(|weight| weight.to_f64() * NM_PER_MM).collect();
+        let row = ScaledRow::of(&weights_nm, -activation_bits, MOST_WEIGHT_BITS, what)?;
+        let sum_bits = row.bits + activation_bits;
+        let bias_nm = network.output_biases[coordinate].to_f64() * NM_PER_MM;
+        let (sum_bias, of_bias) = whole_bias(bias_nm, sum_bits, &row.weights, what)?;
+        let reach_nm = bias_nm.abs() + weights_nm.iter().map(|weight| weight.abs()).sum::<f64>();
+        if reach_nm > f64::from(1 << 30) {
+            return Err(FixedPointError::Range { what: "a coordinate" });
+        }
+        let of_activations = weights_nm.iter().zip(activation_errors).map(|(weight, error)| weight.abs() * error);
+        let error = of_activations.sum::<f64>() + row.error + of_bias + 0.5;
+        self.output_weights.extend(row.weights);
+        self.output_biases.push(sum_bias);
+        self.output_shifts.push(sum_bits as u8);
+        Ok(error)
+    }
+}
+
+/// A bias with so many bits after the point, and its rounding error. The sum with products of the weights and 16-bit
+/// numbers stays within 64 bits.
+fn whole_bias(bias: f64, bits: i32, weights: &[i16], what: &'static str) -> Result<(i64, f64), FixedPointError> {
+    let scale = 2.0_f64.powi(bits);
+    let whole = (bias * scale).round();
+    let products = weights.iter().map(|&weight| f64::from(weight).abs() * 32_768.0);
+    // One bit is left for the rounding of the shift.
+    if whole.abs() + products.sum::<f64>() < 2.0_f64.powi(61) {
+        Ok((whole as i64, (bias - whole / scale).abs()))
+    } else {
+        Err(FixedPointError::Range { what })
+    }
+}

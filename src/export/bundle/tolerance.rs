@@ -1,0 +1,61 @@
+use super::{
+    exact::Growth,
+    portable::Portable,
+    weights::{Arithmetic, Digits},
+};
+
+/// Largest deviation of a bundle of floating-point numbers from its network, relative to the widest range of an output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolerance {
+    pub(super) limit: f64,
+    /// The limit of the precision, without regard to the network.
+    usual: f64,
+    /// Change of an output, in parts of its range, per relative error of the changes of the readings.
+    amplification: f64,
+}
+
+impl Tolerance {
+    /// Usual limit of double precision.
+    pub(super) const DOUBLE: f64 = 1e-12;
+    /// Usual limit of single precision.
+    pub(super) const SINGLE: f64 = 1e-5;
+
+    /// The usual limit, or where rounding errors of the network's own sums can grow beyond it, the bound on these: each
+    /// of n numbers that are added up has a relative error of at most some n units (Higham, section 3.1).
+    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: Growth) -> Self {
+        // Beside the sums: difference, division, logarithm, weight and tangent.
+        let operations = (portable.channels + portable.hidden + 10) as f64;
+        let errors_mm =
+            growth.hidden_mm * arithmetic.hidden.unit_roundoff() + growth.rest_mm * arithmetic.rest.unit_roundoff();
+        let usual = match arithmetic.rest {
+            Digits::Double => Self::DOUBLE,
+            Digits::Single => Self::SINGLE,
+        };
+        Self {
+            limit: usual.max(operations * errors_mm / portable.full_scale_mm),
+            usual,
+            amplification: growth.hidden_mm / portable.full_scale_mm,
+        }
+    }
+
+    /// Remarks on the arithmetic that the network needs.
+    pub(super) fn remarks(self, arithmetic: Arithmetic) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if arithmetic == Arithmetic::MIXED {
+            remarks.push(
+                "the sums of the hidden nodes are computed in double precision, because their large products nearly \
+                 cancel; the rest is in single precision"
+                    .to_owned(),
+            );
+        }
+        if self.limit > self.usual {
+            remarks.push(format!(
+                "this network makes a relative error of the change of its readings up to {:.1e} times as large, in parts \
+                 of the range of the outputs, so that any two programs may differ by up to {:.1e} instead of {:.0e}; \
+                 train with noise (--noise) to have a network that does not",
+                self.amplification, self.limit, self.usual
+            ));
+        }
+        remarks
+    }
+}
