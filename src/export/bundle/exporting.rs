@@ -4,7 +4,7 @@ use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
     error::BundleError,
-    fixed_point::FixedNetworks,
+    fixed_point::{FixedNetworks, HiddenWidth},
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
@@ -134,11 +134,11 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth);
-        let mut remarks = tolerance.remarks(arithmetic);
         let model = |weights: &Weights| {
             vectors.deviation_mm(|vector| weights.decode(vector.network, &vector.readings_ohm)) / portable.full_scale_mm
         };
+        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights));
+        let mut remarks = tolerance.remarks(arithmetic);
         let mut checks = Vec::new();
         let mut check = |evaluator, deviation| checks.push(BundleCheck { evaluator, deviation });
         match self.format {
@@ -184,19 +184,28 @@ impl Bundle<'_> {
         let fixed = FixedNetworks::of(&self.portable)?;
         let unit_ohm = fixed.unit_ohm();
         let vectors = self.vectors(|ohm| f64::from(fixed.reading(ohm)) * unit_ohm)?;
+        // The bound holds for these.
+        let vectors = vectors.inside(&self.portable);
         let limit = fixed.bound_mm / self.portable.full_scale_mm;
         let files = c99::write_fixed(&self.name, &self.portable, &fixed, vectors.golden(), limit);
         for (name, text) in files {
             self.folder.write(&name, text)?;
         }
-        let inside = |vector: &super::vectors::Vector| fixed.decode(vector.network, &vector.readings_ohm);
         let in_mm = |nm: Vec<i32>| nm.into_iter().map(|nm| f64::from(nm) * 1e-6).collect();
-        let deviation_mm = vectors.deviation_mm(|vector| inside(vector).map(in_mm).unwrap_or_default());
+        let deviation_mm = vectors.deviation_mm(|vector| {
+            let coordinates_nm = fixed.decode(vector.network, &vector.readings_ohm);
+            coordinates_nm.map(in_mm).unwrap_or_default()
+        });
         let mut checks = vec![BundleCheck {
             evaluator: "bit-exact model in whole numbers",
             deviation: deviation_mm / self.portable.full_scale_mm,
         }];
         let mut remarks = Vec::new();
+        if fixed.hidden_width == HiddenWidth::TwentyFour {
+            let remark = "the weights of the hidden layer have 24 bits, because its large products nearly cancel; the rest \
+                          has 16";
+            remarks.push(remark.to_owned());
+        }
         match run_self_test(self.folder.path(), &self.name)? {
             Compiled::Ran { deviation } => checks.push(BundleCheck {
                 evaluator: "C source, compiled and run, equal to the model bit for bit",

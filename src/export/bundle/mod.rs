@@ -26,6 +26,9 @@ mod twofold;
 mod vectors;
 mod weights;
 
+#[cfg(test)]
+mod tests;
+
 pub use self::{
     choice::{BundleFormat, BundlePrecision, ChoiceError},
     error::BundleError,

@@ -20,9 +20,12 @@ impl Tolerance {
     /// Usual limit of single precision.
     pub(super) const SINGLE: f64 = 1e-5;
 
-    /// The usual limit, or where rounding errors of the network's own sums can grow beyond it, the bound on these: each
-    /// of n numbers that are added up has a relative error of at most some n units (Higham, section 3.1).
-    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: Growth) -> Self {
+    /// The usual limit. Where the `deviation` of an evaluation comes near it, because the network's own sums let rounding
+    /// errors grow so much, the bound on these: each of n numbers that are added up has a relative error of at most some
+    /// n units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
+    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: Growth, deviation: f64) -> Self {
+        /// Other programs add up in another order, and may be so much closer or farther.
+        const NEAR: f64 = 0.5;
         // Beside the sums: difference, division, logarithm, weight and tangent.
         let operations = (portable.channels + portable.hidden + 10) as f64;
         let errors_mm =
@@ -31,8 +34,9 @@ impl Tolerance {
             Digits::Double => Self::DOUBLE,
             Digits::Single => Self::SINGLE,
         };
+        let bound = operations * errors_mm / portable.full_scale_mm;
         Self {
-            limit: usual.max(operations * errors_mm / portable.full_scale_mm),
+            limit: if deviation <= NEAR * usual { usual } else { usual.max(bound) },
             usual,
             amplification: growth.hidden_mm / portable.full_scale_mm,
         }

@@ -84,6 +84,19 @@ impl Vectors {
         })
     }
 
+    /// Leaves out the vectors with a reading that counts as outside the range of training.
+    pub(super) fn inside(mut self, portable: &Portable) -> Self {
+        let is_inside = |vector: &Vector| {
+            portable.networks[vector.network].range.as_ref().is_none_or(|range| {
+                let mut readings = vector.readings_ohm.iter().zip(&range.limits);
+                readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
+            })
+        };
+        self.golden = self.all[..self.golden].iter().filter(|vector| is_inside(vector)).count();
+        self.all.retain(is_inside);
+        self
+    }
+
     pub(super) fn all(&self) -> &[Vector] {
         &self.all
     }

@@ -4,7 +4,7 @@ use super::{
 };
 use crate::{
     export::bundle::{
-        fixed_point::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, INPUT_BITS, LogTable, TangentTable},
+        fixed_point::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, HiddenWidth, LogTable, TangentTable},
         portable::Portable,
     },
     network::Quantity,
@@ -70,7 +70,7 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
     array("centres", "int32_t", &[1], &|network| texts(&network.centres));
     array("factors", "int32_t", &[1], &|network| texts(&network.factors));
     array("factor_shifts", "uint8_t", &[1], &|network| texts(&network.factor_shifts));
-    array("hidden_weights", "int16_t", &[0, 1], &|network| texts(&network.hidden_weights));
+    array("hidden_weights", hidden_type(networks), &[0, 1], &|network| texts(&network.hidden_weights));
     array("hidden_biases", "int64_t", &[0], &|network| longs(&network.hidden_biases));
     array("hidden_shifts", "uint8_t", &[0], &|network| texts(&network.hidden_shifts));
     array("output_weights", "int16_t", &[2, 0], &|network| texts(&network.output_weights));
@@ -81,15 +81,23 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
     push_array(&mut text, &format!("static const int16_t tangents[{}]", table.len()), &[table.len()], table);
     if networks.quantity == Quantity::LogResistance {
         let table = &networks.logarithm.values;
-        text += &format!("/* Binary logarithm, in 2^-26: largest error with interpolation {:.1e}. */\n", LogTable::ERROR);
+        text += &format!("/* ln(1 + i/256), in 2^-26: largest error of the logarithm {:.1e}. */\n", LogTable::ERROR);
         push_array(&mut text, &format!("static const int32_t logarithms[{}]", table.len()), &[table.len()], table);
     }
     text += &arithmetic(networks.quantity);
-    text += &decode(header);
+    text += &decode(header, networks.hidden_width);
     let limits = networks.networks.iter().flat_map(|network| network.limits.iter().copied());
     let limits = limits.map(|(low, high)| (low.to_string(), high.to_string()));
     push_out_of_range(&mut text, header, limits);
     text
+}
+
+/// Type of the hidden weights, and of their products.
+fn hidden_type(networks: &FixedNetworks) -> &'static str {
+    match networks.hidden_width {
+        HiddenWidth::Sixteen => "int16_t",
+        HiddenWidth::TwentyFour => "int32_t",
+    }
 }
 
 fn texts<T: ToString>(values: &[T]) -> Vec<String> {
@@ -130,27 +138,36 @@ fn arithmetic(quantity: Quantity) -> String {
         Quantity::LogResistance => {
             let rest = 30 - LogTable::INDEX_BITS;
             format!(
-                "    int exponent = 30;\n    int32_t normal, low, high;\n    \
+                "    int exponent = 30;\n    int64_t normal, rest, quotient, square, cube;\n    \
                  while ((reading >> exponent) == 0) {{\n        --exponent;\n    }}\n    \
-                 normal = (int32_t)(reading << (30 - exponent)) - INT32_C(1073741824);\n    \
-                 low = logarithms[normal >> {rest}];\n    \
-                 high = logarithms[(normal >> {rest}) + 1];\n    \
-                 return ((int64_t)exponent << {fraction}) + low +\n        \
-                 (((int64_t)(high - low) * (normal & {mask})) >> {rest}) - centre;\n",
-                fraction = LogTable::FRACTION_BITS,
+                 normal = (int64_t)reading << (30 - exponent);\n    \
+                 rest = normal & {mask};\n    \
+                 quotient = (rest << {quotient}) / (normal - rest);\n    \
+                 square = (quotient * quotient) >> {quotient};\n    \
+                 cube = (square * quotient) >> {quotient};\n    \
+                 return exponent * INT64_C({ln_2}) + logarithms[((normal - rest) >> {rest}) - {entries}] +\n        \
+                 ((quotient - square / 2 + cube / 3) >> {less}) - centre;\n",
                 mask = (1 << rest) - 1,
+                quotient = LogTable::QUOTIENT_BITS,
+                ln_2 = LogTable::LN_2,
+                entries = 1 << LogTable::INDEX_BITS,
+                less = LogTable::QUOTIENT_BITS - LogTable::FRACTION_BITS,
             )
         }
     };
     let about = match quantity {
         Quantity::Resistance | Quantity::Raw => "Difference of a reading from the centre of its channel",
         Quantity::Conductance => "Relative difference of the conductance from the centre of its channel, in 2^-30",
-        Quantity::LogResistance => "Difference of the binary logarithm from the centre of its channel, in 2^-26",
+        Quantity::LogResistance => "Difference of the logarithm from the centre of its channel, in 2^-26",
     };
     format!("{tangent}/* {about}. */\nstatic int64_t changed(int32_t reading, int32_t centre)\n{{\n{change}}}\n\n")
 }
 
-fn decode(header: &Header<'_>) -> String {
+fn decode(header: &Header<'_>, width: HiddenWidth) -> String {
+    let product = match width {
+        HiddenWidth::Sixteen => "int32_t",
+        HiddenWidth::TwentyFour => "int64_t",
+    };
     let (upper, readings) = (header.upper(), header.readings);
     format!(
         "{signature}\n{{\n    \
@@ -165,7 +182,7 @@ fn decode(header: &Header<'_>) -> String {
          for (int j = 0; j < HIDDEN; ++j) {{\n        \
          int64_t sum = hidden_biases[network][j];\n        \
          for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n            \
-         sum += (int32_t)hidden_weights[network][j][i] * changes[i];\n        }}\n        \
+         sum += ({product})hidden_weights[network][j][i] * changes[i];\n        }}\n        \
          activations[j] = tangent((int32_t)clamped(shifted(sum, hidden_shifts[network][j]), {largest}));\n    }}\n    \
          for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        \
          int64_t sum = output_biases[network][k];\n        \
@@ -175,7 +192,7 @@ fn decode(header: &Header<'_>) -> String {
          return {upper}_OK;\n}}\n\n",
         signature = header.decode_signature(),
         network = header.network_of_row(),
-        largest_change = (1 << INPUT_BITS) - 1,
+        largest_change = width.largest_change(),
         largest = TangentTable::LARGEST,
     )
 }

@@ -9,9 +9,10 @@ use crate::network::Quantity;
 
 impl FixedNetworks {
     /// Decodes readings in units: coordinates in nm, or `None` if a reading is not above 0.
-    pub(super) fn decode_whole(&self, network: usize, readings: &[i32]) -> Option<Vec<i32>> {
+    pub(in crate::export::bundle) fn decode_whole(&self, network: usize, readings: &[i32]) -> Option<Vec<i32>> {
         let network = &self.networks[network];
         let channels = readings.len();
+        let largest_change = i64::from(self.hidden_width.largest_change());
         let mut changes = Vec::new();
         for (channel, &reading) in readings.iter().enumerate() {
             if reading <= 0 {
@@ -19,7 +20,7 @@ impl FixedNetworks {
             }
             let change = self.change(reading, network.centres[channel]);
             let scaled = shift(change * i64::from(network.factors[channel]), network.factor_shifts[channel]);
-            changes.push(scaled.clamp(-32_767, 32_767));
+            changes.push(scaled.clamp(-largest_change, largest_change));
         }
         let mut activations = Vec::new();
         for (node, &bias) in network.hidden_biases.iter().enumerate() {

@@ -1,7 +1,8 @@
-/// Binary logarithm of whole numbers: a table with linear interpolation between 1 and 2.
+/// Natural logarithm of whole numbers: a table between 1 and 2, and three terms of the series from its nearest entry
+/// below.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct LogTable {
-    /// log₂(1 + i/256), with [`Self::FRACTION_BITS`] bits after the point.
+    /// ln(1 + i/256), with [`Self::FRACTION_BITS`] bits after the point.
     pub(in crate::export::bundle) values: Vec<i32>,
 }
 
@@ -10,32 +11,38 @@ impl LogTable {
     pub(in crate::export::bundle) const FRACTION_BITS: u32 = 26;
     /// Bits of the number after its first that select an entry.
     pub(in crate::export::bundle) const INDEX_BITS: u32 = 8;
-    /// Largest error of [`Self::of`]: the chord of log₂ over a step h lies at most h²/(8 ln 2) below, and entry and
-    /// interpolation are rounded.
-    pub(in crate::export::bundle) const ERROR: f64 = {
-        let step = 1.0 / (1 << Self::INDEX_BITS) as f64;
-        step * step / 8.0 / std::f64::consts::LN_2 + 2.0 / (1_u32 << Self::FRACTION_BITS) as f64
-    };
+    /// Bits of the quotient that the series takes.
+    pub(in crate::export::bundle) const QUOTIENT_BITS: u32 = 30;
+    /// ln 2.
+    pub(in crate::export::bundle) const LN_2: i64 = 46_516_320;
+    /// Largest error of [`Self::of`]: 30 times the rounding of ln 2, the next term of the series, t⁴/4 with t < 1/256,
+    /// the truncation of three terms in 2⁻³⁰, and the roundings of the entry and of the sum.
+    pub(in crate::export::bundle) const ERROR: f64 = 30.0 * 0.2 / Self::ONE + 1.0 / 4.0 / 4_294_967_296.0
+        + 4.0 / (1_u32 << Self::QUOTIENT_BITS) as f64
+        + 1.5 / Self::ONE;
+    const ONE: f64 = (1_u32 << Self::FRACTION_BITS) as f64;
 
     pub(super) fn new() -> Self {
         let entries = 1 << Self::INDEX_BITS;
-        let scale = f64::from(1 << Self::FRACTION_BITS);
-        let entry = |index: i32| (libm::log2(1.0 + f64::from(index) / f64::from(entries)) * scale).round() as i32;
+        let entry = |index: i32| (libm::log1p(f64::from(index) / f64::from(entries)) * Self::ONE).round() as i32;
         Self {
-            values: (0..=entries).map(entry).collect(),
+            values: (0..entries).map(entry).collect(),
         }
     }
 
-    /// log₂ of a number above 0.
+    /// ln of a number above 0.
     pub(super) fn of(&self, number: i32) -> i32 {
-        let exponent = 31 - number.leading_zeros() as i32;
+        let exponent = 31 - number.leading_zeros();
         // The first bit of the number becomes bit 30.
-        let normal = number << (30 - exponent);
-        let index = ((normal >> (30 - Self::INDEX_BITS)) & ((1 << Self::INDEX_BITS) - 1)) as usize;
-        let rest = i64::from(normal & ((1 << (30 - Self::INDEX_BITS)) - 1));
-        let (low, high) = (i64::from(self.values[index]), i64::from(self.values[index + 1]));
-        let part = low + (((high - low) * rest) >> (30 - Self::INDEX_BITS));
-        (exponent << Self::FRACTION_BITS) + part as i32
+        let normal = i64::from(number) << (30 - exponent);
+        let rest = normal & ((1 << (30 - Self::INDEX_BITS)) - 1);
+        let entry = normal - rest;
+        let index = (entry >> (30 - Self::INDEX_BITS)) - (1 << Self::INDEX_BITS);
+        let quotient = (rest << Self::QUOTIENT_BITS) / entry;
+        let square = (quotient * quotient) >> Self::QUOTIENT_BITS;
+        let cube = (square * quotient) >> Self::QUOTIENT_BITS;
+        let series = (quotient - square / 2 + cube / 3) >> (Self::QUOTIENT_BITS - Self::FRACTION_BITS);
+        (i64::from(exponent) * Self::LN_2 + i64::from(self.values[index as usize]) + series) as i32
     }
 }
 
@@ -50,8 +57,8 @@ mod tests {
         let scale = f64::from(1 << LogTable::FRACTION_BITS);
         let mut largest = 0.0_f64;
         for number in numbers {
-            largest = largest.max((f64::from(table.of(number)) / scale - f64::from(number).log2()).abs());
+            largest = largest.max((f64::from(table.of(number)) / scale - f64::from(number).ln()).abs());
         }
-        assert!(largest <= LogTable::ERROR && largest > 0.5 * LogTable::ERROR, "{largest}");
+        assert!(largest <= LogTable::ERROR && largest > 0.1 * LogTable::ERROR, "{largest}");
     }
 }

@@ -1,5 +1,5 @@
-//! Networks in whole numbers: 16-bit weights and activations, 64-bit sums. Readings and coordinates are 32-bit numbers of
-//! small units.
+//! Networks in whole numbers: 16-bit weights and activations, 64-bit sums; where the products of a hidden layer nearly
+//! cancel, its weights have 24 bits. Readings and coordinates are 32-bit numbers of small units.
 //!
 //! Every number has a range that holds for any readings whatever, because each step begins with a saturation; sums can
 //! therefore not wrap. The bound on the error is computed by interval analysis over the range of readings in training and
@@ -15,7 +15,7 @@ use thiserror::Error;
 
 pub(super) use self::{
     logarithm::LogTable,
-    quantise::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, INPUT_BITS},
+    quantise::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, HiddenWidth},
     tangent::TangentTable,
 };
 
@@ -39,7 +39,7 @@ pub enum FixedPointError {
         what: &'static str,
     },
     /// An error bound that says nothing.
-    #[error("with 16 bits the error is only known to be below {bound_mm:.2} mm, and the widest range of an output is {range_mm:.2} mm: train with noise (the network amplifies differences of its readings too much), or give --precision f32")]
+    #[error("in whole numbers the error is only known to be below {bound_mm:.2} mm, and the widest range of an output is {range_mm:.2} mm: train with noise (the network amplifies differences of its readings too much), or give --precision f32")]
     Coarse {
         /// The bound in mm.
         bound_mm: f64,

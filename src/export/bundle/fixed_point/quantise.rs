@@ -12,14 +12,36 @@ use crate::{
     network::Quantity,
 };
 
-/// Bits after the point of a scaled change of a reading.
-pub(in crate::export::bundle) const INPUT_BITS: i32 = 15;
-/// Most bits after the point of a weight.
-const MOST_WEIGHT_BITS: i32 = 20;
+/// Part of the range of the outputs below which the bound on the error should be.
+const USUAL_BOUND: f64 = 0.01;
+/// Bits of an output weight with its sign.
+const OUTPUT_WIDTH: u32 = 16;
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
 /// Bits after the point of a relative change of a conductance.
 pub(in crate::export::bundle) const CONDUCTANCE_BITS: u32 = 30;
+
+/// Bits of the changes of the readings and of the hidden weights, with their sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::export::bundle) enum HiddenWidth {
+    Sixteen,
+    /// Kept in 32 bits. For networks whose large products nearly cancel.
+    TwentyFour,
+}
+
+impl HiddenWidth {
+    fn bits(self) -> u32 {
+        match self {
+            Self::Sixteen => 16,
+            Self::TwentyFour => 24,
+        }
+    }
+
+    /// Largest scaled change of a reading.
+    pub(in crate::export::bundle) fn largest_change(self) -> i32 {
+        (1 << (self.bits() - 1)) - 1
+    }
+}
 
 /// The networks of a file in whole numbers.
 #[derive(Clone, Debug)]
@@ -27,6 +49,7 @@ pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) quantity: Quantity,
     /// Readings are in units of 10^−`decimals` ohm: 0, 3, 6 or 9.
     pub(in crate::export::bundle) decimals: i32,
+    pub(in crate::export::bundle) hidden_width: HiddenWidth,
     pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
     pub(in crate::export::bundle) tangent: TangentTable,
     pub(in crate::export::bundle) logarithm: LogTable,
@@ -37,17 +60,17 @@ pub(in crate::export::bundle) struct FixedNetworks {
 /// One network in whole numbers.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct FixedNetwork {
-    /// Reading, or binary logarithm of one, from which the change of each channel is taken.
+    /// Reading, or logarithm of one, from which the change of each channel is taken.
     pub(in crate::export::bundle) centres: Vec<i32>,
     /// Factor of the change of each channel, and the shift after it.
     pub(in crate::export::bundle) factors: Vec<i32>,
     pub(in crate::export::bundle) factor_shifts: Vec<u8>,
     /// Hidden nodes × channels.
-    pub(in crate::export::bundle) hidden_weights: Vec<i16>,
+    pub(in crate::export::bundle) hidden_weights: Vec<i32>,
     pub(in crate::export::bundle) hidden_biases: Vec<i64>,
     pub(in crate::export::bundle) hidden_shifts: Vec<u8>,
     /// Coordinates × hidden nodes.
-    pub(in crate::export::bundle) output_weights: Vec<i16>,
+    pub(in crate::export::bundle) output_weights: Vec<i32>,
     /// In nm, times 2 to the power of the shift.
     pub(in crate::export::bundle) output_biases: Vec<i64>,
     pub(in crate::export::bundle) output_shifts: Vec<u8>,
@@ -67,12 +90,26 @@ struct Change {
 }
 
 impl FixedNetworks {
-    /// Rounds the weights of `portable` to 16 bits.
+    /// Rounds the weights of `portable` to 16 bits, or those of the hidden layer to 24 bits where 16 are too few.
     ///
     /// # Errors
     /// The range of the readings is not known, a number does not fit, or the bound on the error is as large as the range
     /// of the outputs.
     pub(in crate::export::bundle) fn of(portable: &Portable) -> Result<Self, FixedPointError> {
+        let range_mm = portable.full_scale_mm;
+        let sixteen = Self::with_width(portable, HiddenWidth::Sixteen);
+        if sixteen.as_ref().is_ok_and(|fixed| fixed.bound_mm <= USUAL_BOUND * range_mm) {
+            return sixteen;
+        }
+        let wide = Self::with_width(portable, HiddenWidth::TwentyFour)?;
+        if wide.bound_mm < range_mm {
+            return Ok(wide);
+        }
+        let bound_mm = wide.bound_mm;
+        Err(FixedPointError::Coarse { bound_mm, range_mm })
+    }
+
+    fn with_width(portable: &Portable, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
         if portable.quantity == Quantity::Raw {
             return Err(FixedPointError::Raw);
         }
@@ -90,17 +127,14 @@ impl FixedNetworks {
             let changes: Vec<_> = (range.limits.iter().zip(&network.centre_ohm))
                 .map(|(&limits, &centre_ohm)| Change::of(portable.quantity, decimals, limits, centre_ohm))
                 .collect();
-            let (fixed, bound_nm) = FixedNetwork::of(network, range, &changes, decimals, tangent_error)?;
+            let (fixed, bound_nm) = FixedNetwork::of(network, range, &changes, decimals, hidden_width, tangent_error)?;
             bound_mm = bound_mm.max(bound_nm / NM_PER_MM);
             networks.push(fixed);
-        }
-        let range_mm = portable.full_scale_mm;
-        if bound_mm >= range_mm {
-            return Err(FixedPointError::Coarse { bound_mm, range_mm });
         }
         Ok(Self {
             quantity: portable.quantity,
             decimals,
+            hidden_width,
             networks,
             tangent,
             logarithm,
@@ -159,28 +193,26 @@ impl Change {
             }
             Quantity::LogResistance => {
                 let one = f64::from(1 << LogTable::FRACTION_BITS);
-                let ln_2 = Twofold::from(2.0).ln();
-                let centre = (0.5 * (low.log2() + high.log2()) * one).round();
-                let of_centre = Twofold::from(centre / one) * ln_2;
+                let centre = (0.5 * (low.ln() + high.ln()) * one).round();
                 Self {
                     centre: centre as i32,
-                    slope: ln_2 / Twofold::from(one),
-                    offset: of_centre - origin.ln(),
-                    span: (high.log2() * one - centre).max(centre - low.log2() * one).max(0.5),
+                    slope: Twofold::from(1.0) / Twofold::from(one),
+                    offset: Twofold::from(centre / one) - origin.ln(),
+                    span: (high.ln() * one - centre).max(centre - low.ln() * one).max(0.5),
                     error: LogTable::ERROR * one,
                 }
             }
         }
     }
 
-    /// Factor that brings the span to 2¹⁵ − 1.
-    fn multiplier(&self) -> Multiplier {
-        Multiplier::of(f64::from(i16::MAX) / self.span)
+    /// Factor that brings the span to the largest scaled change.
+    fn multiplier(&self, width: HiddenWidth) -> Multiplier {
+        Multiplier::of(f64::from(width.largest_change()) / self.span)
     }
 
     /// Error of the scaled change, where the span is 1.
-    fn scaled_error(&self) -> f64 {
-        Multiplier::ERROR + 0.5 / f64::from(i16::MAX) + self.error / self.span
+    fn scaled_error(&self, width: HiddenWidth) -> f64 {
+        Multiplier::ERROR + 0.5 / f64::from(width.largest_change()) + self.error / self.span
     }
 }
 
@@ -191,11 +223,12 @@ impl FixedNetwork {
         range: &ChannelRanges,
         changes: &[Change],
         decimals: i32,
+        width: HiddenWidth,
         tangent_error: f64,
     ) -> Result<(Self, f64), FixedPointError> {
         let (hidden, outputs) = network.output_weights.dim();
         let units = 10.0_f64.powi(decimals);
-        let multipliers: Vec<_> = changes.iter().map(Change::multiplier).collect();
+        let multipliers: Vec<_> = changes.iter().map(|change| change.multiplier(width)).collect();
         let mut fixed = Self {
             centres: changes.iter().map(|change| change.centre).collect(),
             factors: multipliers.iter().map(|multiplier| multiplier.factor).collect(),
@@ -214,7 +247,7 @@ impl FixedNetwork {
         };
         let mut activation_errors = Vec::new();
         for node in 0..hidden {
-            let error = fixed.push_node(network, changes, node)?;
+            let error = fixed.push_node(network, changes, width, node)?;
             activation_errors.push(error + tangent_error);
         }
         let mut bound_nm = 0.0_f64;
@@ -226,23 +259,30 @@ impl FixedNetwork {
     }
 
     /// Adds a hidden node. Returns the bound on the error that it passes on to the tangent's result.
-    fn push_node(&mut self, network: &PortableNetwork, changes: &[Change], node: usize) -> Result<f64, FixedPointError> {
+    fn push_node(
+        &mut self,
+        network: &PortableNetwork,
+        changes: &[Change],
+        width: HiddenWidth,
+        node: usize,
+    ) -> Result<f64, FixedPointError> {
         let what = "the weights of a hidden node";
         let mut bias = network.hidden_biases[node];
         let (mut weights, mut spread, mut error) = (Vec::new(), 0.0, 0.0);
-        // The largest input is 2¹⁵ − 1 and not 2¹⁵.
-        let stretch = f64::from(1 << INPUT_BITS) / f64::from(i16::MAX);
+        let input_bits = width.bits() as i32 - 1;
+        // The largest change is one less than a power of two.
+        let stretch = f64::from(1 << input_bits) / f64::from(width.largest_change());
         for (change, &weight) in changes.iter().zip(network.hidden_weights.column(node)) {
             bias = bias + weight * change.offset;
             let scaled = (weight * change.slope).to_f64() * change.span;
             weights.push(scaled * stretch);
             spread += scaled.abs();
-            error += scaled.abs() * change.scaled_error();
+            error += scaled.abs() * change.scaled_error(width);
         }
         let argument_bits = TangentTable::FRACTION_BITS as i32;
-        let row = ScaledRow::of(&weights, argument_bits - INPUT_BITS, MOST_WEIGHT_BITS, what)?;
-        let sum_bits = row.bits + INPUT_BITS;
-        let (sum_bias, of_bias) = whole_bias(bias.to_f64(), sum_bits, &row.weights, what)?;
+        let row = ScaledRow::of(&weights, width.bits(), argument_bits - input_bits, what)?;
+        let sum_bits = row.bits + input_bits;
+        let (sum_bias, of_bias) = whole_bias(bias.to_f64(), sum_bits, &row.weights, input_bits, what)?;
         error += row.error + of_bias + 0.5 / f64::from(1 << argument_bits);
         // Within the limits the sum is at least this far from 0, where the tangent is steepest.
         let nearest = (bias.to_f64().abs() - spread - error).max(0.0);
@@ -264,10 +304,10 @@ impl FixedNetwork {
         let activation_bits = TangentTable::ACTIVATION_BITS as i32;
         let weights = network.output_weights.column(coordinate);
         let weights_nm: Vec<_> = weights.iter().map(|weight| weight.to_f64() * NM_PER_MM).collect();
-        let row = ScaledRow::of(&weights_nm, -activation_bits, MOST_WEIGHT_BITS, what)?;
+        let row = ScaledRow::of(&weights_nm, OUTPUT_WIDTH, -activation_bits, what)?;
         let sum_bits = row.bits + activation_bits;
         let bias_nm = network.output_biases[coordinate].to_f64() * NM_PER_MM;
-        let (sum_bias, of_bias) = whole_bias(bias_nm, sum_bits, &row.weights, what)?;
+        let (sum_bias, of_bias) = whole_bias(bias_nm, sum_bits, &row.weights, activation_bits, what)?;
         let reach_nm = bias_nm.abs() + weights_nm.iter().map(|weight| weight.abs()).sum::<f64>();
         if reach_nm > f64::from(1 << 30) {
             return Err(FixedPointError::Range { what: "a coordinate" });
@@ -281,12 +321,18 @@ impl FixedNetwork {
     }
 }
 
-/// A bias with so many bits after the point, and its rounding error. The sum with products of the weights and 16-bit
-/// numbers stays within 64 bits.
-fn whole_bias(bias: f64, bits: i32, weights: &[i16], what: &'static str) -> Result<(i64, f64), FixedPointError> {
+/// A bias with so many bits after the point, and its rounding error. The sum with products of the weights and numbers
+/// below 2^`input_bits` stays within 64 bits.
+fn whole_bias(
+    bias: f64,
+    bits: i32,
+    weights: &[i32],
+    input_bits: i32,
+    what: &'static str,
+) -> Result<(i64, f64), FixedPointError> {
     let scale = 2.0_f64.powi(bits);
     let whole = (bias * scale).round();
-    let products = weights.iter().map(|&weight| f64::from(weight).abs() * 32_768.0);
+    let products = weights.iter().map(|&weight| f64::from(weight).abs() * 2.0_f64.powi(input_bits));
     // One bit is left for the rounding of the shift.
     if whole.abs() + products.sum::<f64>() < 2.0_f64.powi(61) {
         Ok((whole as i64, (bias - whole / scale).abs()))

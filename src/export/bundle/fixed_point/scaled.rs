@@ -1,30 +1,33 @@
 use super::FixedPointError;
 
-/// A row of 16-bit weights with a common power of two.
+/// A row of weights as whole numbers with a common power of two.
 #[derive(Clone, Debug)]
 pub(super) struct ScaledRow {
     /// The weights times 2^`bits`, rounded.
-    pub(super) weights: Vec<i16>,
+    pub(super) weights: Vec<i32>,
     pub(super) bits: i32,
     /// Sum of the rounding errors of the weights.
     pub(super) error: f64,
 }
 
+/// Most bits after the point of a weight.
+const MOST_BITS: i32 = 20;
+
 impl ScaledRow {
-    /// Scales `weights` so that the largest takes 16 bits. `fewest` and `most` limit the power of two.
+    /// Scales `weights` so that the largest takes `width` bits with its sign. `fewest` limits the power of two.
     ///
     /// # Errors
     /// A weight that is too large even with the fewest bits.
-    pub(super) fn of(weights: &[f64], fewest: i32, most: i32, what: &'static str) -> Result<Self, FixedPointError> {
+    pub(super) fn of(weights: &[f64], width: u32, fewest: i32, what: &'static str) -> Result<Self, FixedPointError> {
         let largest = weights.iter().fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
-        let fitting = (f64::from(i16::MAX) / largest).log2().floor();
+        let fitting = (f64::from((1 << (width - 1)) - 1) / largest).log2().floor();
         // Not a number for a weight that is none, and infinite for zeros.
         if fitting.is_nan() || fitting < f64::from(fewest) {
             return Err(FixedPointError::Range { what });
         }
-        let bits = fitting.min(f64::from(most)) as i32;
+        let bits = fitting.min(f64::from(MOST_BITS)) as i32;
         let scale = 2.0_f64.powi(bits);
-        let rounded: Vec<i16> = weights.iter().map(|weight| (weight * scale).round() as i16).collect();
+        let rounded: Vec<i32> = weights.iter().map(|weight| (weight * scale).round() as i32).collect();
         let errors = weights.iter().zip(&rounded).map(|(weight, &rounded)| (weight - f64::from(rounded) / scale).abs());
         Ok(Self {
             error: errors.sum(),
@@ -60,13 +63,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_take_sixteen_bits_and_tell_their_error() {
-        let row = ScaledRow::of(&[1.0, -0.3, 0.1], 0, 20, "weights").unwrap();
+    fn weights_take_all_bits_and_tell_their_error() {
+        let row = ScaledRow::of(&[1.0, -0.3, 0.1], 16, 0, "weights").unwrap();
         assert_eq!((row.bits, &row.weights[..]), (14, &[16384, -4915, 1638][..]));
         assert!((row.error - (0.3 - 4915.0 / 16384.0).abs() - (0.1 - 1638.0 / 16384.0).abs()).abs() < 1e-15);
-        assert_eq!(ScaledRow::of(&[0.0], 0, 20, "weights").unwrap().bits, 20);
-        assert!(ScaledRow::of(&[40_000.0], 0, 20, "weights").is_err());
-        assert!(ScaledRow::of(&[f64::INFINITY], 0, 20, "weights").is_err());
+        assert_eq!(ScaledRow::of(&[0.0], 16, 0, "weights").unwrap().bits, 20);
+        assert!(ScaledRow::of(&[40_000.0], 16, 0, "weights").is_err());
+        assert!(ScaledRow::of(&[f64::INFINITY], 24, 0, "weights").is_err());
     }
 
     #[test]
