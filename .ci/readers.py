@@ -20,10 +20,20 @@ NETWORKS = {
     "paper": "--epochs 60",
     "known": "--preset best --noise 1e-3 --samples 2000 --epochs 60",
     "log": "--inputs log --epochs 40",
+    # These magnify rounding errors: in single precision their hidden sums stay in double, and in double precision the
+    # limit is what the program computes and prints.
+    "long": "--epochs 300",
+    "sharp": "--preset best --samples 1000 --epochs 100",
 }
+MAGNIFYING = {"long", "sharp"}
 LIMITS = {"f64": 1e-12, "f32": 1e-5}
 FLAGS = "-std=c99 -O2 -Wall -Wextra -Werror -pedantic -Wconversion".split()
 failures = []
+
+
+def limit_of(network, precision, report):
+    usual = LIMITS.get(precision, report["limit"])
+    return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
 
 
 def run(*command, **options):
@@ -68,7 +78,8 @@ def check_onnx(network, precision):
     import onnx
     import onnxruntime
 
-    folder, _ = export(network, "onnx", precision)
+    folder, report = export(network, "onnx", precision)
+    limit = limit_of(network, precision, report)
     model = onnx.load(folder / "network.onnx")
     onnx.checker.check_model(model, full_check=True)
     names = {entry.key: entry.value for entry in model.metadata_props}
@@ -80,7 +91,7 @@ def check_onnx(network, precision):
     if rows is not None:
         inputs["row"] = rows
     coordinates, outside = session.run(["coordinates_mm", "readings_outside"], inputs)
-    show(network, f"onnx {precision}", f"onnxruntime {onnxruntime.__version__}", deviation(folder, coordinates, expected), LIMITS[precision])
+    show(network, f"onnx {precision}", f"onnxruntime {onnxruntime.__version__}", deviation(folder, coordinates, expected), limit)
     assert outside.shape == (len(readings),), outside.shape
     # What is invalid has no answer.
     bad = {**inputs, "resistances_ohm": inputs["resistances_ohm"].copy()}
@@ -90,10 +101,10 @@ def check_onnx(network, precision):
     if rows is not None:
         answers = session.run(["coordinates_mm"], {**inputs, "row": np.where(rows == 1, 0, rows)})[0]
         assert np.isnan(answers[rows == 1]).all() and not np.isnan(answers[rows != 1]).any()
-    check_onnx_to_c(network, precision, folder, inputs, coordinates)
+    check_onnx_to_c(network, precision, limit, folder, inputs, coordinates)
 
 
-def check_onnx_to_c(network, precision, folder, inputs, coordinates):
+def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
     """C of an independent compiler of the same graph."""
     if importlib.util.find_spec("emx_onnx_cgen") is None:
         print(f"{network:<6} onnx {precision}     emx-onnx-cgen is not installed: not checked")
@@ -120,7 +131,7 @@ def check_onnx_to_c(network, precision, folder, inputs, coordinates):
     pointers = [np.ascontiguousarray(arrays[name]).ctypes.data_as(ctypes.c_void_p) for name in names]
     ctypes.CDLL(str(library)).emx(*pointers)
     _, expected, _ = golden(folder)
-    show(network, f"onnx {precision}", "emx-onnx-cgen, gcc", deviation(folder, answers, expected), LIMITS[precision])
+    show(network, f"onnx {precision}", "emx-onnx-cgen, gcc", deviation(folder, answers, expected), limit)
 
 
 def check_c(network, precision):
@@ -129,7 +140,7 @@ def check_c(network, precision):
     except RuntimeError as error:
         print(f"{network:<6} c99 {precision}  refused: {str(error).splitlines()[-1]}")
         return
-    limit = LIMITS.get(precision, report["limit"])
+    limit = limit_of(network, precision, report)
     sources = sorted(folder.glob("*.c"))
     for compiler in ["gcc", "clang"]:
         for optimisation in ["-O0", "-O2"]:
@@ -147,7 +158,7 @@ def check_c(network, precision):
 
 
 def check_octave(network):
-    folder, _ = export(network, "matlab", "f64")
+    folder, report = export(network, "matlab", "f64")
     readings, expected, rows = golden(folder)
     np.savetxt(folder / "readings.txt", readings, fmt="%.17g")
     row = ""
@@ -158,20 +169,20 @@ def check_octave(network):
     script = f"[c, o] = {function}(load('readings.txt'){row}); dlmwrite('answers.txt', [c o], 'precision', '%.17g');"
     run("octave-cli", "--no-gui", "--quiet", "--eval", script, cwd=folder)
     answers = np.loadtxt(folder / "answers.txt", delimiter=",", ndmin=2)
-    show(network, "matlab f64", "GNU Octave", deviation(folder, answers[:, :-1], expected), LIMITS["f64"])
+    show(network, "matlab f64", "GNU Octave", deviation(folder, answers[:, :-1], expected), limit_of(network, "f64", report))
     bad = f"try, {function}(-ones(1, {readings.shape[1]}){', 1' if row else ''}); disp('accepted'), catch e, disp(e.message), end"
     assert "above 0" in run("octave-cli", "--no-gui", "--quiet", "--eval", bad, cwd=folder)
 
 
 def check_numpy(network, precision):
-    folder, _ = export(network, "numpy", precision)
+    folder, report = export(network, "numpy", precision)
     readings, expected, rows = golden(folder)
     spec = importlib.util.spec_from_file_location(f"decode_{network}_{precision}", folder / "decode.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     coordinates, _ = module.decode(readings, *([] if rows is None else [rows]))
     assert coordinates.dtype == (np.float32 if precision == "f32" else np.float64)
-    show(network, f"numpy {precision}", f"NumPy {np.__version__}", deviation(folder, coordinates, expected), LIMITS[precision])
+    show(network, f"numpy {precision}", f"NumPy {np.__version__}", deviation(folder, coordinates, expected), limit_of(network, precision, report))
     try:
         module.decode(-readings, *([] if rows is None else [rows]))
     except ValueError:

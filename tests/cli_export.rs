@@ -28,7 +28,11 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
     let output = decoupler(arguments, folder);
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(status), "{arguments}: {message}");
-    assert_eq!((message.lines().count(), output.stdout.len()), (1, 0), "{arguments}: {message}");
+    assert_eq!(
+        (message.lines().count(), output.stdout.len()),
+        (1, 0),
+        "{arguments}: {message}"
+    );
     message
 }
 
@@ -43,13 +47,19 @@ fn names(folder: &Path) -> Vec<String> {
 #[test]
 fn an_exported_network_is_that_of_decode() {
     let folder = trained("--rows known --noise 1e-3");
-    let output = decoupler("export --network n.json --format onnx --out bundle --json", folder.path());
+    let output = decoupler(
+        "export --network n.json --format onnx --out bundle --json",
+        folder.path(),
+    );
     assert!(output.status.success() && output.stderr.is_empty());
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(report["deviation"].as_f64().unwrap() <= report["limit"].as_f64().unwrap());
     assert_eq!((&report["limit"], &report["precision"]), (&1e-12.into(), &"f64".into()));
     let bundle = folder.path().join("bundle");
-    assert_eq!(names(&bundle), ["README.txt", "golden.csv", "metadata.json", "network.onnx"]);
+    assert_eq!(
+        names(&bundle),
+        ["README.txt", "golden.csv", "metadata.json", "network.onnx"]
+    );
     let output = decoupler(
         "decode --network n.json --input bundle/golden.csv --output decoded.csv",
         folder.path(),
@@ -57,8 +67,17 @@ fn an_exported_network_is_that_of_decode() {
     assert!(output.status.success());
     let column = |path: &Path, name: &str| {
         let text = fs::read_to_string(path).unwrap();
-        let index = text.lines().next().unwrap().split(',').position(|other| other == name).unwrap();
-        let fields = text.lines().skip(1).map(|line| line.split(',').nth(index).unwrap().parse().unwrap());
+        let index = text
+            .lines()
+            .next()
+            .unwrap()
+            .split(',')
+            .position(|other| other == name)
+            .unwrap();
+        let fields = text
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').nth(index).unwrap().parse().unwrap());
         fields.collect::<Vec<f64>>()
     };
     for name in ["x_1", "y_1", "z_1", "z_2"] {
@@ -75,16 +94,27 @@ fn an_exported_network_is_that_of_decode() {
 fn the_report_names_files_deviations_and_bounds_with_their_units() {
     let folder = trained("--noise 1e-3");
     let cases = [
-        ("onnx", "f32", vec!["network.onnx", "ONNX graph, read back and evaluated"]),
-        ("c99", "fixed16", vec!["out_c99_fixed16_decode.c", "bit-exact model", "Proven bound", " mm"]),
-        ("matlab", "f64", vec!["out_matlab_f64_decode.m", "relative to the widest range"]),
+        (
+            "onnx",
+            "f32",
+            vec!["network.onnx", "ONNX graph, read back and evaluated"],
+        ),
+        (
+            "c99",
+            "fixed16",
+            vec!["out_c99_fixed16_decode.c", "bit-exact model", "Proven bound", " mm"],
+        ),
+        (
+            "matlab",
+            "f64",
+            vec!["out_matlab_f64_decode.m", "relative to the widest range"],
+        ),
         ("numpy", "f32", vec!["decode.py", "network.npz"]),
         ("json", "f64", vec!["network file, read back"]),
     ];
     for (format, precision, expected) in cases {
-        let arguments = format!(
-            "export --network n.json --format {format} --precision {precision} --out out_{format}_{precision}"
-        );
+        let arguments =
+            format!("export --network n.json --format {format} --precision {precision} --out out_{format}_{precision}");
         let output = decoupler(&arguments, folder.path());
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -93,7 +123,10 @@ fn the_report_names_files_deviations_and_bounds_with_their_units() {
         }
     }
     let readme = fs::read_to_string(folder.path().join("out_c99_fixed16/README.txt")).unwrap();
-    assert!(readme.contains("out_c99_fixed16_decode(") && readme.contains("Proven bound"), "{readme}");
+    assert!(
+        readme.contains("out_c99_fixed16_decode(") && readme.contains("Proven bound"),
+        "{readme}"
+    );
 }
 
 #[test]

@@ -8,8 +8,8 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
-    train::Train,
+    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate,
+    trade::Trade, train::Train,
 };
 
 /// Opens the window and returns when it is closed.

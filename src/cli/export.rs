@@ -60,6 +60,10 @@ impl Export {
             let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
         }
         let report = export_bundle(&file, self.format, self.precision, &self.out)?;
-        if self.json { print_json(&report) } else { print_text(&report) }
+        if self.json {
+            print_json(&report)
+        } else {
+            print_text(&report)
+        }
     }
 }

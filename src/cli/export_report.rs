@@ -88,7 +88,10 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
         text += &format!("  limit: {:.1e}\n", report.limit);
     }
     if let Some(bound_mm) = report.bound_mm {
-        text += &format!("Proven bound on the error in whole numbers: {} mm\n", format_number(bound_mm));
+        text += &format!(
+            "Proven bound on the error in whole numbers: {} mm\n",
+            format_number(bound_mm)
+        );
     }
     for remark in &report.remarks {
         text += &format!("Note: {remark}.\n");

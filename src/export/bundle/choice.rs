@@ -71,7 +71,10 @@ impl BundleFormat {
         if self.precisions().contains(&precision) {
             return Ok(());
         }
-        Err(ChoiceError::Pair { format: self, precision })
+        Err(ChoiceError::Pair {
+            format: self,
+            precision,
+        })
     }
 
     fn precision_names(self) -> String {
@@ -139,8 +142,17 @@ mod tests {
         for precision in BundlePrecision::ALL {
             assert_eq!(precision.to_string().parse(), Ok(precision));
         }
-        let message = BundleFormat::Onnx.check(BundlePrecision::Fixed16).unwrap_err().to_string();
+        let message = BundleFormat::Onnx
+            .check(BundlePrecision::Fixed16)
+            .unwrap_err()
+            .to_string();
         assert_eq!(message, "onnx has no precision fixed16: give f64 or f32");
-        assert!("tflite".parse::<BundleFormat>().unwrap_err().to_string().contains("onnx, c99"));
+        assert!(
+            "tflite"
+                .parse::<BundleFormat>()
+                .unwrap_err()
+                .to_string()
+                .contains("onnx, c99")
+        );
     }
 }

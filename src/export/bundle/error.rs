@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::{choice::ChoiceError, fixed_point::FixedPointError};
+use super::{choice::ChoiceError, fixed_point::FixedPointError, portable::FoldError};
 use crate::{
     evaluation::RunError,
     export::{NetworkFileError, WriteError},
@@ -15,15 +15,9 @@ pub enum BundleError {
     /// The format does not have the precision.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
-    /// A weight overflows when the scaling is folded into it.
-    #[error("network {network}: a weight is beyond the range of single precision when the scaling is folded into it; train again with other settings")]
-    NotFinite {
-        /// Number of the network, from 1.
-        network: usize,
-    },
-    /// The networks of a file read different quantities.
-    #[error("the networks of the rows read different quantities: train them together")]
-    Quantities,
+    /// The scaling cannot be folded into the weights.
+    #[error(transparent)]
+    Fold(#[from] FoldError),
     /// The readings with which the bundle is verified could not be drawn.
     #[error("no readings to verify the bundle: {0}")]
     Readings(#[from] Box<RunError>),
@@ -56,7 +50,9 @@ pub enum BundleError {
         reason: String,
     },
     /// The bundle gives other answers than the network.
-    #[error("{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle")]
+    #[error(
+        "{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle"
+    )]
     Deviation {
         /// What evaluated the bundle.
         evaluator: String,

@@ -37,7 +37,9 @@ impl Growth {
 /// Answers `readings_ohm` with twice the digits of double precision.
 pub(super) fn decode_exactly(portable: &Portable, network: &PortableNetwork, readings_ohm: &[f64]) -> Exact {
     let readings = readings_ohm.iter().zip(&network.centre_ohm);
-    let changes: Vec<_> = readings.map(|(&ohm, &centre)| change(portable.quantity, ohm, centre)).collect();
+    let changes: Vec<_> = readings
+        .map(|(&ohm, &centre)| change(portable.quantity, ohm, centre))
+        .collect();
     let mut hidden = Vec::new();
     for node in 0..portable.hidden {
         let bias = network.hidden_biases[node];

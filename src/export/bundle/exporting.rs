@@ -143,16 +143,22 @@ impl Bundle<'_> {
         let mut check = |evaluator, deviation| checks.push(BundleCheck { evaluator, deviation });
         match self.format {
             BundleFormat::Onnx => {
-                self.folder.write("network.onnx", onnx::write(portable, &weights, &self.metadata))?;
+                self.folder
+                    .write("network.onnx", onnx::write(portable, &weights, &self.metadata))?;
                 let damaged = |reason| read_back("network.onnx", reason);
                 let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
                 let mut answers = graph.decode(vectors.all()).map_err(damaged)?.coordinates_mm.into_iter();
                 let deviation_mm = vectors.deviation_mm(|_| answers.next().unwrap_or_default());
-                check("ONNX graph, read back and evaluated", deviation_mm / portable.full_scale_mm);
+                check(
+                    "ONNX graph, read back and evaluated",
+                    deviation_mm / portable.full_scale_mm,
+                );
             }
             BundleFormat::NumPy => {
-                self.folder.write("network.npz", numpy::write_weights(portable, &weights))?;
-                self.folder.write("decode.py", numpy::write_program(portable, arithmetic))?;
+                self.folder
+                    .write("network.npz", numpy::write_weights(portable, &weights))?;
+                self.folder
+                    .write("decode.py", numpy::write_program(portable, arithmetic))?;
                 let read = numpy::read_weights(&self.read("network.npz")?, portable.quantity);
                 let read = read.map_err(|reason| read_back("network.npz", reason))?;
                 check("NumPy weights, read back and evaluated", model(&read));
@@ -255,11 +261,14 @@ impl Bundle<'_> {
             bound_mm: fixed.map(|fixed| fixed.bound_mm),
             remarks,
         };
-        self.folder.write("golden.csv", golden_csv(portable, vectors.golden()))?;
-        let metadata = serde_json::to_string_pretty(&self.metadata).map_err(|error| read_back("metadata.json", error.to_string()))?;
+        self.folder
+            .write("golden.csv", golden_csv(portable, vectors.golden()))?;
+        let metadata = serde_json::to_string_pretty(&self.metadata)
+            .map_err(|error| read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
         let array = self.file.settings.source.sensor.scale.to_string();
-        self.folder.write("README.txt", readme(&self.name, &array, portable, fixed, &report))?;
+        self.folder
+            .write("README.txt", readme(&self.name, &array, portable, fixed, &report))?;
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)

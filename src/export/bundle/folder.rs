@@ -23,7 +23,9 @@ impl AtomicFolder {
     /// # Errors
     /// Something else is there, or its folder cannot be written.
     pub(super) fn create(target: &Path) -> Result<Self, BundleError> {
-        let name = target.file_name().ok_or_else(|| BundleError::Exists(target.to_owned()))?;
+        let name = target
+            .file_name()
+            .ok_or_else(|| BundleError::Exists(target.to_owned()))?;
         let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
         let parent = parent.unwrap_or(Path::new("."));
         if !parent.is_dir() {
@@ -42,8 +44,8 @@ impl AtomicFolder {
         }
         // The default error repeats the temporary name, which means nothing to the user.
         let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
-        let (folder, listed) =
-            Listed::begin(|| builder.tempdir_in(parent).map_err(plain)).map_err(|error| WriteError::io(target, error))?;
+        let (folder, listed) = Listed::begin(|| builder.tempdir_in(parent).map_err(plain))
+            .map_err(|error| WriteError::io(target, error))?;
         Ok(Self {
             target: parent.join(name),
             folder,
@@ -75,7 +77,10 @@ impl AtomicFolder {
             let mut sizes = Vec::new();
             for entry in fs::read_dir(self.path())? {
                 let entry = entry?;
-                sizes.push((entry.file_name().to_string_lossy().into_owned(), entry.metadata()?.len()));
+                sizes.push((
+                    entry.file_name().to_string_lossy().into_owned(),
+                    entry.metadata()?.len(),
+                ));
             }
             sizes.sort();
             Ok(sizes)
@@ -127,7 +132,10 @@ mod tests {
         let folder = AtomicFolder::create(&target).unwrap();
         folder.write("whole", "2").unwrap();
         folder.commit().unwrap();
-        assert_eq!((names(home.path()), names(&target)), (vec!["bundle".into()], vec!["whole".into()]));
+        assert_eq!(
+            (names(home.path()), names(&target)),
+            (vec!["bundle".into()], vec!["whole".into()])
+        );
     }
 
     #[test]
@@ -145,6 +153,9 @@ mod tests {
             let message = AtomicFolder::create(path).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");
         }
-        assert_eq!((names(home.path()), names(&full)), (vec!["file".into(), "full".into()], vec!["kept".into()]));
+        assert_eq!(
+            (names(home.path()), names(&full)),
+            (vec!["file".into(), "full".into()], vec!["kept".into()])
+        );
     }
 }

@@ -5,7 +5,10 @@ const LONGEST: usize = 40;
 
 /// Name for functions and files, after the folder of the bundle: lower-case letters, digits and underscores.
 pub(super) fn identifier(path: &Path) -> String {
-    let name = path.file_stem().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let name = path
+        .file_stem()
+        .map(|name| name.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
     let plain: String = name
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })

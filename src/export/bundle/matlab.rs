@@ -27,9 +27,7 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
     let (argument, help, check) = if portable.takes_row() {
         (
             ", row",
-            format!(
-                "%   ROW has the row-wire of each sample, from 1 to {rows}; one number stands for all.\n"
-            ),
+            format!("%   ROW has the row-wire of each sample, from 1 to {rows}; one number stands for all.\n"),
             format!(
                 "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
                  ~all(ismember(row, 1:{rows}))\n    error('row: give the row-wire of each sample, from 1 to {rows}');\n\
@@ -40,7 +38,9 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
         ("", String::new(), "row = ones(samples, 1);\n".to_owned())
     };
     let counted = match ranges {
-        Some(_) => "the number of readings of each sample that lie beyond the range seen in training by more than a\n%   tenth of it",
+        Some(_) => {
+            "the number of readings of each sample that lie beyond the range seen in training by more than a\n%   tenth of it"
+        }
         None => "zeros, because the range of the readings in training is not known",
     };
     let (is_reading, readings) = match portable.quantity {
@@ -130,8 +130,15 @@ pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, S
     for (index, (name, of)) in MATRICES.iter().enumerate() {
         let missing = || format!("the matrix {name} is missing or damaged");
         let rest = text.split(&format!("\n{name} = [")).nth(1).ok_or_else(missing)?;
-        let inside = rest.split("];").next().ok_or_else(missing)?.replace("...", " ").replace(';', " ");
-        let values = inside.split_whitespace().map(|number| number.parse::<f64>().map_err(|_| missing()));
+        let inside = rest
+            .split("];")
+            .next()
+            .ok_or_else(missing)?
+            .replace("...", " ")
+            .replace(';', " ");
+        let values = inside
+            .split_whitespace()
+            .map(|number| number.parse::<f64>().map_err(|_| missing()));
         let values: Vec<f64> = values.collect::<Result<_, _>>()?;
         let expected = Weights::of(portable, Arithmetic::DOUBLE);
         let sizes: usize = expected.networks.iter().map(|network| of(network).len()).sum();

@@ -28,7 +28,10 @@ pub(super) fn metadata(file: &NetworkFile, portable: &Portable, precision: Bundl
         let (minimum, maximum): (Vec<f64>, Vec<f64>) = range.extremes.iter().copied().unzip();
         json!({ "minimum": minimum, "maximum": maximum })
     };
-    let ranges = portable.networks.iter().map(|network| network.range.as_ref().map(range));
+    let ranges = portable
+        .networks
+        .iter()
+        .map(|network| network.range.as_ref().map(range));
     let fields = json!({
         "program": crate::export::network_file::PROGRAM,
         "trained_by": file.program,

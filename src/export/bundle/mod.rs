@@ -34,5 +34,6 @@ pub use self::{
     error::BundleError,
     exporting::export_bundle,
     fixed_point::FixedPointError,
+    portable::FoldError,
     report::{BundleCheck, BundleReport, VectorCounts},
 };

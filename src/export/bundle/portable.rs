@@ -1,6 +1,7 @@
 use ndarray::Array2;
+use thiserror::Error;
 
-use super::{error::BundleError, twofold::Twofold};
+use super::twofold::Twofold;
 use crate::{
     export::NetworkFile,
     network::{DecouplingNetwork, InputScaling, Quantity},
@@ -57,21 +58,38 @@ pub(super) struct ChannelRanges {
     pub(super) limits: Vec<(f64, f64)>,
 }
 
+/// Errors of folding the scaling of networks into their weights.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum FoldError {
+    /// A weight overflows.
+    #[error(
+        "network {network}: a weight is beyond the range of single precision when the scaling is folded into it; train again with other settings"
+    )]
+    NotFinite {
+        /// Number of the network, from 1.
+        network: usize,
+    },
+    /// The networks of a file read different quantities.
+    #[error("the networks of the rows read different quantities: train them together")]
+    Quantities,
+}
+
 impl Portable {
     /// Folds the scaling of the networks in `file` into their weights.
     ///
     /// # Errors
     /// A folded weight is not a finite number, or the networks read different quantities.
-    pub(super) fn of(file: &NetworkFile) -> Result<Self, BundleError> {
+    pub(super) fn of(file: &NetworkFile) -> Result<Self, FoldError> {
         let networks = file.network.values();
         let first = &networks[0];
         let quantity = first.inputs().quantity();
         if networks.iter().any(|network| network.inputs().quantity() != quantity) {
-            return Err(BundleError::Quantities);
+            return Err(FoldError::Quantities);
         }
         let folded: Vec<_> = networks.iter().map(PortableNetwork::of).collect();
         if let Some(index) = folded.iter().position(|network| !network.is_finite(quantity)) {
-            return Err(BundleError::NotFinite { network: index + 1 });
+            return Err(FoldError::NotFinite { network: index + 1 });
         }
         let outputs = first.outputs().channels();
         let extremes = networks
@@ -121,9 +139,12 @@ impl PortableNetwork {
         });
         let hidden_biases = (0..shape.hidden).map(|node| {
             let rests = centre_ohm.iter().zip(&centre).enumerate();
-            rests.fold(Twofold::from(w[[shape.inputs, node]]), |bias, (channel, (&ohm, &value))| {
-                bias + of_value[[channel, node]] * (value_of(quantity, ohm) - Twofold::from(value))
-            })
+            rests.fold(
+                Twofold::from(w[[shape.inputs, node]]),
+                |bias, (channel, (&ohm, &value))| {
+                    bias + of_value[[channel, node]] * (value_of(quantity, ohm) - Twofold::from(value))
+                },
+            )
         });
         let hidden_biases = hidden_biases.collect();
         let per_change = |channel: usize| match quantity {
@@ -146,7 +167,9 @@ impl PortableNetwork {
         }
         let range = inputs.range().map(|range| ChannelRanges {
             extremes: (0..range.channels()).map(|channel| range.extremes(channel)).collect(),
-            limits: (0..range.channels()).map(|channel| range.limits(quantity, channel)).collect(),
+            limits: (0..range.channels())
+                .map(|channel| range.limits(quantity, channel))
+                .collect(),
         });
         Self {
             centre_ohm,

@@ -31,7 +31,11 @@ pub(super) fn readme(
         outputs = portable.outputs,
     );
     if portable.takes_row() {
-        let _ = write!(text, " There is one network for each row-wire, from 1 to {}.", portable.networks.len());
+        let _ = write!(
+            text,
+            " There is one network for each row-wire, from 1 to {}.",
+            portable.networks.len()
+        );
     }
     text += "\n\nHow to call it\n\n";
     text += &call(name, portable, fixed, report);
@@ -55,8 +59,7 @@ pub(super) fn readme(
     for remark in &report.remarks {
         let _ = writeln!(text, "Note: {remark}.");
     }
-    text
-        + "\ngolden.csv has readings with the coordinates that the network gives to them, for a test of your own.\n\
+    text + "\ngolden.csv has readings with the coordinates that the network gives to them, for a test of your own.\n\
            metadata.json has the array, its geometry, the errors of the network, the range of the readings in training,\n\
            the seed and the version of the program.\n"
 }
@@ -66,8 +69,16 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
     let (channels, outputs, upper) = (portable.channels, portable.outputs, name.to_uppercase());
     match report.format {
         BundleFormat::Onnx => {
-            let kind = if report.precision == BundlePrecision::Single { "float32" } else { "float64" };
-            let row = if takes_row { ", \"row\": np.array([1], np.int64)" } else { "" };
+            let kind = if report.precision == BundlePrecision::Single {
+                "float32"
+            } else {
+                "float64"
+            };
+            let row = if takes_row {
+                ", \"row\": np.array([1], np.int64)"
+            } else {
+                ""
+            };
             format!(
                 "    import numpy as np\n    import onnxruntime\n    \
                  session = onnxruntime.InferenceSession(\"network.onnx\")\n    \
@@ -115,7 +126,11 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                 "    [coordinates_mm, readings_outside] = {name}_decode(resistances_ohm{row})\n\n\
                  in MATLAB (from R2016b) or GNU Octave. resistances_ohm is samples x {channels}, coordinates_mm samples x \
                  {outputs}{row_text}.",
-                row_text = if takes_row { ";\nrow has the row-wire of each sample, from 1" } else { "" },
+                row_text = if takes_row {
+                    ";\nrow has the row-wire of each sample, from 1"
+                } else {
+                    ""
+                },
             )
         }
         BundleFormat::NumPy => {
@@ -124,7 +139,11 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                 "    from decode import decode\n    \
                  coordinates_mm, readings_outside = decode(resistances_ohm{row})\n\n\
                  resistances_ohm is samples x {channels}, coordinates_mm samples x {outputs}{row_text}.",
-                row_text = if takes_row { ";\nrow has the row-wire of each sample, from 1" } else { "" },
+                row_text = if takes_row {
+                    ";\nrow has the row-wire of each sample, from 1"
+                } else {
+                    ""
+                },
             )
         }
         BundleFormat::Json => String::new(),

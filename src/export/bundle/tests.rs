@@ -5,7 +5,7 @@ use std::fs;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
-    BundleError, BundleFormat, BundlePrecision,
+    BundleError, BundleFormat, BundlePrecision, FoldError,
     exact::decode_exactly,
     export_bundle,
     fixed_point::{FixedNetworks, HiddenWidth},
@@ -42,8 +42,14 @@ fn trained(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -
 fn networks() -> Vec<(String, NetworkFile)> {
     let mut all = Vec::new();
     for quantity in Quantity::ALL {
-        for (rows, scaling) in [(Rows::All, ScalingChoice::MinMax), (Rows::Known, ScalingChoice::Whitening)] {
-            all.push((format!("{quantity}, rows {rows}"), trained(rows, quantity, scaling, 1e-3)));
+        for (rows, scaling) in [
+            (Rows::All, ScalingChoice::MinMax),
+            (Rows::Known, ScalingChoice::Whitening),
+        ] {
+            all.push((
+                format!("{quantity}, rows {rows}"),
+                trained(rows, quantity, scaling, 1e-3),
+            ));
         }
     }
     all
@@ -55,8 +61,16 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
     for (name, file) in networks() {
         let portable = Portable::of(&file).unwrap();
         let vectors = Vectors::of(&file, &portable, |ohm| ohm).unwrap();
-        assert!(vectors.program_deviation_mm < 1e-11, "{name}: {}", vectors.program_deviation_mm);
-        for (arithmetic, limit_mm) in [(Arithmetic::DOUBLE, 1e-12), (Arithmetic::MIXED, 2e-5), (Arithmetic::SINGLE, 2e-3)] {
+        assert!(
+            vectors.program_deviation_mm < 1e-11,
+            "{name}: {}",
+            vectors.program_deviation_mm
+        );
+        for (arithmetic, limit_mm) in [
+            (Arithmetic::DOUBLE, 1e-12),
+            (Arithmetic::MIXED, 2e-5),
+            (Arithmetic::SINGLE, 2e-3),
+        ] {
             let weights = Weights::of(&portable, arithmetic);
             let deviation_mm = vectors.deviation_mm(|vector| weights.decode(vector.network, &vector.readings_ohm));
             assert!(deviation_mm < limit_mm, "{name}, {arithmetic:?}: {deviation_mm}");
@@ -74,7 +88,10 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
             let outputs = file.network.at(vector.network).outputs();
             for coordinate in 0..portable.outputs {
                 let (low, high) = outputs.extremes(coordinate);
-                assert!(low < high || vector.coordinates_mm[coordinate] == low, "{name}: {coordinate}");
+                assert!(
+                    low < high || vector.coordinates_mm[coordinate] == low,
+                    "{name}: {coordinate}"
+                );
             }
         }
     }
@@ -107,7 +124,11 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
                 .collect();
             assert_eq!(are_valid, [false, false, true, !portable.takes_row()], "{name}");
             let inputs = file.network.at(odd[2].network).inputs();
-            let outside = inputs.range().unwrap().outside(portable.quantity, &odd[2].readings_ohm).count();
+            let outside = inputs
+                .range()
+                .unwrap()
+                .outside(portable.quantity, &odd[2].readings_ohm)
+                .count();
             assert_eq!(answers.readings_outside.unwrap()[2], outside as i64, "{name}");
         }
     }
@@ -120,7 +141,11 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
         for arithmetic in [Arithmetic::DOUBLE, Arithmetic::MIXED, Arithmetic::SINGLE] {
             let weights = Weights::of(&portable, arithmetic);
             let bytes = numpy::write_weights(&portable, &weights);
-            assert_eq!(numpy::read_weights(&bytes, portable.quantity).unwrap(), weights, "{name}");
+            assert_eq!(
+                numpy::read_weights(&bytes, portable.quantity).unwrap(),
+                weights,
+                "{name}"
+            );
         }
         let weights = Weights::of(&portable, Arithmetic::DOUBLE);
         let text = matlab::write("decode", &portable, &weights);
@@ -142,7 +167,9 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
             let limits = &network.range.as_ref().unwrap().limits;
             let mut largest_mm = 0.0_f64;
             for _ in 0..300 {
-                let units = limits.iter().map(|&(low, high)| fixed.reading(rng.random_range(low..high)));
+                let units = limits
+                    .iter()
+                    .map(|&(low, high)| fixed.reading(rng.random_range(low..high)));
                 let readings: Vec<f64> = units.map(|units| f64::from(units) * fixed.unit_ohm()).collect();
                 let exact = decode_exactly(&portable, network, &readings).coordinates_mm;
                 let ours = fixed.decode(index, &readings).unwrap();
@@ -151,13 +178,20 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
                 }
             }
             assert!(largest_mm <= fixed.bound_mm, "{name}: {largest_mm} {}", fixed.bound_mm);
-            assert!(largest_mm > 0.005 * fixed.bound_mm, "{name}: {largest_mm} {}", fixed.bound_mm);
+            assert!(
+                largest_mm > 0.005 * fixed.bound_mm,
+                "{name}: {largest_mm} {}",
+                fixed.bound_mm
+            );
             for _ in 0..300 {
                 let readings: Vec<i32> = limits.iter().map(|_| rng.random_range(1..=i32::MAX)).collect();
                 assert!(fixed.decode_whole(index, &readings).is_some(), "{name}");
             }
             for reading in [1, i32::MAX] {
-                assert!(fixed.decode_whole(index, &vec![reading; limits.len()]).is_some(), "{name}");
+                assert!(
+                    fixed.decode_whole(index, &vec![reading; limits.len()]).is_some(),
+                    "{name}"
+                );
             }
             assert_eq!(fixed.decode_whole(index, &vec![0; limits.len()]), None, "{name}");
         }
@@ -179,7 +213,10 @@ fn every_format_and_precision_is_written_verified_and_whole() {
             for &precision in format.precisions() {
                 let path = home.path().join(format!("{index} {format} {precision}"));
                 let report = export_bundle(&file, format, precision, &path).unwrap();
-                assert!(report.deviation() <= report.limit, "{name}, {format} {precision}: {report:?}");
+                assert!(
+                    report.deviation() <= report.limit,
+                    "{name}, {format} {precision}: {report:?}"
+                );
                 if format == BundleFormat::Json {
                     assert_eq!(NetworkFile::load(&path).unwrap().network, file.network);
                     continue;
@@ -218,17 +255,34 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
         }
     };
     let cases = [
-        (export_bundle(&file, BundleFormat::Onnx, BundlePrecision::Fixed16, &path), "give f64 or f32"),
-        (export_bundle(&file, BundleFormat::Onnx, BundlePrecision::Double, &taken), "is there already"),
-        (export_bundle(&file, BundleFormat::Json, BundlePrecision::Double, &taken), "is there already"),
-        (export_bundle(&without_range, BundleFormat::C99, BundlePrecision::Fixed16, &path), "train again"),
+        (
+            export_bundle(&file, BundleFormat::Onnx, BundlePrecision::Fixed16, &path),
+            "give f64 or f32",
+        ),
+        (
+            export_bundle(&file, BundleFormat::Onnx, BundlePrecision::Double, &taken),
+            "is there already",
+        ),
+        (
+            export_bundle(&file, BundleFormat::Json, BundlePrecision::Double, &taken),
+            "is there already",
+        ),
+        (
+            export_bundle(&without_range, BundleFormat::C99, BundlePrecision::Fixed16, &path),
+            "train again",
+        ),
     ];
     for (refused, expected) in cases {
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     }
     // Without the range, the other bundles have no count of readings outside.
-    for format in [BundleFormat::Onnx, BundleFormat::C99, BundleFormat::NumPy, BundleFormat::Matlab] {
+    for format in [
+        BundleFormat::Onnx,
+        BundleFormat::C99,
+        BundleFormat::NumPy,
+        BundleFormat::Matlab,
+    ] {
         let path = home.path().join(format!("without {format}"));
         export_bundle(&without_range, format, BundlePrecision::Double, &path).unwrap();
     }
@@ -238,8 +292,13 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     network["output_layer"][0] = serde_json::json!(1e300);
     file.network = serde_json::from_value(network).unwrap();
     let refused = export_bundle(&file, BundleFormat::NumPy, BundlePrecision::Double, &path);
-    assert!(matches!(refused, Err(BundleError::NotFinite { network: 1 })), "{refused:?}");
+    assert!(
+        matches!(refused, Err(BundleError::Fold(FoldError::NotFinite { network: 1 }))),
+        "{refused:?}"
+    );
     assert!(!path.exists());
-    let left = fs::read_dir(home.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    let left = fs::read_dir(home.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name());
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }

@@ -36,7 +36,11 @@ impl Tolerance {
         };
         let bound = operations * errors_mm / portable.full_scale_mm;
         Self {
-            limit: if deviation <= NEAR * usual { usual } else { usual.max(bound) },
+            limit: if deviation <= NEAR * usual {
+                usual
+            } else {
+                usual.max(bound)
+            },
             usual,
             amplification: growth.hidden_mm / portable.full_scale_mm,
         }

@@ -144,7 +144,12 @@ mod tests {
     const BITS: usize = 160;
 
     fn exact(value: Twofold) -> FBig<HalfEven, 2> {
-        let part = |part: f64| FBig::<HalfEven, 2>::try_from(part).unwrap().with_precision(BITS).value();
+        let part = |part: f64| {
+            FBig::<HalfEven, 2>::try_from(part)
+                .unwrap()
+                .with_precision(BITS)
+                .value()
+        };
         part(value.high) + part(value.low)
     }
 
@@ -166,7 +171,10 @@ mod tests {
                 ("logarithm of a quotient", (a / b).ln(), exact(a / b).ln()),
             ];
             for (name, ours, truth) in cases {
-                assert!(relative(ours, &truth) < 1e-29, "{name} of {a:?} and {b:?}: {ours:?} {truth}");
+                assert!(
+                    relative(ours, &truth) < 1e-29,
+                    "{name} of {a:?} and {b:?}: {ours:?} {truth}"
+                );
             }
             assert!(((exact(a - b) - (exact_a - exact_b)).to_f64().value() / a.high.max(b.high)).abs() < 1e-30);
         }

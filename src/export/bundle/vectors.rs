@@ -68,7 +68,10 @@ impl Vectors {
             growth = growth.largest(exact.growth);
             let row = ndarray::ArrayView2::from_shape((1, readings_ohm.len()), &readings_ohm);
             let of_program = file.network.at(network).decouple(row.expect("one row of readings"));
-            let differences = of_program.iter().zip(&exact.coordinates_mm).map(|(ours, exact)| (ours - exact).abs());
+            let differences = of_program
+                .iter()
+                .zip(&exact.coordinates_mm)
+                .map(|(ours, exact)| (ours - exact).abs());
             program_deviation_mm = differences.fold(program_deviation_mm, f64::max);
             all.push(Vector {
                 network,
@@ -92,7 +95,10 @@ impl Vectors {
                 readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
             })
         };
-        self.golden = self.all[..self.golden].iter().filter(|vector| is_inside(vector)).count();
+        self.golden = self.all[..self.golden]
+            .iter()
+            .filter(|vector| is_inside(vector))
+            .count();
         self.all.retain(is_inside);
         self
     }

@@ -78,7 +78,11 @@ impl Weights {
         let Arithmetic { hidden, rest } = arithmetic;
         let network = |network: &PortableNetwork| RoundedNetwork {
             centre_ohm: network.centre_ohm.clone(),
-            hidden_weights: network.hidden_weights.iter().map(|w| hidden.round(w.to_f64())).collect(),
+            hidden_weights: network
+                .hidden_weights
+                .iter()
+                .map(|w| hidden.round(w.to_f64()))
+                .collect(),
             hidden_biases: network.hidden_biases.iter().map(|w| hidden.round(w.to_f64())).collect(),
             output_weights: network.output_weights.iter().map(|w| rest.round(w.to_f64())).collect(),
             output_biases: network.output_biases.iter().map(|w| rest.round(w.to_f64())).collect(),
@@ -99,7 +103,10 @@ impl Weights {
             .map(|(&ohm, &centre)| change(self.quantity, digits, rest.round(ohm), centre))
             .collect();
         let sums = affine(digits, &changes, &network.hidden_weights, &network.hidden_biases);
-        let activations: Vec<_> = sums.iter().map(|&sum| rest.round(libm::tanh(rest.round(sum)))).collect();
+        let activations: Vec<_> = sums
+            .iter()
+            .map(|&sum| rest.round(libm::tanh(rest.round(sum))))
+            .collect();
         affine(rest, &activations, &network.output_weights, &network.output_biases)
     }
 }

@@ -8,7 +8,15 @@ use crate::export::bundle::error::BundleError;
 
 const COMPILER: &str = "cc";
 /// The flags under which the source has no warning.
-const FLAGS: [&str; 7] = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-O2"];
+const FLAGS: [&str; 7] = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-Wconversion",
+    "-O2",
+];
 
 /// What compiling and running a self-test gave.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,9 +39,15 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
     let hello = "#include <math.h>\n#include <stdio.h>\nint main(void)\n{\n    return puts(\"\") < 0;\n}\n";
     let tried = std::fs::write(&trial, hello).and_then(|()| compile(&[&trial], &program));
     match tried {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Compiled::NoCompiler("no C compiler found")),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok(Compiled::NoCompiler("no C compiler found"));
+        }
         Ok(output) if output.status.success() => {}
-        _ => return Ok(Compiled::NoCompiler("the C compiler 'cc' cannot compile an empty program")),
+        _ => {
+            return Ok(Compiled::NoCompiler(
+                "the C compiler 'cc' cannot compile an empty program",
+            ));
+        }
     }
     let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
     let output = compile(&[&sources[0], &sources[1]], &program);
@@ -44,7 +58,10 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
     let output = Command::new(&program).output();
     let output = output.map_err(|error| failed("the self-test of the C source", error.to_string()))?;
     let text = first_lines(&output.stdout);
-    let deviation = text.split("largest deviation: ").nth(1).and_then(|rest| rest.split(' ').next()?.parse().ok());
+    let deviation = text
+        .split("largest deviation: ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next()?.parse().ok());
     match deviation {
         Some(deviation) if output.status.success() => Ok(Compiled::Ran { deviation }),
         _ => Err(failed("the self-test of the C source", text)),

@@ -11,7 +11,12 @@ use crate::{
 };
 
 /// Declarations of the interface in whole numbers.
-pub(super) fn header<'a>(name: &'a str, portable: &'a Portable, networks: &FixedNetworks, units: &'a str) -> Header<'a> {
+pub(super) fn header<'a>(
+    name: &'a str,
+    portable: &'a Portable,
+    networks: &FixedNetworks,
+    units: &'a str,
+) -> Header<'a> {
     Header {
         name,
         portable,
@@ -63,30 +68,70 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
             size => format!("[{upper}_{size}]"),
         };
         let brackets: String = shape.iter().map(bracket).collect();
-        let shape: Vec<_> = std::iter::once(rows).chain(shape.iter().map(|&axis| sizes[axis].1)).collect();
+        let shape: Vec<_> = std::iter::once(rows)
+            .chain(shape.iter().map(|&axis| sizes[axis].1))
+            .collect();
         let values = networks.networks.iter().flat_map(of);
-        push_array(&mut text, &format!("static const {kind} {name}[{rows}]{brackets}"), &shape, values);
+        push_array(
+            &mut text,
+            &format!("static const {kind} {name}[{rows}]{brackets}"),
+            &shape,
+            values,
+        );
     };
     array("centres", "int32_t", &[1], &|network| texts(&network.centres));
     array("factors", "int32_t", &[1], &|network| texts(&network.factors));
-    array("factor_shifts", "uint8_t", &[1], &|network| texts(&network.factor_shifts));
-    array("hidden_weights", hidden_type(networks), &[0, 1], &|network| texts(&network.hidden_weights));
-    array("hidden_biases", "int64_t", &[0], &|network| longs(&network.hidden_biases));
-    array("hidden_shifts", "uint8_t", &[0], &|network| texts(&network.hidden_shifts));
-    array("output_weights", "int16_t", &[2, 0], &|network| texts(&network.output_weights));
-    array("output_biases", "int64_t", &[2], &|network| longs(&network.output_biases));
-    array("output_shifts", "uint8_t", &[2], &|network| texts(&network.output_shifts));
+    array("factor_shifts", "uint8_t", &[1], &|network| {
+        texts(&network.factor_shifts)
+    });
+    array("hidden_weights", hidden_type(networks), &[0, 1], &|network| {
+        texts(&network.hidden_weights)
+    });
+    array("hidden_biases", "int64_t", &[0], &|network| {
+        longs(&network.hidden_biases)
+    });
+    array("hidden_shifts", "uint8_t", &[0], &|network| {
+        texts(&network.hidden_shifts)
+    });
+    array("output_weights", "int16_t", &[2, 0], &|network| {
+        texts(&network.output_weights)
+    });
+    array("output_biases", "int64_t", &[2], &|network| {
+        longs(&network.output_biases)
+    });
+    array("output_shifts", "uint8_t", &[2], &|network| {
+        texts(&network.output_shifts)
+    });
     let table = &networks.tangent.values;
-    text += &format!("/* tanh, in 2^-15: largest error with interpolation {:.1e}. */\n", networks.tangent.error());
-    push_array(&mut text, &format!("static const int16_t tangents[{}]", table.len()), &[table.len()], table);
+    text += &format!(
+        "/* tanh, in 2^-15: largest error with interpolation {:.1e}. */\n",
+        networks.tangent.error()
+    );
+    push_array(
+        &mut text,
+        &format!("static const int16_t tangents[{}]", table.len()),
+        &[table.len()],
+        table,
+    );
     if networks.quantity == Quantity::LogResistance {
         let table = &networks.logarithm.values;
-        text += &format!("/* ln(1 + i/256), in 2^-26: largest error of the logarithm {:.1e}. */\n", LogTable::ERROR);
-        push_array(&mut text, &format!("static const int32_t logarithms[{}]", table.len()), &[table.len()], table);
+        text += &format!(
+            "/* ln(1 + i/256), in 2^-26: largest error of the logarithm {:.1e}. */\n",
+            LogTable::ERROR
+        );
+        push_array(
+            &mut text,
+            &format!("static const int32_t logarithms[{}]", table.len()),
+            &[table.len()],
+            table,
+        );
     }
     text += &arithmetic(networks.quantity);
     text += &decode(header, networks.hidden_width);
-    let limits = networks.networks.iter().flat_map(|network| network.limits.iter().copied());
+    let limits = networks
+        .networks
+        .iter()
+        .flat_map(|network| network.limits.iter().copied());
     let limits = limits.map(|(low, high)| (low.to_string(), high.to_string()));
     push_out_of_range(&mut text, header, limits);
     text

@@ -28,7 +28,10 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
     let portable = header.portable;
     let Arithmetic { hidden, rest } = weights.arithmetic;
     let (upper, rows) = (header.upper(), portable.networks.len());
-    let mut text = format!("#include \"{}_decode.h\"\n\n#include <float.h>\n#include <math.h>\n", header.name);
+    let mut text = format!(
+        "#include \"{}_decode.h\"\n\n#include <float.h>\n#include <math.h>\n",
+        header.name
+    );
     text += &format!("\n#define HIDDEN {}\n\n", portable.hidden);
     if hidden != rest {
         text += "/* The sums of the hidden nodes are computed in double: their large products nearly cancel. */\n";
@@ -36,7 +39,9 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
     let mut array = |array: &str, digits: Digits, shape: &[(&str, usize)], of: fn(&RoundedNetwork) -> &Vec<f64>| {
         let brackets: String = shape.iter().map(|(size, _)| format!("[{size}]")).collect();
         let declaration = format!("static const {} {array}[{rows}]{brackets}", type_name(digits));
-        let shape: Vec<usize> = std::iter::once(rows).chain(shape.iter().map(|&(_, size)| size)).collect();
+        let shape: Vec<usize> = std::iter::once(rows)
+            .chain(shape.iter().map(|&(_, size)| size))
+            .collect();
         let values = weights.networks.iter().flat_map(of).map(|&value| number(digits, value));
         push_array(&mut text, &declaration, &shape, values);
     };
@@ -45,9 +50,13 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
     let outputs = (outputs.as_str(), portable.outputs);
     let nodes = ("HIDDEN", portable.hidden);
     array("centre_ohm", hidden, &[channels], |network| &network.centre_ohm);
-    array("hidden_weights", hidden, &[channels, nodes], |network| &network.hidden_weights);
+    array("hidden_weights", hidden, &[channels, nodes], |network| {
+        &network.hidden_weights
+    });
     array("hidden_biases", hidden, &[nodes], |network| &network.hidden_biases);
-    array("output_weights", rest, &[nodes, outputs], |network| &network.output_weights);
+    array("output_weights", rest, &[nodes, outputs], |network| {
+        &network.output_weights
+    });
     array("output_biases", rest, &[outputs], |network| &network.output_biases);
     push_decode(&mut text, header, weights.arithmetic);
     if let Some(ranges) = portable.ranges() {
@@ -75,8 +84,16 @@ fn push_decode(text: &mut String, header: &Header<'_>, Arithmetic { hidden, rest
             format!("log1p{}((reading - {centre}) / {centre})", suffix(hidden))
         }
     };
-    let reading = if hidden == rest { "resistances_ohm[i]".to_owned() } else { format!("({wide})resistances_ohm[i]") };
-    let sum = if hidden == rest { "sums[j]".to_owned() } else { format!("({plain})sums[j]") };
+    let reading = if hidden == rest {
+        "resistances_ohm[i]".to_owned()
+    } else {
+        format!("({wide})resistances_ohm[i]")
+    };
+    let sum = if hidden == rest {
+        "sums[j]".to_owned()
+    } else {
+        format!("({plain})sums[j]")
+    };
     *text += &format!(
         "{signature}\n\
          {{\n    \

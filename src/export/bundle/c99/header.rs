@@ -132,7 +132,12 @@ pub(super) fn push_out_of_range(
     let reading = header.reading;
     let low = limits.clone().map(|limits| limits.0);
     push_array(text, &format!("static const {reading} lowest{sizes}"), &shape, low);
-    push_array(text, &format!("static const {reading} highest{sizes}"), &shape, limits.map(|limits| limits.1));
+    push_array(
+        text,
+        &format!("static const {reading} highest{sizes}"),
+        &shape,
+        limits.map(|limits| limits.1),
+    );
     *text += &format!(
         "{signature}\n\
          {{\n    \

@@ -38,7 +38,9 @@ pub(super) fn push_array(
 fn push_level(text: &mut String, shape: &[usize], elements: &mut impl Iterator<Item = impl Display>, depth: usize) {
     /// Characters after which a line ends.
     const WIDTH: usize = 100;
-    let Some((&size, inner)) = shape.split_first() else { return };
+    let Some((&size, inner)) = shape.split_first() else {
+        return;
+    };
     let indent = "    ".repeat(depth + 1);
     text.push_str("{\n");
     let mut line = indent.clone();

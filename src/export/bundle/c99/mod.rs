@@ -8,12 +8,7 @@ mod literal;
 mod selftest;
 
 use self::{header::Header, selftest::SelfTest};
-use super::{
-    fixed_point::FixedNetworks,
-    portable::Portable,
-    vectors::Vector,
-    weights::Weights,
-};
+use super::{fixed_point::FixedNetworks, portable::Portable, vectors::Vector, weights::Weights};
 
 pub(super) use self::{
     compiler::{Compiled, run_self_test},
@@ -72,7 +67,9 @@ pub(super) fn write_fixed(
 }
 
 fn bits_of(networks: &FixedNetworks, vector: &Vector) -> Vec<i32> {
-    networks.decode(vector.network, &vector.readings_ohm).unwrap_or_default()
+    networks
+        .decode(vector.network, &vector.readings_ohm)
+        .unwrap_or_default()
 }
 
 fn files(header: &Header<'_>, source: String, self_test: String) -> Files {

@@ -36,10 +36,16 @@ impl SelfTest<'_> {
             push_array(&mut text, "static const int rows[VECTORS]", &[vectors.len()], rows);
         }
         let declaration = format!("static const {} readings[VECTORS][{upper}_CHANNELS]", header.reading);
-        let readings = vectors.iter().flat_map(|vector| &vector.readings_ohm).map(|&ohm| reading(ohm));
+        let readings = vectors
+            .iter()
+            .flat_map(|vector| &vector.readings_ohm)
+            .map(|&ohm| reading(ohm));
         push_array(&mut text, &declaration, &[vectors.len(), portable.channels], readings);
         let declaration = format!("static const double expected_mm[VECTORS][{upper}_OUTPUTS]");
-        let expected = vectors.iter().flat_map(|vector| &vector.coordinates_mm).map(|mm| format!("{mm:e}"));
+        let expected = vectors
+            .iter()
+            .flat_map(|vector| &vector.coordinates_mm)
+            .map(|mm| format!("{mm:e}"));
         push_array(&mut text, &declaration, &[vectors.len(), portable.outputs], expected);
         let same_bits = if let Some(bits) = bits {
             let declaration = format!("static const int32_t expected_bits[VECTORS][{upper}_OUTPUTS]");
@@ -84,7 +90,11 @@ impl SelfTest<'_> {
                  return 1;\n    }}\n"
             )
         };
-        let bad = if is_signed { String::new() } else { format!("    {} bad[{upper}_CHANNELS];\n", header.reading) };
+        let bad = if is_signed {
+            String::new()
+        } else {
+            format!("    {} bad[{upper}_CHANNELS];\n", header.reading)
+        };
         text + &format!(
             "int main(void)\n{{\n    \
              {coordinate} decoded[{upper}_OUTPUTS];\n\

@@ -1,10 +1,6 @@
 //! The decoder in whole numbers, step by step as the C source has it.
 
-use super::{
-    FixedNetworks,
-    quantise::CONDUCTANCE_BITS,
-    tangent::TangentTable,
-};
+use super::{FixedNetworks, change::CONDUCTANCE_BITS, tangent::TangentTable};
 use crate::network::Quantity;
 
 impl FixedNetworks {
@@ -19,13 +15,19 @@ impl FixedNetworks {
                 return None;
             }
             let change = self.change(reading, network.centres[channel]);
-            let scaled = shift(change * i64::from(network.factors[channel]), network.factor_shifts[channel]);
+            let scaled = shift(
+                change * i64::from(network.factors[channel]),
+                network.factor_shifts[channel],
+            );
             changes.push(scaled.clamp(-largest_change, largest_change));
         }
         let mut activations = Vec::new();
         for (node, &bias) in network.hidden_biases.iter().enumerate() {
             let weights = &network.hidden_weights[node * channels..][..channels];
-            let products = weights.iter().zip(&changes).map(|(&weight, change)| i64::from(weight) * change);
+            let products = weights
+                .iter()
+                .zip(&changes)
+                .map(|(&weight, change)| i64::from(weight) * change);
             let argument = shift(bias + products.sum::<i64>(), network.hidden_shifts[node]);
             let largest = i64::from(TangentTable::LARGEST);
             activations.push(i64::from(self.tangent.of(argument.clamp(-largest, largest) as i32)));
@@ -33,7 +35,10 @@ impl FixedNetworks {
         let hidden = activations.len();
         let coordinates = network.output_biases.iter().enumerate().map(|(coordinate, &bias)| {
             let weights = &network.output_weights[coordinate * hidden..][..hidden];
-            let products = weights.iter().zip(&activations).map(|(&weight, activation)| i64::from(weight) * activation);
+            let products = weights
+                .iter()
+                .zip(&activations)
+                .map(|(&weight, activation)| i64::from(weight) * activation);
             let nm = shift(bias + products.sum::<i64>(), network.output_shifts[coordinate]);
             // Proven to fit when the weights were rounded.
             nm.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32

@@ -17,7 +17,8 @@ impl LogTable {
     pub(in crate::export::bundle) const LN_2: i64 = 46_516_320;
     /// Largest error of [`Self::of`]: 30 times the rounding of ln 2, the next term of the series, t⁴/4 with t < 1/256,
     /// the truncation of three terms in 2⁻³⁰, and the roundings of the entry and of the sum.
-    pub(in crate::export::bundle) const ERROR: f64 = 30.0 * 0.2 / Self::ONE + 1.0 / 4.0 / 4_294_967_296.0
+    pub(in crate::export::bundle) const ERROR: f64 = 30.0 * 0.2 / Self::ONE
+        + 1.0 / 4.0 / 4_294_967_296.0
         + 4.0 / (1_u32 << Self::QUOTIENT_BITS) as f64
         + 1.5 / Self::ONE;
     const ONE: f64 = (1_u32 << Self::FRACTION_BITS) as f64;
@@ -59,6 +60,9 @@ mod tests {
         for number in numbers {
             largest = largest.max((f64::from(table.of(number)) / scale - f64::from(number).ln()).abs());
         }
-        assert!(largest <= LogTable::ERROR && largest > 0.1 * LogTable::ERROR, "{largest}");
+        assert!(
+            largest <= LogTable::ERROR && largest > 0.1 * LogTable::ERROR,
+            "{largest}"
+        );
     }
 }

@@ -1,14 +1,12 @@
 use super::{
     FixedPointError,
+    change::{Change, HiddenWidth},
     logarithm::LogTable,
-    scaled::{Multiplier, ScaledRow},
+    scaled::ScaledRow,
     tangent::TangentTable,
 };
 use crate::{
-    export::bundle::{
-        portable::{ChannelRanges, Portable, PortableNetwork},
-        twofold::Twofold,
-    },
+    export::bundle::portable::{ChannelRanges, Portable, PortableNetwork},
     network::Quantity,
 };
 
@@ -18,31 +16,6 @@ const USUAL_BOUND: f64 = 0.01;
 const OUTPUT_WIDTH: u32 = 16;
 /// Nanometres in a millimetre.
 const NM_PER_MM: f64 = 1e6;
-/// Bits after the point of a relative change of a conductance.
-pub(in crate::export::bundle) const CONDUCTANCE_BITS: u32 = 30;
-
-/// Bits of the changes of the readings and of the hidden weights, with their sign.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::export::bundle) enum HiddenWidth {
-    Sixteen,
-    /// Kept in 32 bits. For networks whose large products nearly cancel.
-    TwentyFour,
-}
-
-impl HiddenWidth {
-    fn bits(self) -> u32 {
-        match self {
-            Self::Sixteen => 16,
-            Self::TwentyFour => 24,
-        }
-    }
-
-    /// Largest scaled change of a reading.
-    pub(in crate::export::bundle) fn largest_change(self) -> i32 {
-        (1 << (self.bits() - 1)) - 1
-    }
-}
-
 /// The networks of a file in whole numbers.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct FixedNetworks {
@@ -78,17 +51,6 @@ pub(in crate::export::bundle) struct FixedNetwork {
     pub(in crate::export::bundle) limits: Vec<(i32, i32)>,
 }
 
-/// The change x of a reading as slope · d + offset, where d is the whole number that the decoder computes.
-struct Change {
-    centre: i32,
-    slope: Twofold,
-    offset: Twofold,
-    /// Largest |d| within the limits, at least ½.
-    span: f64,
-    /// Largest error of d.
-    error: f64,
-}
-
 impl FixedNetworks {
     /// Rounds the weights of `portable` to 16 bits, or those of the hidden layer to 24 bits where 16 are too few.
     ///
@@ -98,7 +60,10 @@ impl FixedNetworks {
     pub(in crate::export::bundle) fn of(portable: &Portable) -> Result<Self, FixedPointError> {
         let range_mm = portable.full_scale_mm;
         let sixteen = Self::with_width(portable, HiddenWidth::Sixteen);
-        if sixteen.as_ref().is_ok_and(|fixed| fixed.bound_mm <= USUAL_BOUND * range_mm) {
+        if sixteen
+            .as_ref()
+            .is_ok_and(|fixed| fixed.bound_mm <= USUAL_BOUND * range_mm)
+        {
             return sixteen;
         }
         let wide = Self::with_width(portable, HiddenWidth::TwentyFour)?;
@@ -118,7 +83,10 @@ impl FixedNetworks {
         let largest_ohm = limits.fold(0.0_f64, |largest, limits| largest.max(limits.1));
         // A factor of 2 for readings outside.
         let fits = |decimals: &i32| largest_ohm * 10.0_f64.powi(*decimals) <= f64::from(1 << 30);
-        let decimals = [9, 6, 3, 0].into_iter().find(fits).ok_or(FixedPointError::Reading(largest_ohm))?;
+        let decimals = [9, 6, 3, 0]
+            .into_iter()
+            .find(fits)
+            .ok_or(FixedPointError::Reading(largest_ohm))?;
         let (tangent, logarithm) = (TangentTable::new(), LogTable::new());
         let tangent_error = tangent.error();
         let mut networks = Vec::new();
@@ -156,63 +124,6 @@ impl FixedNetworks {
     pub(in crate::export::bundle) fn decode(&self, network: usize, readings_ohm: &[f64]) -> Option<Vec<i32>> {
         let readings: Vec<_> = readings_ohm.iter().map(|&ohm| self.reading(ohm)).collect();
         self.decode_whole(network, &readings)
-    }
-}
-
-impl Change {
-    fn of(quantity: Quantity, decimals: i32, (low, high): (f64, f64), centre_ohm: f64) -> Self {
-        let units = 10.0_f64.powi(decimals);
-        let (low, high) = (low * units, high * units);
-        let origin = Twofold::from(centre_ohm) * Twofold::from(units);
-        let wide = |centre: f64| (high - centre).max(centre - low).max(0.5);
-        match quantity {
-            Quantity::Resistance | Quantity::Raw => {
-                let centre = (0.5 * (low + high)).round();
-                let unit = Twofold::from(1.0) / Twofold::from(units);
-                Self {
-                    centre: centre as i32,
-                    slope: unit,
-                    offset: (Twofold::from(centre) - origin) * unit,
-                    span: wide(centre),
-                    error: 0.0,
-                }
-            }
-            Quantity::Conductance => {
-                let one = f64::from(1_u32 << CONDUCTANCE_BITS);
-                let centre = (2.0 / (1.0 / low + 1.0 / high)).round().max(1.0);
-                let ratio = origin / Twofold::from(centre);
-                let span = ((centre / low - 1.0).abs()).max((centre / high - 1.0).abs());
-                Self {
-                    centre: centre as i32,
-                    slope: ratio / Twofold::from(one),
-                    offset: ratio - Twofold::from(1.0),
-                    span: (span * one).max(0.5),
-                    // Division truncates.
-                    error: 1.0,
-                }
-            }
-            Quantity::LogResistance => {
-                let one = f64::from(1 << LogTable::FRACTION_BITS);
-                let centre = (0.5 * (low.ln() + high.ln()) * one).round();
-                Self {
-                    centre: centre as i32,
-                    slope: Twofold::from(1.0) / Twofold::from(one),
-                    offset: Twofold::from(centre / one) - origin.ln(),
-                    span: (high.ln() * one - centre).max(centre - low.ln() * one).max(0.5),
-                    error: LogTable::ERROR * one,
-                }
-            }
-        }
-    }
-
-    /// Factor that brings the span to the largest scaled change.
-    fn multiplier(&self, width: HiddenWidth) -> Multiplier {
-        Multiplier::of(f64::from(width.largest_change()) / self.span)
-    }
-
-    /// Error of the scaled change, where the span is 1.
-    fn scaled_error(&self, width: HiddenWidth) -> f64 {
-        Multiplier::ERROR + 0.5 / f64::from(width.largest_change()) + self.error / self.span
     }
 }
 
@@ -312,7 +223,10 @@ impl FixedNetwork {
         if reach_nm > f64::from(1 << 30) {
             return Err(FixedPointError::Range { what: "a coordinate" });
         }
-        let of_activations = weights_nm.iter().zip(activation_errors).map(|(weight, error)| weight.abs() * error);
+        let of_activations = weights_nm
+            .iter()
+            .zip(activation_errors)
+            .map(|(weight, error)| weight.abs() * error);
         let error = of_activations.sum::<f64>() + row.error + of_bias + 0.5;
         self.output_weights.extend(row.weights);
         self.output_biases.push(sum_bias);
@@ -332,7 +246,9 @@ fn whole_bias(
 ) -> Result<(i64, f64), FixedPointError> {
     let scale = 2.0_f64.powi(bits);
     let whole = (bias * scale).round();
-    let products = weights.iter().map(|&weight| f64::from(weight).abs() * 2.0_f64.powi(input_bits));
+    let products = weights
+        .iter()
+        .map(|&weight| f64::from(weight).abs() * 2.0_f64.powi(input_bits));
     // One bit is left for the rounding of the shift.
     if whole.abs() + products.sum::<f64>() < 2.0_f64.powi(61) {
         Ok((whole as i64, (bias - whole / scale).abs()))

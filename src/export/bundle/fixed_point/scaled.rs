@@ -19,7 +19,9 @@ impl ScaledRow {
     /// # Errors
     /// A weight that is too large even with the fewest bits.
     pub(super) fn of(weights: &[f64], width: u32, fewest: i32, what: &'static str) -> Result<Self, FixedPointError> {
-        let largest = weights.iter().fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
+        let largest = weights
+            .iter()
+            .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
         let fitting = (f64::from((1 << (width - 1)) - 1) / largest).log2().floor();
         // Not a number for a weight that is none, and infinite for zeros.
         if fitting.is_nan() || fitting < f64::from(fewest) {
@@ -28,7 +30,10 @@ impl ScaledRow {
         let bits = fitting.min(f64::from(MOST_BITS)) as i32;
         let scale = 2.0_f64.powi(bits);
         let rounded: Vec<i32> = weights.iter().map(|weight| (weight * scale).round() as i32).collect();
-        let errors = weights.iter().zip(&rounded).map(|(weight, &rounded)| (weight - f64::from(rounded) / scale).abs());
+        let errors = weights
+            .iter()
+            .zip(&rounded)
+            .map(|(weight, &rounded)| (weight - f64::from(rounded) / scale).abs());
         Ok(Self {
             error: errors.sum(),
             weights: rounded,
@@ -66,7 +71,7 @@ mod tests {
     fn weights_take_all_bits_and_tell_their_error() {
         let row = ScaledRow::of(&[1.0, -0.3, 0.1], 16, 0, "weights").unwrap();
         assert_eq!((row.bits, &row.weights[..]), (14, &[16384, -4915, 1638][..]));
-        assert!((row.error - (0.3 - 4915.0 / 16384.0).abs() - (0.1 - 1638.0 / 16384.0).abs()).abs() < 1e-15);
+        assert!((row.error - (0.3 - 4915.0 / 16384.0_f64).abs() - (0.1 - 1638.0 / 16384.0_f64).abs()).abs() < 1e-15);
         assert_eq!(ScaledRow::of(&[0.0], 16, 0, "weights").unwrap().bits, 20);
         assert!(ScaledRow::of(&[40_000.0], 16, 0, "weights").is_err());
         assert!(ScaledRow::of(&[f64::INFINITY], 24, 0, "weights").is_err());

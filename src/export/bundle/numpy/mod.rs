@@ -30,7 +30,9 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
         array("output_weights", rest, &[portable.hidden, outputs], &|network| {
             network.output_weights.clone()
         }),
-        array("output_biases", rest, &[outputs], &|network| network.output_biases.clone()),
+        array("output_biases", rest, &[outputs], &|network| {
+            network.output_biases.clone()
+        }),
     ];
     if let Some(ranges) = portable.ranges() {
         let limit = |name: &str, pick: fn(&(f64, f64)) -> f64| NamedArray {
@@ -59,7 +61,9 @@ pub(super) fn read_weights(bytes: &[u8], quantity: Quantity) -> Result<Weights, 
         let array = array(name)?;
         let size: usize = array.shape.iter().skip(1).product();
         let values = array.values.get(index * size..).and_then(|rest| rest.get(..size));
-        values.map(<[f64]>::to_vec).ok_or_else(|| format!("'{name}' is too short"))
+        values
+            .map(<[f64]>::to_vec)
+            .ok_or_else(|| format!("'{name}' is too short"))
     };
     let centre = array("centre_ohm")?;
     let networks = (0..centre.shape[0]).map(|index| {
@@ -93,7 +97,11 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
     } else {
         ("", "    row = np.ones(len(r))\n".to_owned())
     };
-    let row_text = if portable.takes_row() { "; row: the row-wire of each sample, from 1" } else { "" };
+    let row_text = if portable.takes_row() {
+        "; row: the row-wire of each sample, from 1"
+    } else {
+        ""
+    };
     let change = match portable.quantity {
         Quantity::Resistance | Quantity::Raw => "x - w[\"centre_ohm\"]",
         Quantity::Conductance => "(w[\"centre_ohm\"] - x) / x",
@@ -140,6 +148,10 @@ def decode(resistances_ohm{argument}):
 "#,
         channels = portable.channels,
         outputs = portable.outputs,
-        above = if portable.quantity == Quantity::Raw { "" } else { " above 0" },
+        above = if portable.quantity == Quantity::Raw {
+            ""
+        } else {
+            " above 0"
+        },
     )
 }

@@ -68,7 +68,10 @@ fn write_array(array: &NamedArray) -> Vec<u8> {
         Digits::Double => "<f8",
     };
     let sizes: String = array.shape.iter().map(|size| format!("{size}, ")).collect();
-    let mut header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
+    let mut header = format!(
+        "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}",
+        sizes.trim_end()
+    );
     // The values begin at a multiple of 64 bytes; the line ends the header.
     let padded = (MAGIC.len() + 2 + header.len() + 1).next_multiple_of(64);
     header += &" ".repeat(padded - MAGIC.len() - 2 - header.len() - 1);
@@ -117,9 +120,18 @@ fn read_array(name: String, bytes: &[u8]) -> Result<NamedArray, String> {
         Some("<f8") => (Digits::Double, 8),
         _ => return Err(damaged()),
     };
-    let shape = header.split("'shape': (").nth(1).and_then(|rest| rest.split(')').next());
-    let sizes = shape.ok_or_else(damaged)?.split(',').map(str::trim).filter(|size| !size.is_empty());
-    let shape: Vec<usize> = sizes.map(|size| size.parse().map_err(|_| damaged())).collect::<Result<_, _>>()?;
+    let shape = header
+        .split("'shape': (")
+        .nth(1)
+        .and_then(|rest| rest.split(')').next());
+    let sizes = shape
+        .ok_or_else(damaged)?
+        .split(',')
+        .map(str::trim)
+        .filter(|size| !size.is_empty());
+    let shape: Vec<usize> = sizes
+        .map(|size| size.parse().map_err(|_| damaged()))
+        .collect::<Result<_, _>>()?;
     let count: usize = shape.iter().product();
     let values = part(bytes, MAGIC.len() + 2 + header_size, count * width)?;
     let value = |bytes: &[u8]| match *bytes {
@@ -162,7 +174,12 @@ mod tests {
             values: values.to_vec(),
         };
         vec![
-            array("a", Digits::Double, &[1, 2, 3], &[1.0, -2.5, 1e-300, f64::MAX, 0.1, -0.0]),
+            array(
+                "a",
+                Digits::Double,
+                &[1, 2, 3],
+                &[1.0, -2.5, 1e-300, f64::MAX, 0.1, -0.0],
+            ),
             array("of_singles", Digits::Single, &[2], &[0.5, f64::from(0.1_f32)]),
             array("empty", Digits::Double, &[0, 4], &[]),
         ]

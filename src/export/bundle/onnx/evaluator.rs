@@ -17,7 +17,10 @@ pub(super) fn evaluate(graph: &Graph, inputs: Vec<(String, Tensor)>) -> Result<H
     }
     for node in &graph.node {
         let input = |index: usize| {
-            let name = node.input.get(index).ok_or_else(|| format!("{} lacks an input", node.name))?;
+            let name = node
+                .input
+                .get(index)
+                .ok_or_else(|| format!("{} lacks an input", node.name))?;
             let value = values.get(name);
             value.ok_or_else(|| format!("{} needs '{name}', which is not computed before", node.name))
         };
@@ -34,7 +37,9 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
     let attribute = |name: &str| {
         let mut all = node.attribute.iter();
         let found = all.find(|attribute| attribute.name == name);
-        found.and_then(|attribute| attribute.i).ok_or_else(|| format!("there is no attribute {name}"))
+        found
+            .and_then(|attribute| attribute.i)
+            .ok_or_else(|| format!("there is no attribute {name}"))
     };
     match node.op_type.as_str() {
         "Add" | "Sub" | "Mul" | "Div" | "Greater" | "GreaterOrEqual" | "Less" | "LessOrEqual" | "Equal" | "And" => {

@@ -49,7 +49,10 @@ impl OnnxGraph {
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
         let model = Model::decode(bytes).map_err(|error| error.to_string())?;
         let graph = model.graph.ok_or("there is no graph in it")?;
-        let input = graph.input.first().and_then(|input| input.kind.as_ref()?.tensor_type.as_ref());
+        let input = graph
+            .input
+            .first()
+            .and_then(|input| input.kind.as_ref()?.tensor_type.as_ref());
         let digits = match input.map(|kind| kind.elem_type) {
             Some(schema::FLOAT) => Digits::Single,
             Some(schema::DOUBLE) => Digits::Double,
@@ -75,7 +78,10 @@ impl OnnxGraph {
             inputs.push(("row".to_owned(), Tensor::int([vectors.len()], rows)));
         }
         let mut values = evaluate(&self.graph, inputs)?;
-        let coordinates_mm = match values.remove("coordinates_mm").map(|tensor| (tensor.shape, tensor.values)) {
+        let coordinates_mm = match values
+            .remove("coordinates_mm")
+            .map(|tensor| (tensor.shape, tensor.values))
+        {
             Some((shape, Values::Real(_, values))) if shape.len() == 2 => {
                 values.chunks(shape[1].max(1)).map(<[f64]>::to_vec).collect()
             }

@@ -21,7 +21,10 @@ pub(super) fn unary(operation: &str, tensor: &Tensor) -> Outcome {
                 _ => None,
             };
             let all = values.iter().map(|&value| of(value).map(|value| digits.round(value)));
-            Values::Real(*digits, all.collect::<Option<_>>().ok_or("no such operation on numbers")?)
+            Values::Real(
+                *digits,
+                all.collect::<Option<_>>().ok_or("no such operation on numbers")?,
+            )
         }
         _ => return Err("it does not fit its elements".to_owned()),
     };
@@ -164,7 +167,9 @@ pub(super) fn reduce_sum(tensor: &Tensor, is_kept: bool) -> Outcome {
     let (&[rows, columns], Values::Int(values)) = (&tensor.shape[..], &tensor.values) else {
         return Err("only rows of whole numbers are added up".to_owned());
     };
-    let sums = (0..rows).map(|row| values[row * columns..][..columns].iter().sum()).collect();
+    let sums = (0..rows)
+        .map(|row| values[row * columns..][..columns].iter().sum())
+        .collect();
     let shape = if is_kept { vec![rows, 1] } else { vec![rows] };
     Ok(Tensor::int(shape, sums))
 }
@@ -174,7 +179,11 @@ fn broadcast(tensors: &[&Tensor]) -> Result<(Vec<usize>, Vec<Vec<usize>>), Strin
     let dimensions = tensors.iter().map(|tensor| tensor.shape.len()).max().unwrap_or(0);
     let size = |tensor: &Tensor, axis: usize| {
         let missing = dimensions - tensor.shape.len();
-        if axis < missing { 1 } else { tensor.shape[axis - missing] }
+        if axis < missing {
+            1
+        } else {
+            tensor.shape[axis - missing]
+        }
     };
     let mut shape = Vec::new();
     for axis in 0..dimensions {

@@ -59,10 +59,16 @@ impl Tensor {
     /// A description of the damage.
     pub(super) fn read(message: &TensorData) -> Result<Self, String> {
         let bytes = &message.raw_data;
-        let shape: Vec<usize> = message.dims.iter().map(|&size| usize::try_from(size).unwrap_or(0)).collect();
+        let shape: Vec<usize> = message
+            .dims
+            .iter()
+            .map(|&size| usize::try_from(size).unwrap_or(0))
+            .collect();
         let (values, count) = match message.data_type {
             FLOAT => {
-                let values: Vec<_> = chunks::<4>(bytes).map(|bytes| f64::from(f32::from_le_bytes(bytes))).collect();
+                let values: Vec<_> = chunks::<4>(bytes)
+                    .map(|bytes| f64::from(f32::from_le_bytes(bytes)))
+                    .collect();
                 (Values::Real(Digits::Single, values.clone()), values.len() * 4)
             }
             DOUBLE => {
@@ -79,7 +85,10 @@ impl Tensor {
         if count == bytes.len() && tensor.len() == tensor.shape.iter().product::<usize>() {
             Ok(tensor)
         } else {
-            Err(format!("tensor '{}' has not as many elements as its shape", message.name))
+            Err(format!(
+                "tensor '{}' has not as many elements as its shape",
+                message.name
+            ))
         }
     }
 

@@ -2,9 +2,7 @@ use prost::Message;
 
 use super::{
     graph::GraphBuilder,
-    schema::{
-        Dimension, Graph, INT64, Model, OperatorSet, Property, TensorShape, TensorType, TypeOfValue, ValueInfo,
-    },
+    schema::{Dimension, Graph, INT64, Model, OperatorSet, Property, TensorShape, TensorType, TypeOfValue, ValueInfo},
     tensor::{Tensor, element_type},
 };
 use crate::{
@@ -26,7 +24,11 @@ pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, m
         key: key.clone(),
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
     });
-    let row = if portable.takes_row() { "the network of the row-wire 'row' (from 1)" } else { "the network" };
+    let row = if portable.takes_row() {
+        "the network of the row-wire 'row' (from 1)"
+    } else {
+        "the network"
+    };
     let model = Model {
         ir_version: IR_VERSION,
         producer_name: env!("CARGO_PKG_NAME").to_owned(),
@@ -61,7 +63,14 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
     let output_weights = add_table(&mut builder, "output_weights", weights, digits, &shape, columns);
     let products = add_product(&mut builder, portable, &activations, &output_weights, "output_products");
     let biases = |network: &RoundedNetwork| network.output_biases.clone();
-    let biases = add_table(&mut builder, "output_biases", weights, digits, &[portable.outputs], biases);
+    let biases = add_table(
+        &mut builder,
+        "output_biases",
+        weights,
+        digits,
+        &[portable.outputs],
+        biases,
+    );
     let answers = builder.node("Add", &[&products, &biases], "answers");
     builder.node("Where", &[&is_valid, &answers, "not_a_number"], "coordinates_mm");
     let mut outputs = vec![value(
@@ -211,7 +220,10 @@ fn add_readings_outside(builder: &mut GraphBuilder, portable: &Portable, digits:
         let table = builder.constant(&format!("{name}_of_rows"), &Tensor::real(digits, shape, values));
         builder.node("Gather", &[&table, "row_index"], name)
     };
-    let (low, high) = (limit("lowest_ohm", |limits| limits.0), limit("highest_ohm", |limits| limits.1));
+    let (low, high) = (
+        limit("lowest_ohm", |limits| limits.0),
+        limit("highest_ohm", |limits| limits.1),
+    );
     let not_below = builder.node("GreaterOrEqual", &["resistances_ohm", &low], "is_not_below");
     let not_above = builder.node("LessOrEqual", &["resistances_ohm", &high], "is_not_above");
     let is_inside = builder.node("And", &[&not_below, &not_above], "is_inside");
