@@ -14,7 +14,7 @@
 //! | [`decoupling`] | readings to deformation, every way we know, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
-//! | `export` | files for other programs (feature `files`); `export::figures` draws (feature `figures`) |
+//! | `export` | files for other programs (feature `files`); `export::bundle` writes networks for them (feature `bundle`), `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
 //!

@@ -75,7 +75,7 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
     }
     if report.vectors.verified > 0 {
         text += &format!(
-            "Verified with {} readings of a row-wire, {} of them golden vectors in the bundle. Largest deviation of a \
+            "Verified on {} readings of a row-wire, {} of them in the bundle as golden vectors. Largest deviation of a \
              coordinate, relative to the widest range of one in training ({range} mm):\n",
             report.vectors.verified, report.vectors.golden
         );

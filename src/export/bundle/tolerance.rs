@@ -51,16 +51,16 @@ impl Tolerance {
         let mut remarks = Vec::new();
         if arithmetic == Arithmetic::MIXED {
             remarks.push(
-                "the sums of the hidden nodes are computed in double precision, because their large products nearly \
-                 cancel; the rest is in single precision"
+                "the hidden sums are computed in double precision, because their large products nearly cancel; the rest is \
+                 in single precision"
                     .to_owned(),
             );
         }
         if self.limit > self.usual {
             remarks.push(format!(
-                "this network makes a relative error of the change of its readings up to {:.1e} times as large, in parts \
-                 of the range of the outputs, so that any two programs may differ by up to {:.1e} instead of {:.0e}; \
-                 train with noise (--noise) to have a network that does not",
+                "this network amplifies rounding errors up to {:.1e} times (relative to the range of its outputs), so two \
+                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; train with noise \
+                 (--noise) for a network that amplifies less",
                 self.amplification, self.limit, self.usual
             ));
         }

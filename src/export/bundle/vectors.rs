@@ -120,8 +120,8 @@ impl Vectors {
             assert_eq!(answers.len(), vector.coordinates_mm.len());
             for (answer, expected) in answers.iter().zip(&vector.coordinates_mm) {
                 let difference = (answer - expected).abs();
-                // Also takes NaN.
-                if !(difference <= largest) {
+                // Once it is NaN it stays so.
+                if difference.is_nan() || difference > largest {
                     largest = difference;
                 }
             }

@@ -17,7 +17,7 @@ use thiserror::Error;
 pub(super) use self::{
     change::{CONDUCTANCE_BITS, HiddenWidth},
     logarithm::LogTable,
-    quantise::{FixedNetwork, FixedNetworks},
+    quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND},
     tangent::TangentTable,
 };
 

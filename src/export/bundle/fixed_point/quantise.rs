@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Part of the range of the outputs below which the bound on the error should be.
-const USUAL_BOUND: f64 = 0.01;
+pub(in crate::export::bundle) const USUAL_BOUND: f64 = 0.01;
 /// Bits of an output weight with its sign.
 const OUTPUT_WIDTH: u32 = 16;
 /// Nanometres in a millimetre.

@@ -129,7 +129,7 @@ import pathlib
 
 import numpy as np
 
-NETWORKS = np.load(pathlib.Path(__file__).with_name("network.npz"))
+NETWORKS = dict(np.load(pathlib.Path(__file__).with_name("network.npz")))
 
 
 def decode(resistances_ohm{argument}):
@@ -140,7 +140,7 @@ def decode(resistances_ohm{argument}):
         raise ValueError("resistances_ohm: give finite numbers{above}")
 {row}    coordinates_mm, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
     for index in range({rows}):
-        mine, w = row == index + 1, {{name: NETWORKS[name][index] for name in NETWORKS.files}}
+        mine, w = row == index + 1, {{name: array[index] for name, array in NETWORKS.items()}}
         x = r[mine].astype(w["centre_ohm"].dtype)
         sums = ({change}) @ w["hidden_weights"] + w["hidden_biases"]
         coordinates_mm[mine] = np.tanh(sums.astype(r.dtype)) @ w["output_weights"] + w["output_biases"]

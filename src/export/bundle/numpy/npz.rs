@@ -67,10 +67,12 @@ fn write_array(array: &NamedArray) -> Vec<u8> {
         Digits::Single => "<f4",
         Digits::Double => "<f8",
     };
-    let sizes: String = array.shape.iter().map(|size| format!("{size}, ")).collect();
+    let sizes: Vec<_> = array.shape.iter().map(usize::to_string).collect();
+    // A tuple of one has a comma after it.
+    let comma = if sizes.len() == 1 { "," } else { "" };
     let mut header = format!(
-        "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}), }}",
-        sizes.trim_end()
+        "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}{comma}), }}",
+        sizes.join(", ")
     );
     // The values begin at a multiple of 64 bytes; the line ends the header.
     let padded = (MAGIC.len() + 2 + header.len() + 1).next_multiple_of(64);
