@@ -242,7 +242,9 @@ impl Bundle<'_> {
         fixed: Option<&FixedNetworks>,
         remarks: Vec<String>,
     ) -> Result<BundleReport, BundleError> {
-        let worst = checks.iter().find(|check| check.deviation.is_nan() || check.deviation > limit);
+        let worst = checks
+            .iter()
+            .find(|check| check.deviation.is_nan() || check.deviation > limit);
         if let Some(&BundleCheck { evaluator, deviation }) = worst {
             return Err(BundleError::Deviation {
                 evaluator: evaluator.to_owned(),

@@ -39,7 +39,7 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
     };
     let counted = match ranges {
         Some(_) => {
-            "the number of readings of each sample that lie beyond the range seen in training by more than a\n%   tenth of it"
+            "the number of readings of each\n%   sample that lie beyond the range seen in training by more than a tenth of it"
         }
         None => "zeros, because the range of the readings in training is not known",
     };

@@ -65,10 +65,10 @@ impl Header<'_> {
         }
         let upper = self.upper();
         format!(
-            "    const int network = row - 1;\n    \
-             if (row < 1 || row > {upper}_ROWS) {{\n        \
+            "    if (row < 1 || row > {upper}_ROWS) {{\n        \
              return {upper}_NO_SUCH_ROW;\n    \
-             }}\n"
+             }}\n    \
+             const int network = row - 1;\n"
         )
     }
 

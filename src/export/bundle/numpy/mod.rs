@@ -133,8 +133,11 @@ NETWORKS = dict(np.load(pathlib.Path(__file__).with_name("network.npz")))
 
 
 def decode(resistances_ohm{argument}):
-    """resistances_ohm: samples x {channels}{row_text}. Returns the coordinates in mm (samples x {outputs}: x_1, y_1, z_1,
-    x_2, ...) and {counted}."""
+    """Returns the coordinates in mm (samples x {outputs}: x_1, y_1, z_1, x_2, ...), and
+    {counted}.
+
+    resistances_ohm: samples x {channels}{row_text}
+    """
     r = np.atleast_2d(np.asarray(resistances_ohm, dtype={dtype}))
     if not ({is_reading}).all():
         raise ValueError("resistances_ohm: give finite numbers{above}")
