@@ -68,7 +68,7 @@ def time_onnx(folder, readings, precision, takes_row):
 
 
 def arm_size(folder, cpu):
-    """Flash with the arithmetic that the processor lacks, static memory, and stack of the decoder."""
+    """Flash of the decoder with the arithmetic that the processor lacks, static memory, and stack of the decoder."""
     source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}.elf"
     prefix = source.name.removesuffix("_decode.c")
     call = f"{prefix}_decode({'1, ' if 'int row' in source.read_text() else ''}(const int32_t *)0x20000000, (int32_t *)0x20001000)"
