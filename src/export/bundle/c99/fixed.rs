@@ -190,11 +190,13 @@ fn arithmetic(quantity: Quantity) -> String {
                  quotient = (rest << {quotient}) / (normal - rest);\n    \
                  square = (quotient * quotient) >> {quotient};\n    \
                  cube = (square * quotient) >> {quotient};\n    \
-                 return exponent * INT64_C({ln_2}) + logarithms[((normal - rest) >> {rest}) - {entries}] +\n        \
+                 return ((exponent * INT64_C({ln_2}) + {half}) >> {bits}) + logarithms[((normal - rest) >> {rest}) - {entries}] +\n        \
                  ((quotient - square / 2 + cube / 3) >> {less}) - centre;\n",
                 mask = (1 << rest) - 1,
                 quotient = LogTable::QUOTIENT_BITS,
                 ln_2 = LogTable::LN_2,
+                half = 1 << (LogTable::LN_2_BITS - 1),
+                bits = LogTable::LN_2_BITS,
                 entries = 1 << LogTable::INDEX_BITS,
                 less = LogTable::QUOTIENT_BITS - LogTable::FRACTION_BITS,
             )

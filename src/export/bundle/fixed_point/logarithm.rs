@@ -13,14 +13,14 @@ impl LogTable {
     pub(in crate::export::bundle) const INDEX_BITS: u32 = 8;
     /// Bits of the quotient that the series takes.
     pub(in crate::export::bundle) const QUOTIENT_BITS: u32 = 30;
-    /// ln 2.
-    pub(in crate::export::bundle) const LN_2: i64 = 46_516_320;
-    /// Largest error of [`Self::of`]: 30 times the rounding of ln 2, the next term of the series, t⁴/4 with t < 1/256,
-    /// the truncation of three terms in 2⁻³⁰, and the roundings of the entry and of the sum.
-    pub(in crate::export::bundle) const ERROR: f64 = 30.0 * 0.2 / Self::ONE
-        + 1.0 / 4.0 / 4_294_967_296.0
-        + 4.0 / (1_u32 << Self::QUOTIENT_BITS) as f64
-        + 1.5 / Self::ONE;
+    /// ln 2, with ten bits more.
+    pub(in crate::export::bundle) const LN_2: i64 = 47_632_711_549;
+    /// Bits that ln 2 has more than the logarithm.
+    pub(in crate::export::bundle) const LN_2_BITS: u32 = 10;
+    /// Largest error of [`Self::of`]: the next term of the series, t⁴/4 with t < 1/256, the truncation of its terms in
+    /// 2⁻³⁰, and the roundings of entry and multiple of ln 2 and the truncation of the series in the last bit.
+    pub(in crate::export::bundle) const ERROR: f64 =
+        1.0 / 4.0 / 4_294_967_296.0 + 4.0 / (1_u32 << Self::QUOTIENT_BITS) as f64 + 2.01 / Self::ONE;
     const ONE: f64 = (1_u32 << Self::FRACTION_BITS) as f64;
 
     pub(super) fn new() -> Self {
@@ -43,7 +43,8 @@ impl LogTable {
         let square = (quotient * quotient) >> Self::QUOTIENT_BITS;
         let cube = (square * quotient) >> Self::QUOTIENT_BITS;
         let series = (quotient - square / 2 + cube / 3) >> (Self::QUOTIENT_BITS - Self::FRACTION_BITS);
-        (i64::from(exponent) * Self::LN_2 + i64::from(self.values[index as usize]) + series) as i32
+        let of_exponent = (i64::from(exponent) * Self::LN_2 + (1 << (Self::LN_2_BITS - 1))) >> Self::LN_2_BITS;
+        (of_exponent + i64::from(self.values[index as usize]) + series) as i32
     }
 }
 
