@@ -1,9 +1,9 @@
 //! Bundles: trained networks as other programs read them (feature `bundle`).
 //!
-//! A network file is folded once into a description without any scaling ([`portable`]: readings in ohm to coordinates in
+//! A network file is folded once into a description without any scaling (`portable`: readings in ohm to coordinates in
 //! mm), which each format then writes: an ONNX graph, C99 in floating point or in whole numbers, a MATLAB function,
 //! NumPy arrays. What was written is read back and evaluated, and compared with the network computed with twice the
-//! digits ([`exact`]). Only a bundle that agrees is put in its place.
+//! digits (`exact`). Only a bundle that agrees is put in its place.
 
 mod c99;
 mod choice;
