@@ -15,7 +15,7 @@
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
 //! | `figure` | what a picture says, for the window and for print (feature `figures`) |
-//! | `export` | files for other programs (feature `files`); `export::figures` draws (feature `figures`) |
+//! | `export` | files for other programs (feature `files`); `export::bundle` writes networks (feature `bundle`), `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
 //!

@@ -8,8 +8,8 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
-    train::Train,
+    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate,
+    trade::Trade, train::Train,
 };
 use crate::export::exit_leaving_nothing;
 
@@ -30,6 +30,7 @@ struct Arguments {
 enum Command {
     Train(Box<Train>),
     Decode(Decode),
+    Export(Export),
     Simulate(Box<Simulate>),
     Reproduce(Reproduce),
     Trade(Box<Trade>),
@@ -69,6 +70,7 @@ impl Arguments {
         match self.command {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Decode(decode)) => decode.run(),
+            Some(Command::Export(export)) => export.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),

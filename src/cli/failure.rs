@@ -11,7 +11,7 @@ use super::interruption;
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
-    export::{DocumentError, WriteError, figures::PictureError},
+    export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError},
     scene::Rows,
     training::SettingError,
 };
@@ -31,6 +31,8 @@ pub(super) enum Failure {
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Document(#[from] DocumentError),
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
     #[error("'{}': {source}", .path.display())]
     Resume { path: PathBuf, source: RunError },
     #[error("{0}")]
@@ -115,7 +117,7 @@ impl Failure {
     /// Exit status of the program.
     pub(super) fn status(&self) -> u8 {
         match self {
-            Self::Arguments(_) => 2,
+            Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_) | Self::InterruptedTrials { .. } | Self::InterruptedTrade { .. } => {

@@ -1,4 +1,4 @@
-//! The work in a terminal: `decoupler train`, `decode`, `simulate`, `reproduce` and `trade`.
+//! The work in a terminal: `decoupler train`, `decode`, `export`, `simulate`, `reproduce` and `trade`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
@@ -7,6 +7,8 @@ mod announcement;
 mod arguments;
 mod checkpointing;
 mod decode;
+mod export;
+mod export_report;
 mod failure;
 mod interruption;
 mod output;

@@ -2,6 +2,8 @@
 //! one way in which all of them are written: whole or not at all.
 
 mod atomic;
+#[cfg(feature = "bundle")]
+pub mod bundle;
 mod checkpoint_file;
 mod document;
 mod experiment_tables;

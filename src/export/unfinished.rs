@@ -12,7 +12,7 @@ use tempfile::{NamedTempFile, PersistError};
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
 
-/// Paths of all files in the making. A program that is ended from another thread drops nothing, so it looks here.
+/// Paths of all files and folders in the making. A program that is ended from another thread drops nothing, so it looks here.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -33,7 +33,19 @@ pub(super) struct Unfinished {
 
 /// An entry of [`ALL`], while it lives.
 #[derive(Debug)]
-struct Listed(PathBuf);
+pub(super) struct Listed(PathBuf);
+
+#[cfg(feature = "bundle")]
+impl Listed {
+    /// Makes a temporary folder and lists it.
+    pub(super) fn begin(make: impl FnOnce() -> io::Result<tempfile::TempDir>) -> io::Result<(tempfile::TempDir, Self)> {
+        let mut all = all();
+        let folder = make()?;
+        all.insert(folder.path().to_owned());
+        let listed = Self(folder.path().to_owned());
+        Ok((folder, listed))
+    }
+}
 
 impl Drop for Listed {
     fn drop(&mut self) {
@@ -149,7 +161,7 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
     let all = all();
     for path in all.iter() {
         // It may have found its place or have been removed just now.
-        let _ = std::fs::remove_file(path);
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
     std::process::exit(status)
 }

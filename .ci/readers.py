@@ -1,0 +1,214 @@
+"""Exports networks and checks the bundles with the programs that read them. Usage: readers.py PROGRAM FOLDER.
+
+Deviations are relative to the widest range of a coordinate in training. The truth is golden.csv of each bundle, and for
+more samples the bundle in double precision for NumPy.
+"""
+
+import csv
+import importlib.util
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import numpy as np
+
+PROGRAM, HOME = sys.argv[1], pathlib.Path(sys.argv[2])
+NETWORKS = {
+    "paper": "--epochs 60",
+    "known": "--preset best --noise 1e-3 --samples 2000 --epochs 60",
+    "log": "--inputs log --epochs 40",
+    # These magnify rounding errors: in single precision their hidden sums stay in double, and in double precision the
+    # limit is what the program computes and prints.
+    "long": "--epochs 300",
+    "sharp": "--preset best --samples 1000 --epochs 100",
+}
+MAGNIFYING = {"long", "sharp"}
+LIMITS = {"f64": 1e-12, "f32": 1e-5}
+FLAGS = "-std=c99 -O2 -Wall -Wextra -Werror -pedantic -Wconversion".split()
+failures = []
+
+
+def limit_of(network, precision, report):
+    usual = LIMITS.get(precision, report["limit"])
+    return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
+
+
+def run(*command, **options):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **options)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def show(network, bundle, reader, deviation, limit, note=""):
+    passed = deviation <= limit
+    if not passed:
+        failures.append(f"{network} {bundle} {reader}")
+    verdict = "" if passed else "FAILED"
+    print(f"{network:<6} {bundle:<12} {reader:<34} {deviation:8.1e} {limit:8.1e} {note} {verdict}".rstrip(), flush=True)
+
+
+def export(network, form, precision):
+    folder = HOME / network / f"{form}_{precision}"
+    command = [PROGRAM, "export", "--network", HOME / network / "network.json", "--format", form]
+    report = json.loads(run(*command, "--precision", precision, "--out", folder, "--json"))
+    return folder, report
+
+
+def golden(folder):
+    """Readings, coordinates, and row-wires if they are arguments."""
+    with open(folder / "golden.csv") as file:
+        lines = list(csv.DictReader(file))
+    names = list(lines[0])
+    table = np.array([[float(line[name]) for name in names] for line in lines])
+    columns = lambda pattern: [index for index, name in enumerate(names) if re.match(pattern, name)]
+    rows = table[:, 0].astype(np.int64) if names[0] == "row" else None
+    return table[:, columns("r_")], table[:, columns("[xyz]_")], rows
+
+
+def deviation(folder, answers, expected):
+    width = json.loads((folder / "metadata.json").read_text())["output_range_mm"]
+    return float(np.max(np.abs(np.asarray(answers, dtype=float) - expected)) / width)
+
+
+def check_onnx(network, precision):
+    import onnx
+    import onnxruntime
+
+    folder, report = export(network, "onnx", precision)
+    limit = limit_of(network, precision, report)
+    model = onnx.load(folder / "network.onnx")
+    onnx.checker.check_model(model, full_check=True)
+    names = {entry.key: entry.value for entry in model.metadata_props}
+    assert names["array"] == "10×10_5×30" and json.loads(names["geometry"])["height_mm"] == 5, names
+    session = onnxruntime.InferenceSession(folder / "network.onnx")
+    readings, expected, rows = golden(folder)
+    kind = np.float32 if precision == "f32" else np.float64
+    inputs = {"resistances_ohm": readings.astype(kind)}
+    if rows is not None:
+        inputs["row"] = rows
+    coordinates, outside = session.run(["coordinates_mm", "readings_outside"], inputs)
+    show(network, f"onnx {precision}", f"onnxruntime {onnxruntime.__version__}", deviation(folder, coordinates, expected), limit)
+    assert outside.shape == (len(readings),), outside.shape
+    # What is invalid has no answer.
+    bad = {**inputs, "resistances_ohm": inputs["resistances_ohm"].copy()}
+    bad["resistances_ohm"][0, 3] = -1
+    answers = session.run(["coordinates_mm"], bad)[0]
+    assert np.isnan(answers[0]).all() and not np.isnan(answers[1:]).any()
+    if rows is not None:
+        answers = session.run(["coordinates_mm"], {**inputs, "row": np.where(rows == 1, 0, rows)})[0]
+        assert np.isnan(answers[rows == 1]).all() and not np.isnan(answers[rows != 1]).any()
+    check_onnx_to_c(network, precision, limit, folder, inputs, coordinates)
+
+
+def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
+    """C of an independent compiler of the same graph."""
+    if importlib.util.find_spec("emx_onnx_cgen") is None:
+        print(f"{network:<6} onnx {precision}     emx-onnx-cgen is not installed: not checked")
+        return
+    import ctypes
+    import onnx
+
+    # The compiler wants one size: the batch of the golden vectors.
+    model = onnx.load(folder / "network.onnx")
+    for value in [*model.graph.input, *model.graph.output]:
+        value.type.tensor_type.shape.dim[0].dim_value = len(coordinates)
+    onnx.save(model, folder / "fixed_batch.onnx")
+    source, library = folder / "emx.c", folder / "emx.so"
+    try:
+        run(sys.executable, "-m", "emx_onnx_cgen", "compile", folder / "fixed_batch.onnx", source, "--model-name", "emx")
+        run("gcc", "-O2", "-shared", "-fPIC", source, "-lm", "-o", library)
+    except RuntimeError as error:
+        print(f"{network:<6} onnx {precision}     emx-onnx-cgen cannot compile it: {str(error).splitlines()[-1]}")
+        return
+    declaration = re.search(r"void emx\(([^;{]*)\)", source.read_text()).group(1)
+    answers, outside = np.zeros_like(coordinates), np.zeros(len(coordinates), np.int64)
+    arrays = {"coordinates_mm": answers, "readings_outside": outside, **inputs}
+    names = re.findall(r"(\w+)(?:\[[^\]]*\])+\s*(?:,|$)", declaration)
+    pointers = [np.ascontiguousarray(arrays[name]).ctypes.data_as(ctypes.c_void_p) for name in names]
+    ctypes.CDLL(str(library)).emx(*pointers)
+    _, expected, _ = golden(folder)
+    show(network, f"onnx {precision}", "emx-onnx-cgen, gcc", deviation(folder, answers, expected), limit)
+
+
+def check_c(network, precision):
+    try:
+        folder, report = export(network, "c99", precision)
+    except RuntimeError as error:
+        print(f"{network:<6} c99 {precision}  refused: {str(error).splitlines()[-1]}")
+        return
+    limit = limit_of(network, precision, report)
+    sources = sorted(folder.glob("*.c"))
+    for compiler in ["gcc", "clang"]:
+        for optimisation in ["-O0", "-O2"]:
+            run(compiler, *FLAGS, optimisation, *sources, "-lm", "-o", folder / "selftest")
+            found = re.search(r"largest deviation: (\S+)", run(folder / "selftest"))
+            note = f"bound {report['error_bound_mm']:.2g} mm" if precision == "fixed16" else ""
+            show(network, f"c99 {precision}", f"{compiler} {optimisation}", float(found.group(1)), limit, note)
+    run("g++" if precision != "fixed16" else "gcc", "-fsyntax-only", "-x", "c++", folder / next(folder.glob("*.h")).name)
+    symbols = run("gcc", *FLAGS, "-c", next(folder.glob("*_decode.c")), "-o", folder / "decode.o") + run("nm", folder / "decode.o")
+    assert not re.search(r" [dDbBC] ", symbols), f"mutable global data:\n{symbols}"
+    assert not re.search(r"malloc|calloc", symbols), symbols
+    if precision == "fixed16":
+        # The decoder has no floating point: without a floating-point unit it needs no library for it.
+        assert not re.search(r"\b(float|double)\b", next(folder.glob("*_decode.c")).read_text())
+
+
+def check_octave(network):
+    folder, report = export(network, "matlab", "f64")
+    readings, expected, rows = golden(folder)
+    np.savetxt(folder / "readings.txt", readings, fmt="%.17g")
+    row = ""
+    if rows is not None:
+        np.savetxt(folder / "rows.txt", rows, fmt="%d")
+        row = ", load('rows.txt')"
+    function = next(folder.glob("*.m")).stem
+    script = f"[c, o] = {function}(load('readings.txt'){row}); dlmwrite('answers.txt', [c o], 'precision', '%.17g');"
+    run("octave-cli", "--no-gui", "--quiet", "--eval", script, cwd=folder)
+    answers = np.loadtxt(folder / "answers.txt", delimiter=",", ndmin=2)
+    show(network, "matlab f64", "GNU Octave", deviation(folder, answers[:, :-1], expected), limit_of(network, "f64", report))
+    bad = f"try, {function}(-ones(1, {readings.shape[1]}){', 1' if row else ''}); disp('accepted'), catch e, disp(e.message), end"
+    assert "above 0" in run("octave-cli", "--no-gui", "--quiet", "--eval", bad, cwd=folder)
+
+
+def check_numpy(network, precision):
+    folder, report = export(network, "numpy", precision)
+    readings, expected, rows = golden(folder)
+    spec = importlib.util.spec_from_file_location(f"decode_{network}_{precision}", folder / "decode.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    coordinates, _ = module.decode(readings, *([] if rows is None else [rows]))
+    assert coordinates.dtype == (np.float32 if precision == "f32" else np.float64)
+    show(network, f"numpy {precision}", f"NumPy {np.__version__}", deviation(folder, coordinates, expected), limit_of(network, precision, report))
+    try:
+        module.decode(-readings, *([] if rows is None else [rows]))
+    except ValueError:
+        return
+    failures.append(f"{network} numpy {precision}: readings below 0 are accepted")
+
+
+def check_json(network):
+    folder, _ = export(network, "json", "f64")
+    for name, path in [("a", HOME / network / "network.json"), ("b", folder)]:
+        run(PROGRAM, "decode", "--network", path, "--input", HOME / network / "readings.csv", "--output", HOME / network / f"{name}.csv")
+    assert (HOME / network / "a.csv").read_bytes() == (HOME / network / "b.csv").read_bytes()
+    show(network, "json f64", "decode", 0.0, 0.0)
+
+
+print(f"{'net':<6} {'bundle':<12} {'reader':<34} {'found':>8} {'limit':>8}")
+for network, arguments in NETWORKS.items():
+    (HOME / network).mkdir()
+    run(PROGRAM, "train", *arguments.split(), "--out", HOME / network / "network.json", "--json")
+    run(PROGRAM, "simulate", "--samples", 100, "--seed", 9, "--out", HOME / network / "readings.csv")
+    for precision in ["f64", "f32"]:
+        check_onnx(network, precision)
+        check_numpy(network, precision)
+    for precision in ["f64", "f32", "fixed16"]:
+        check_c(network, precision)
+    check_octave(network)
+    check_json(network)
+if failures:
+    sys.exit("failed: " + ", ".join(failures))

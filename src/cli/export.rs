@@ -1,0 +1,69 @@
+use std::{
+    io::{Write, stderr},
+    path::PathBuf,
+};
+
+use clap::Args;
+
+use super::{
+    export_report::{print_json, print_text},
+    failure::Failure,
+    same_file::is_same,
+};
+use crate::export::{
+    NetworkFile,
+    bundle::{BundleFormat, BundlePrecision, export_bundle},
+};
+
+/// Write a network for other programs, and verify what was written
+///
+/// The exported network takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
+/// the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; scaling, conductances or logarithms, and
+/// constant coordinates are part of it. Networks of known rows leave as one, which also takes the number of the row-wire,
+/// from 1.
+///
+/// What was written is read back, evaluated, and compared with the network on readings of its scene and on the extremes of
+/// its training range: the largest deviation is shown, relative to the widest range of a coordinate in training. A bundle
+/// that deviates by more than 1e-12 (f64) or 1e-5 (f32), or in fixed16 by more than its proven bound, is not written,
+/// unless the network itself magnifies rounding errors further, which is then said. The bundle is a folder (for json a
+/// file) with golden vectors and a README.txt that shows how to call it.
+#[derive(Args)]
+pub(super) struct Export {
+    /// Network saved by train --out or by the window
+    #[arg(long, value_name = "FILE")]
+    network: PathBuf,
+    /// onnx: a graph (opset 13) for ONNX runtimes; c99: one header and one source in C; matlab: one function file for
+    /// MATLAB and GNU Octave; numpy: weights (.npz) and a decode.py; json: the network file itself
+    #[arg(long, value_name = "onnx|c99|matlab|numpy|json")]
+    format: BundleFormat,
+    /// Numbers in which it decodes. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: whole numbers
+    /// with 16-bit weights (c99), which reads whole numbers of nano-, micro- or milliohm and gives nanometres
+    #[arg(long, value_name = "f64|f32|fixed16", default_value_t)]
+    precision: BundlePrecision,
+    /// Folder to be made (for json the file), which must not exist or be an empty folder
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+impl Export {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        if is_same(&self.network, &self.out) {
+            let message = "--network and --out name the same file: give --out another name";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        let file = NetworkFile::load(&self.network)?;
+        if let Some(warning) = file.old_version_warning() {
+            // Nobody is left to tell if this fails.
+            let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
+        }
+        let report = export_bundle(&file, self.format, self.precision, &self.out)?;
+        if self.json {
+            print_json(&report)
+        } else {
+            print_text(&report)
+        }
+    }
+}

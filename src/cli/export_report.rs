@@ -1,0 +1,100 @@
+use std::{
+    io::{Write, stdout},
+    path::Path,
+};
+
+use serde::Serialize;
+
+use super::failure::Failure;
+use crate::export::{bundle::BundleReport, format_number};
+
+/// The object printed by `export --json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    path: &'a Path,
+    format: String,
+    precision: String,
+    files: Vec<File<'a>>,
+    verified_vectors: usize,
+    golden_vectors: usize,
+    checks: Vec<Check>,
+    /// Largest of all checks; like these relative to `output_range_mm`.
+    deviation: f64,
+    limit: f64,
+    output_range_mm: f64,
+    deviation_of_decode: f64,
+    error_bound_mm: Option<f64>,
+    remarks: &'a [String],
+}
+
+#[derive(Serialize)]
+struct File<'a> {
+    name: &'a str,
+    bytes: u64,
+}
+
+#[derive(Serialize)]
+struct Check {
+    evaluator: &'static str,
+    deviation: f64,
+}
+
+/// Prints one JSON object.
+pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
+    let files = report.files.iter().map(|(name, bytes)| File { name, bytes: *bytes });
+    let checks = report.checks.iter().map(|check| Check {
+        evaluator: check.evaluator,
+        deviation: check.deviation,
+    });
+    let printed = Report {
+        path: &report.path,
+        format: report.format.to_string(),
+        precision: report.precision.to_string(),
+        files: files.collect(),
+        verified_vectors: report.vectors.verified,
+        golden_vectors: report.vectors.golden,
+        checks: checks.collect(),
+        deviation: report.deviation(),
+        limit: report.limit,
+        output_range_mm: report.output_range_mm,
+        deviation_of_decode: report.program_deviation,
+        error_bound_mm: report.bound_mm,
+        remarks: &report.remarks,
+    };
+    let mut stdout = stdout().lock();
+    serde_json::to_writer(&mut stdout, &printed).map_err(|error| Failure::Output(error.into()))?;
+    writeln!(stdout).map_err(Failure::Output)
+}
+
+/// Prints what was written, and how far it is from the network.
+pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
+    let range = format_number(report.output_range_mm);
+    let mut text = format!("{} ({}, {})\n", report.path.display(), report.format, report.precision);
+    for (name, bytes) in &report.files {
+        text += &format!("  {name:<30} {bytes:>9} bytes\n");
+    }
+    if report.vectors.verified > 0 {
+        text += &format!(
+            "Verified on {} readings of a row-wire, {} of them in the bundle as golden vectors. Largest deviation of a \
+             coordinate, relative to the widest range of one in training ({range} mm):\n",
+            report.vectors.verified, report.vectors.golden
+        );
+    }
+    for check in &report.checks {
+        text += &format!("  {}: {:.1e}\n", check.evaluator, check.deviation);
+    }
+    if report.vectors.verified > 0 {
+        text += &format!("  decode of this program: {:.1e}\n", report.program_deviation);
+        text += &format!("  limit: {:.1e}\n", report.limit);
+    }
+    if let Some(bound_mm) = report.bound_mm {
+        text += &format!(
+            "Proven bound on the error in whole numbers: {} mm\n",
+            format_number(bound_mm)
+        );
+    }
+    for remark in &report.remarks {
+        text += &format!("Note: {remark}.\n");
+    }
+    stdout().lock().write_all(text.as_bytes()).map_err(Failure::Output)
+}

@@ -1,0 +1,82 @@
+//! Bundles as one C99 header and one source, with a self-test.
+
+mod compiler;
+mod fixed;
+mod floating;
+mod header;
+mod literal;
+mod selftest;
+
+use self::{header::Header, selftest::SelfTest};
+use super::{fixed_point::FixedNetworks, portable::Portable, vectors::Vector, weights::Weights};
+
+pub(super) use self::{
+    compiler::{Compiled, run_self_test},
+    fixed::readings,
+};
+
+/// Files of a bundle: names and contents.
+pub(super) type Files = Vec<(String, String)>;
+
+/// Writes header, source and self-test in floating point.
+pub(super) fn write_floating(
+    name: &str,
+    portable: &Portable,
+    weights: &Weights,
+    vectors: &[Vector],
+    limit: f64,
+) -> Files {
+    let header = floating::header(name, portable, weights.arithmetic);
+    let digits = weights.arithmetic.rest;
+    let self_test = SelfTest {
+        header: &header,
+        vectors,
+        unit_mm: 1.0,
+        limit,
+        bits: None,
+    };
+    files(
+        &header,
+        floating::source(&header, weights),
+        self_test.text(|ohm| literal::number(digits, ohm)),
+    )
+}
+
+/// Writes header, source and self-test in whole numbers.
+pub(super) fn write_fixed(
+    name: &str,
+    portable: &Portable,
+    networks: &FixedNetworks,
+    vectors: &[Vector],
+    limit: f64,
+) -> Files {
+    let units = fixed::units(networks);
+    let header = fixed::header(name, portable, networks, &units);
+    let self_test = SelfTest {
+        header: &header,
+        vectors,
+        unit_mm: 1e-6,
+        limit,
+        bits: Some(vectors.iter().flat_map(|vector| bits_of(networks, vector)).collect()),
+    };
+    files(
+        &header,
+        fixed::source(&header, networks),
+        self_test.text(|ohm| networks.reading(ohm).to_string()),
+    )
+}
+
+fn bits_of(networks: &FixedNetworks, vector: &Vector) -> Vec<i32> {
+    networks
+        .decode(vector.network, &vector.readings_ohm)
+        .unwrap_or_default()
+}
+
+fn files(header: &Header<'_>, source: String, self_test: String) -> Files {
+    let name = header.name;
+    vec![
+        (format!("{name}_decode.h"), header.text()),
+        (format!("{name}_decode.c"), source),
+        (format!("{name}_selftest.c"), self_test),
+    ]
+}

@@ -1,0 +1,158 @@
+use std::{fmt, str::FromStr};
+
+use thiserror::Error;
+
+/// Form in which a network leaves the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BundleFormat {
+    /// A graph for ONNX runtimes, opset 13.
+    Onnx,
+    /// One C99 header and one source.
+    C99,
+    /// One function file for MATLAB and GNU Octave.
+    Matlab,
+    /// Weights as `.npz` and a short `decode.py`.
+    NumPy,
+    /// The network file itself.
+    Json,
+}
+
+/// Numbers in which a bundle decodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BundlePrecision {
+    /// Double precision.
+    #[default]
+    Double,
+    /// Single precision; sums that would lose too much in it stay in double precision.
+    Single,
+    /// Whole numbers only: weights and activations of 16 bits.
+    Fixed16,
+}
+
+/// Error for a word that names no format or precision, or for a pair of them that does not exist.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ChoiceError {
+    /// No such format.
+    #[error("'{0}' is not a format: give onnx, c99, matlab, numpy or json")]
+    Format(String),
+    /// No such precision.
+    #[error("'{0}' is not a precision: give f64, f32 or fixed16")]
+    Precision(String),
+    /// A format that does not have this precision.
+    #[error("{format} has no precision {precision}: give {}", .format.precision_names())]
+    Pair {
+        /// The format.
+        format: BundleFormat,
+        /// The precision it lacks.
+        precision: BundlePrecision,
+    },
+}
+
+impl BundleFormat {
+    /// All formats, in the order offered to the user.
+    pub const ALL: [Self; 5] = [Self::Onnx, Self::C99, Self::Matlab, Self::NumPy, Self::Json];
+
+    /// Precisions in which the format can be written.
+    pub fn precisions(self) -> &'static [BundlePrecision] {
+        use BundlePrecision::{Double, Fixed16, Single};
+        match self {
+            Self::Onnx | Self::NumPy => &[Double, Single],
+            Self::C99 => &[Double, Single, Fixed16],
+            Self::Matlab | Self::Json => &[Double],
+        }
+    }
+
+    /// Checks that the format can be written in `precision`.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check(self, precision: BundlePrecision) -> Result<(), ChoiceError> {
+        if self.precisions().contains(&precision) {
+            return Ok(());
+        }
+        Err(ChoiceError::Pair {
+            format: self,
+            precision,
+        })
+    }
+
+    fn precision_names(self) -> String {
+        let names = self.precisions().iter().map(BundlePrecision::to_string);
+        names.collect::<Vec<_>>().join(" or ")
+    }
+}
+
+impl BundlePrecision {
+    /// All precisions, in the order offered to the user.
+    pub const ALL: [Self; 3] = [Self::Double, Self::Single, Self::Fixed16];
+}
+
+impl fmt::Display for BundleFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Onnx => "onnx",
+            Self::C99 => "c99",
+            Self::Matlab => "matlab",
+            Self::NumPy => "numpy",
+            Self::Json => "json",
+        })
+    }
+}
+
+impl fmt::Display for BundlePrecision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Double => "f64",
+            Self::Single => "f32",
+            Self::Fixed16 => "fixed16",
+        })
+    }
+}
+
+impl FromStr for BundleFormat {
+    type Err = ChoiceError;
+
+    fn from_str(text: &str) -> Result<Self, ChoiceError> {
+        let found = Self::ALL.into_iter().find(|format| format.to_string() == text.trim());
+        found.ok_or_else(|| ChoiceError::Format(text.to_owned()))
+    }
+}
+
+impl FromStr for BundlePrecision {
+    type Err = ChoiceError;
+
+    fn from_str(text: &str) -> Result<Self, ChoiceError> {
+        let mut all = Self::ALL.into_iter();
+        let found = all.find(|precision| precision.to_string() == text.trim());
+        found.ok_or_else(|| ChoiceError::Precision(text.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_come_back_and_pairs_that_do_not_exist_are_refused_with_those_that_do() {
+        for format in BundleFormat::ALL {
+            assert_eq!(format.to_string().parse(), Ok(format));
+            assert_eq!(format.check(BundlePrecision::default()), Ok(()), "{format}");
+        }
+        for precision in BundlePrecision::ALL {
+            assert_eq!(precision.to_string().parse(), Ok(precision));
+        }
+        let message = BundleFormat::Onnx
+            .check(BundlePrecision::Fixed16)
+            .unwrap_err()
+            .to_string();
+        assert_eq!(message, "onnx has no precision fixed16: give f64 or f32");
+        assert!(
+            "tflite"
+                .parse::<BundleFormat>()
+                .unwrap_err()
+                .to_string()
+                .contains("onnx, c99")
+        );
+    }
+}

@@ -1,0 +1,64 @@
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::{choice::ChoiceError, fixed_point::FixedPointError, portable::FoldError};
+use crate::{
+    evaluation::RunError,
+    export::{DocumentError, WriteError},
+};
+
+/// Errors of exporting a bundle. Nothing is left behind.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BundleError {
+    /// The format does not have the precision.
+    #[error(transparent)]
+    Choice(#[from] ChoiceError),
+    /// The scaling cannot be folded into the weights.
+    #[error(transparent)]
+    Fold(#[from] FoldError),
+    /// The readings with which the bundle is verified could not be drawn.
+    #[error("no readings to verify the bundle: {0}")]
+    Readings(#[from] Box<RunError>),
+    /// Something is in the place of the bundle.
+    #[error("'{}' is there already: give another name, or delete it first", .0.display())]
+    Exists(PathBuf),
+    /// The bundle cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The network file cannot be written or read back.
+    #[error(transparent)]
+    NetworkFile(#[from] DocumentError),
+    /// The numbers do not fit 16 bits.
+    #[error(transparent)]
+    FixedPoint(#[from] FixedPointError),
+    /// A file of the bundle could not be read back.
+    #[error("'{file}' of the bundle could not be read back: {reason}; nothing is left of the bundle")]
+    ReadBack {
+        /// Name of the file.
+        file: String,
+        /// The cause.
+        reason: String,
+    },
+    /// The C compiler refused the source, or its program failed.
+    #[error("{step} failed: {reason}; nothing is left of the bundle")]
+    SelfTest {
+        /// Compiling, or running.
+        step: &'static str,
+        /// First lines of the message.
+        reason: String,
+    },
+    /// The bundle gives other answers than the network.
+    #[error(
+        "{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle"
+    )]
+    Deviation {
+        /// What evaluated the bundle.
+        evaluator: String,
+        /// Largest deviation relative to the widest range of an output.
+        deviation: f64,
+        /// Largest deviation allowed.
+        limit: f64,
+    },
+}

@@ -1,0 +1,291 @@
+use std::{fs, path::Path};
+
+use super::{
+    c99::{self, Compiled, run_self_test},
+    choice::{BundleFormat, BundlePrecision},
+    error::BundleError,
+    fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
+    folder::AtomicFolder,
+    golden::golden_csv,
+    identifier::identifier,
+    matlab,
+    metadata::{Metadata, metadata},
+    numpy, onnx,
+    portable::Portable,
+    readme::readme,
+    report::{BundleCheck, BundleReport, VectorCounts},
+    tolerance::Tolerance,
+    vectors::Vectors,
+    weights::{Arithmetic, Digits, Weights},
+};
+use crate::export::NetworkFile;
+
+/// Writes the network of `file` as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
+/// read back and compared with the network before it is put in its place.
+///
+/// # Errors
+/// The format lacks the precision, the network cannot be written in it, `path` is taken or cannot be written, or the
+/// bundle deviates from the network. Nothing is left behind.
+pub fn export_bundle(
+    file: &NetworkFile,
+    format: BundleFormat,
+    precision: BundlePrecision,
+    path: &Path,
+) -> Result<BundleReport, BundleError> {
+    format.check(precision)?;
+    if format == BundleFormat::Json {
+        return export_network_file(file, path);
+    }
+    let folder = AtomicFolder::create(path)?;
+    let portable = Portable::of(file)?;
+    let bundle = Bundle {
+        file,
+        name: identifier(path),
+        format,
+        precision,
+        metadata: metadata(file, &portable, precision),
+        portable,
+        folder,
+    };
+    match precision {
+        BundlePrecision::Fixed16 => bundle.export_fixed(path),
+        BundlePrecision::Double => {
+            let vectors = bundle.vectors(|ohm| ohm)?;
+            bundle.export_floating(path, Arithmetic::DOUBLE, &vectors)
+        }
+        BundlePrecision::Single => {
+            let vectors = bundle.vectors(|ohm| Digits::Single.round(ohm))?;
+            let arithmetic = single_arithmetic(&bundle.portable, &vectors);
+            bundle.export_floating(path, arithmetic, &vectors)
+        }
+    }
+}
+
+/// Copies the network file.
+fn export_network_file(file: &NetworkFile, path: &Path) -> Result<BundleReport, BundleError> {
+    if fs::symlink_metadata(path).is_ok() {
+        return Err(BundleError::Exists(path.to_owned()));
+    }
+    let trial = tempfile::tempdir().map_err(|error| crate::export::WriteError::io(path, error))?;
+    let copy = trial.path().join("network.json");
+    file.save(&copy)?;
+    let read = NetworkFile::load(&copy)?;
+    if read.network != file.network || read.settings != file.settings {
+        return Err(BundleError::ReadBack {
+            file: path.display().to_string(),
+            reason: "it is another network".to_owned(),
+        });
+    }
+    file.save(path)?;
+    let portable = Portable::of(file)?;
+    let size = fs::metadata(path).map_or(0, |found| found.len());
+    Ok(BundleReport {
+        format: BundleFormat::Json,
+        precision: BundlePrecision::Double,
+        path: path.to_owned(),
+        files: vec![(path.display().to_string(), size)],
+        vectors: VectorCounts { verified: 0, golden: 0 },
+        checks: vec![BundleCheck {
+            evaluator: "network file, read back",
+            deviation: 0.0,
+        }],
+        limit: 0.0,
+        output_range_mm: portable.full_scale_mm,
+        program_deviation: 0.0,
+        bound_mm: None,
+        remarks: Vec::new(),
+    })
+}
+
+/// Single precision throughout where that is enough, and otherwise the hidden sums in double.
+fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
+    /// Part of the limit that single precision may use in this evaluation: others add up in another order.
+    const PART: f64 = 0.2;
+    let single = Weights::of(portable, Arithmetic::SINGLE);
+    let deviation_mm = vectors.deviation_mm(|vector| single.decode(vector.network, &vector.readings_ohm));
+    if deviation_mm <= PART * Tolerance::SINGLE * portable.full_scale_mm {
+        Arithmetic::SINGLE
+    } else {
+        Arithmetic::MIXED
+    }
+}
+
+/// A bundle in the making.
+struct Bundle<'a> {
+    file: &'a NetworkFile,
+    name: String,
+    format: BundleFormat,
+    precision: BundlePrecision,
+    metadata: Metadata,
+    portable: Portable,
+    folder: AtomicFolder,
+}
+
+impl Bundle<'_> {
+    fn vectors(&self, representable: impl Fn(f64) -> f64) -> Result<Vectors, BundleError> {
+        Vectors::of(self.file, &self.portable, representable)
+    }
+
+    fn export_floating(
+        self,
+        path: &Path,
+        arithmetic: Arithmetic,
+        vectors: &Vectors,
+    ) -> Result<BundleReport, BundleError> {
+        let portable = &self.portable;
+        let weights = Weights::of(portable, arithmetic);
+        let model = |weights: &Weights| {
+            vectors.deviation_mm(|vector| weights.decode(vector.network, &vector.readings_ohm)) / portable.full_scale_mm
+        };
+        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights));
+        let mut remarks = tolerance.remarks(arithmetic);
+        let mut checks = Vec::new();
+        let mut check = |evaluator, deviation| checks.push(BundleCheck { evaluator, deviation });
+        match self.format {
+            BundleFormat::Onnx => {
+                self.folder
+                    .write("network.onnx", onnx::write(portable, &weights, &self.metadata))?;
+                let damaged = |reason| read_back("network.onnx", reason);
+                let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
+                let mut answers = graph.decode(vectors.all()).map_err(damaged)?.coordinates_mm.into_iter();
+                let deviation_mm = vectors.deviation_mm(|_| answers.next().unwrap_or_default());
+                check(
+                    "ONNX graph, read back and evaluated",
+                    deviation_mm / portable.full_scale_mm,
+                );
+            }
+            BundleFormat::NumPy => {
+                self.folder
+                    .write("network.npz", numpy::write_weights(portable, &weights))?;
+                self.folder
+                    .write("decode.py", numpy::write_program(portable, arithmetic))?;
+                let read = numpy::read_weights(&self.read("network.npz")?, portable.quantity);
+                let read = read.map_err(|reason| read_back("network.npz", reason))?;
+                check("NumPy weights, read back and evaluated", model(&read));
+            }
+            BundleFormat::Matlab => {
+                let (function, file) = (format!("{}_decode", self.name), format!("{}_decode.m", self.name));
+                self.folder.write(&file, matlab::write(&function, portable, &weights))?;
+                let text = String::from_utf8(self.read(&file)?).map_err(|error| read_back(&file, error.to_string()))?;
+                let read = matlab::read_weights(&text, portable).map_err(|reason| read_back(&file, reason))?;
+                check("MATLAB matrices, read back and evaluated", model(&read));
+            }
+            BundleFormat::C99 | BundleFormat::Json => {
+                let limit = tolerance.limit;
+                let files = c99::write_floating(&self.name, portable, &weights, vectors.golden(), limit);
+                for (name, text) in files {
+                    self.folder.write(&name, text)?;
+                }
+                check("model of the C source", model(&weights));
+                match run_self_test(self.folder.path(), &self.name)? {
+                    Compiled::Ran { deviation } => check("C source, compiled and run", deviation),
+                    Compiled::NoCompiler(why) => remarks.push(format!("the C source was not compiled: {why}")),
+                }
+            }
+        }
+        self.finish(path, vectors, checks, tolerance.limit, None, remarks)
+    }
+
+    fn export_fixed(self, path: &Path) -> Result<BundleReport, BundleError> {
+        let fixed = FixedNetworks::of(&self.portable)?;
+        let unit_ohm = fixed.unit_ohm();
+        let vectors = self.vectors(|ohm| f64::from(fixed.reading(ohm)) * unit_ohm)?;
+        // The bound holds for these.
+        let vectors = vectors.inside(&self.portable);
+        let limit = fixed.bound_mm / self.portable.full_scale_mm;
+        let files = c99::write_fixed(&self.name, &self.portable, &fixed, vectors.golden(), limit);
+        for (name, text) in files {
+            self.folder.write(&name, text)?;
+        }
+        let in_mm = |nm: Vec<i32>| nm.into_iter().map(|nm| f64::from(nm) * 1e-6).collect();
+        let deviation_mm = vectors.deviation_mm(|vector| {
+            let coordinates_nm = fixed.decode(vector.network, &vector.readings_ohm);
+            coordinates_nm.map(in_mm).unwrap_or_default()
+        });
+        let mut checks = vec![BundleCheck {
+            evaluator: "bit-exact model in whole numbers",
+            deviation: deviation_mm / self.portable.full_scale_mm,
+        }];
+        let mut remarks = Vec::new();
+        if fixed.hidden_width == HiddenWidth::TwentyFour {
+            let remark = "the hidden weights have 24 bits, because their large products nearly cancel; the rest has 16";
+            remarks.push(remark.to_owned());
+        }
+        if limit > USUAL_BOUND {
+            remarks.push(format!(
+                "the error is only known to be below {:.0} % of the range of the outputs; train with noise (--noise) for a \
+                 network that amplifies rounding errors less",
+                100.0 * limit
+            ));
+        }
+        match run_self_test(self.folder.path(), &self.name)? {
+            Compiled::Ran { deviation } => checks.push(BundleCheck {
+                evaluator: "C source, compiled and run, equal to the model bit for bit",
+                deviation,
+            }),
+            Compiled::NoCompiler(why) => remarks.push(format!("the C source was not compiled: {why}")),
+        }
+        self.finish(path, &vectors, checks, limit, Some(&fixed), remarks)
+    }
+
+    fn read(&self, name: &str) -> Result<Vec<u8>, BundleError> {
+        fs::read(self.folder.path().join(name)).map_err(|error| read_back(name, error.to_string()))
+    }
+
+    /// Checks the deviations, adds the files that every bundle has, and puts the folder in its place.
+    fn finish(
+        self,
+        path: &Path,
+        vectors: &Vectors,
+        checks: Vec<BundleCheck>,
+        limit: f64,
+        fixed: Option<&FixedNetworks>,
+        remarks: Vec<String>,
+    ) -> Result<BundleReport, BundleError> {
+        let worst = checks
+            .iter()
+            .find(|check| check.deviation.is_nan() || check.deviation > limit);
+        if let Some(&BundleCheck { evaluator, deviation }) = worst {
+            return Err(BundleError::Deviation {
+                evaluator: evaluator.to_owned(),
+                deviation,
+                limit,
+            });
+        }
+        let portable = &self.portable;
+        let mut report = BundleReport {
+            format: self.format,
+            precision: self.precision,
+            path: path.to_owned(),
+            files: Vec::new(),
+            vectors: VectorCounts {
+                verified: vectors.all().len(),
+                golden: vectors.golden().len(),
+            },
+            checks,
+            limit,
+            output_range_mm: portable.full_scale_mm,
+            program_deviation: vectors.program_deviation_mm / portable.full_scale_mm,
+            bound_mm: fixed.map(|fixed| fixed.bound_mm),
+            remarks,
+        };
+        self.folder
+            .write("golden.csv", golden_csv(portable, vectors.golden()))?;
+        let metadata = serde_json::to_string_pretty(&self.metadata)
+            .map_err(|error| read_back("metadata.json", error.to_string()))?;
+        self.folder.write("metadata.json", metadata + "\n")?;
+        let array = self.file.settings.source.sensor.scale.to_string();
+        self.folder
+            .write("README.txt", readme(&self.name, &array, portable, fixed, &report))?;
+        report.files = self.folder.sizes()?;
+        self.folder.commit()?;
+        Ok(report)
+    }
+}
+
+fn read_back(file: &str, reason: String) -> BundleError {
+    BundleError::ReadBack {
+        file: file.to_owned(),
+        reason,
+    }
+}

@@ -1,0 +1,161 @@
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use tempfile::TempDir;
+
+use super::error::BundleError;
+use crate::export::{WriteError, unfinished::Listed};
+
+/// A folder that is filled under a temporary name beside its target and then renamed, so that it is there whole or not at
+/// all. Dropped before [`Self::commit`], it leaves nothing.
+#[derive(Debug)]
+pub(super) struct AtomicFolder {
+    target: PathBuf,
+    folder: TempDir,
+    listed: Listed,
+}
+
+impl AtomicFolder {
+    /// Creates the temporary folder beside `target`, which must be missing or an empty folder.
+    ///
+    /// # Errors
+    /// Something else is there, or its folder cannot be written.
+    pub(super) fn create(target: &Path) -> Result<Self, BundleError> {
+        let name = target
+            .file_name()
+            .ok_or_else(|| BundleError::Exists(target.to_owned()))?;
+        let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let parent = parent.unwrap_or(Path::new("."));
+        if !parent.is_dir() {
+            let (path, folder) = (target.to_owned(), parent.to_owned());
+            return Err(WriteError::NoFolder { path, folder }.into());
+        }
+        if fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
+            return Err(BundleError::Exists(target.to_owned()));
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".decoupler-").suffix(".part");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o777));
+        }
+        // The default error repeats the temporary name, which means nothing to the user.
+        let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+        let (folder, listed) = Listed::begin(|| builder.tempdir_in(parent).map_err(plain))
+            .map_err(|error| WriteError::io(target, error))?;
+        Ok(Self {
+            target: parent.join(name),
+            folder,
+            listed,
+        })
+    }
+
+    /// Path of the temporary folder.
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Writes a file into it.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub(super) fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), BundleError> {
+        let path = self.path().join(name);
+        let written = fs::write(&path, contents).and_then(|()| fs::File::open(&path)?.sync_all());
+        Ok(written.map_err(|error| WriteError::io(&self.target.join(name), error))?)
+    }
+
+    /// Names of its files in order, with their sizes in bytes.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub(super) fn sizes(&self) -> Result<Vec<(String, u64)>, BundleError> {
+        let sizes = || {
+            let mut sizes = Vec::new();
+            for entry in fs::read_dir(self.path())? {
+                let entry = entry?;
+                sizes.push((
+                    entry.file_name().to_string_lossy().into_owned(),
+                    entry.metadata()?.len(),
+                ));
+            }
+            sizes.sort();
+            Ok(sizes)
+        };
+        Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
+    }
+
+    /// Renames it to its target.
+    ///
+    /// # Errors
+    /// Something came to be there meanwhile, or the operating system refuses.
+    pub(super) fn commit(self) -> Result<(), BundleError> {
+        let Self { target, folder, listed } = self;
+        if is_empty_folder(&target) {
+            fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
+        }
+        fs::rename(folder.path(), &target).map_err(|error| WriteError::io(&target, error))?;
+        // It is not there any more under its temporary name.
+        let _ = folder.keep();
+        drop(listed);
+        Ok(())
+    }
+}
+
+fn is_empty_folder(path: &Path) -> bool {
+    fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn it_is_there_whole_or_not_at_all() {
+        let home = tempfile::tempdir().unwrap();
+        let target = home.path().join("bundle");
+        let dropped = AtomicFolder::create(&target).unwrap();
+        dropped.write("half", "1").unwrap();
+        drop(dropped);
+        assert_eq!(names(home.path()), [""; 0]);
+        fs::create_dir(&target).unwrap();
+        let folder = AtomicFolder::create(&target).unwrap();
+        folder.write("whole", "2").unwrap();
+        folder.commit().unwrap();
+        assert_eq!(
+            (names(home.path()), names(&target)),
+            (vec!["bundle".into()], vec!["whole".into()])
+        );
+    }
+
+    #[test]
+    fn what_is_in_the_way_stays() {
+        let home = tempfile::tempdir().unwrap();
+        let [file, full] = ["file", "full"].map(|name| home.path().join(name));
+        fs::write(&file, "").unwrap();
+        fs::create_dir(&full).unwrap();
+        fs::write(full.join("kept"), "").unwrap();
+        for (path, expected) in [
+            (&file, "is there already"),
+            (&full, "is there already"),
+            (&home.path().join("none/bundle"), "does not exist"),
+        ] {
+            let message = AtomicFolder::create(path).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+        assert_eq!(
+            (names(home.path()), names(&full)),
+            (vec!["file".into(), "full".into()], vec!["kept".into()])
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! Bundles as ONNX graphs (opset 13), and their evaluation as it is read back.
+//!
+//! | input | shape | type |
+//! |---|---|---|
+//! | `resistances_ohm` | batch × M4 | float or double |
+//! | `row`, for networks of known rows | batch | int64, from 1 |
+//!
+//! | output | shape | type |
+//! |---|---|---|
+//! | `coordinates_mm` | batch × 3·M2 | as the input; NaN where a reading or the row is invalid |
+//! | `readings_outside`, if the range in training is known | batch | int64 |
+
+mod evaluator;
+mod graph;
+mod operations;
+mod schema;
+mod tensor;
+mod writer;
+
+use prost::Message;
+
+use self::{
+    evaluator::evaluate,
+    schema::Model,
+    tensor::{Tensor, Values},
+};
+use super::{vectors::Vector, weights::Digits};
+
+pub(super) use self::writer::write;
+
+/// A graph that was read back.
+pub(super) struct OnnxGraph {
+    graph: schema::Graph,
+    digits: Digits,
+}
+
+/// The outputs of a graph.
+pub(super) struct OnnxAnswers {
+    pub(super) coordinates_mm: Vec<Vec<f64>>,
+    #[cfg_attr(not(test), expect(dead_code, reason = "compared with the range in tests"))]
+    pub(super) readings_outside: Option<Vec<i64>>,
+}
+
+impl OnnxGraph {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// A description of the damage.
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
+        let model = Model::decode(bytes).map_err(|error| error.to_string())?;
+        let graph = model.graph.ok_or("there is no graph in it")?;
+        let input = graph
+            .input
+            .first()
+            .and_then(|input| input.kind.as_ref()?.tensor_type.as_ref());
+        let digits = match input.map(|kind| kind.elem_type) {
+            Some(schema::FLOAT) => Digits::Single,
+            Some(schema::DOUBLE) => Digits::Double,
+            _ => return Err("its first input is not of numbers".to_owned()),
+        };
+        Ok(Self { graph, digits })
+    }
+
+    /// Answers all vectors as one batch.
+    ///
+    /// # Errors
+    /// A description of the first operation that fails.
+    pub(super) fn decode(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
+        let channels = vectors.first().map_or(0, |vector| vector.readings_ohm.len());
+        let readings = vectors.iter().flat_map(|vector| &vector.readings_ohm);
+        let readings = readings.map(|&ohm| self.digits.round(ohm)).collect();
+        let mut inputs = vec![(
+            "resistances_ohm".to_owned(),
+            Tensor::real(self.digits, [vectors.len(), channels], readings),
+        )];
+        if self.graph.input.len() > 1 {
+            let rows = vectors.iter().map(|vector| vector.network as i64 + 1).collect();
+            inputs.push(("row".to_owned(), Tensor::int([vectors.len()], rows)));
+        }
+        let mut values = evaluate(&self.graph, inputs)?;
+        let coordinates_mm = match values
+            .remove("coordinates_mm")
+            .map(|tensor| (tensor.shape, tensor.values))
+        {
+            Some((shape, Values::Real(_, values))) if shape.len() == 2 => {
+                values.chunks(shape[1].max(1)).map(<[f64]>::to_vec).collect()
+            }
+            _ => return Err("there are no coordinates".to_owned()),
+        };
+        let readings_outside = match values.remove("readings_outside").map(|tensor| tensor.values) {
+            Some(Values::Int(outside)) => Some(outside),
+            _ => None,
+        };
+        Ok(OnnxAnswers {
+            coordinates_mm,
+            readings_outside,
+        })
+    }
+}

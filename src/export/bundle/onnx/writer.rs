@@ -1,0 +1,259 @@
+use prost::Message;
+
+use super::{
+    graph::GraphBuilder,
+    schema::{Dimension, Graph, INT64, Model, OperatorSet, Property, TensorShape, TensorType, TypeOfValue, ValueInfo},
+    tensor::{Tensor, element_type},
+};
+use crate::{
+    export::bundle::{
+        metadata::{Metadata, coordinate_names, reading_names},
+        portable::Portable,
+        weights::{Digits, RoundedNetwork, Weights},
+    },
+    network::Quantity,
+};
+
+const OPSET: i64 = 13;
+/// The first version of the format with opset 13.
+const IR_VERSION: i64 = 7;
+
+/// Writes the graph of `weights`.
+pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, metadata: &Metadata) -> Vec<u8> {
+    let properties = metadata.iter().map(|(key, value)| Property {
+        key: key.clone(),
+        value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
+    });
+    let row = if portable.takes_row() {
+        "the network of the row-wire 'row' (from 1)"
+    } else {
+        "the network"
+    };
+    let model = Model {
+        ir_version: IR_VERSION,
+        producer_name: env!("CARGO_PKG_NAME").to_owned(),
+        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        doc_string: format!(
+            "Decodes the readings of one row-wire in ohm into the coordinates of its nodes in mm with {row}. Answers are \
+             NaN where a reading or the row is invalid."
+        ),
+        graph: Some(graph(portable, weights)),
+        opset_import: vec![OperatorSet {
+            domain: String::new(),
+            version: OPSET,
+        }],
+        metadata_props: properties.collect(),
+    };
+    model.encode_to_vec()
+}
+
+fn graph(portable: &Portable, weights: &Weights) -> Graph {
+    let mut builder = GraphBuilder::default();
+    let digits = weights.arithmetic.rest;
+    let is_valid = add_validity(&mut builder, portable, digits);
+    let hidden = add_hidden_sums(&mut builder, portable, weights);
+    let hidden = if weights.arithmetic.hidden == digits {
+        hidden
+    } else {
+        builder.cast(&hidden, digits, "rounded_hidden_sums")
+    };
+    let activations = builder.node("Tanh", &[&hidden], "activations");
+    let columns = |network: &RoundedNetwork| network.output_weights.clone();
+    let shape = [portable.hidden, portable.outputs];
+    let output_weights = add_table(&mut builder, "output_weights", weights, digits, &shape, columns);
+    let products = add_product(&mut builder, portable, &activations, &output_weights, "output_products");
+    let biases = |network: &RoundedNetwork| network.output_biases.clone();
+    let biases = add_table(
+        &mut builder,
+        "output_biases",
+        weights,
+        digits,
+        &[portable.outputs],
+        biases,
+    );
+    let answers = builder.node("Add", &[&products, &biases], "answers");
+    builder.node("Where", &[&is_valid, &answers, "not_a_number"], "coordinates_mm");
+    let mut outputs = vec![value(
+        "coordinates_mm",
+        element_type(digits),
+        Some(portable.outputs),
+        format!("Coordinates in mm: {}", coordinate_names(portable).join(", ")),
+    )];
+    if add_readings_outside(&mut builder, portable, digits) {
+        let text = "Number of readings beyond the range seen in training by more than a tenth of it";
+        outputs.push(value("readings_outside", INT64, None, text.to_owned()));
+    }
+    let mut inputs = vec![value(
+        "resistances_ohm",
+        element_type(digits),
+        Some(portable.channels),
+        format!("Readings in ohm: {}", reading_names(portable).join(", ")),
+    )];
+    if portable.takes_row() {
+        let text = format!("Row-wire of each reading, from 1 to {}", portable.networks.len());
+        inputs.push(value("row", INT64, None, text));
+    }
+    Graph {
+        name: "decoupler".to_owned(),
+        input: inputs,
+        output: outputs,
+        ..builder.build()
+    }
+}
+
+/// Adds the condition (batch × 1) under which there is an answer, and the index of the row's network.
+fn add_validity(builder: &mut GraphBuilder, portable: &Portable, digits: Digits) -> String {
+    let scalar = |value: f64| Tensor::real(digits, [], vec![value]);
+    let not_outside = builder.constant("infinity", &scalar(f64::INFINITY));
+    builder.constant("not_a_number", &scalar(f64::NAN));
+    builder.constant("second_axis", &Tensor::int([1], vec![1]));
+    let is_reading = if portable.quantity == Quantity::Raw {
+        let size = builder.node("Abs", &["resistances_ohm"], "reading_sizes");
+        builder.node("Less", &[&size, &not_outside], "is_reading")
+    } else {
+        let zero = builder.constant("zero", &scalar(0.0));
+        let is_positive = builder.node("Greater", &["resistances_ohm", &zero], "is_positive");
+        let is_finite = builder.node("Less", &["resistances_ohm", &not_outside], "is_finite");
+        builder.node("And", &[&is_positive, &is_finite], "is_reading")
+    };
+    let is_invalid = builder.node("Not", &[&is_reading], "is_invalid_reading");
+    let counted = builder.cast_to(&is_invalid, INT64, "counted_invalid_readings");
+    let invalid = builder.sum(&counted, "second_axis", true, "invalid_readings");
+    let none = builder.constant("none", &Tensor::int([], vec![0]));
+    let are_valid = builder.node("Equal", &[&invalid, &none], "are_readings_valid");
+    if !portable.takes_row() {
+        return are_valid;
+    }
+    let first = builder.constant("first_row", &Tensor::int([], vec![1]));
+    let last = builder.constant("last_row", &Tensor::int([], vec![portable.networks.len() as i64]));
+    let not_below = builder.node("GreaterOrEqual", &["row", &first], "is_row_from_first");
+    let not_above = builder.node("LessOrEqual", &["row", &last], "is_row_to_last");
+    let is_row = builder.node("And", &[&not_below, &not_above], "is_row");
+    let row = builder.node("Where", &[&is_row, "row", &first], "valid_row");
+    builder.node("Sub", &[&row, &first], "row_index");
+    let is_row = builder.node("Unsqueeze", &[&is_row, "second_axis"], "is_row_of_answer");
+    builder.node("And", &[&are_valid, &is_row], "is_valid")
+}
+
+fn add_hidden_sums(builder: &mut GraphBuilder, portable: &Portable, weights: &Weights) -> String {
+    let digits = weights.arithmetic.hidden;
+    let readings = if digits == weights.arithmetic.rest {
+        "resistances_ohm".to_owned()
+    } else {
+        builder.cast("resistances_ohm", digits, "resistances_in_double")
+    };
+    let centre = |network: &RoundedNetwork| network.centre_ohm.clone();
+    let centre = add_table(builder, "centre_ohm", weights, digits, &[portable.channels], centre);
+    let changes = match portable.quantity {
+        Quantity::Resistance | Quantity::Raw => builder.node("Sub", &[&readings, &centre], "changes"),
+        Quantity::Conductance => {
+            let difference = builder.node("Sub", &[&centre, &readings], "differences_ohm");
+            builder.node("Div", &[&difference, &readings], "changes")
+        }
+        Quantity::LogResistance => {
+            let difference = builder.node("Sub", &[&readings, &centre], "differences_ohm");
+            let relative = builder.node("Div", &[&difference, &centre], "relative_changes");
+            add_log_of_one_more(builder, &relative, digits)
+        }
+    };
+    let columns = |network: &RoundedNetwork| network.hidden_weights.clone();
+    let shape = [portable.channels, portable.hidden];
+    let hidden_weights = add_table(builder, "hidden_weights", weights, digits, &shape, columns);
+    let products = add_product(builder, portable, &changes, &hidden_weights, "hidden_products");
+    let biases = |network: &RoundedNetwork| network.hidden_biases.clone();
+    let biases = add_table(builder, "hidden_biases", weights, digits, &[portable.hidden], biases);
+    builder.node("Add", &[&products, &biases], "hidden_sums")
+}
+
+/// Adds ln(1 + x) = x · ln w / (w − 1), where w is the rounded 1 + x: the errors of w in both cancel (W. Kahan, in the
+/// Hewlett-Packard HP-15C Advanced Functions Handbook, 1982).
+fn add_log_of_one_more(builder: &mut GraphBuilder, x: &str, digits: Digits) -> String {
+    let one = builder.constant("one", &Tensor::real(digits, [], vec![1.0]));
+    let sum = builder.node("Add", &[x, &one], "ratios");
+    let log = builder.node("Log", &[&sum], "logs_of_ratios");
+    let rounded = builder.node("Sub", &[&sum, &one], "rounded_changes");
+    let product = builder.node("Mul", &[x, &log], "log_products");
+    let quotient = builder.node("Div", &[&product, &rounded], "log_quotients");
+    let is_tiny = builder.node("Equal", &[&sum, &one], "is_change_tiny");
+    builder.node("Where", &[&is_tiny, x, &quotient], "changes")
+}
+
+/// Adds a constant for one network, or the part of a table of all rows.
+fn add_table(
+    builder: &mut GraphBuilder,
+    name: &str,
+    weights: &Weights,
+    digits: Digits,
+    shape: &[usize],
+    of: impl Fn(&RoundedNetwork) -> Vec<f64>,
+) -> String {
+    let values: Vec<f64> = weights.networks.iter().flat_map(of).collect();
+    if let [_] = weights.networks[..] {
+        return builder.constant(name, &Tensor::real(digits, shape, values));
+    }
+    let shape = [&[weights.networks.len()], shape].concat();
+    let table = builder.constant(&format!("{name}_of_rows"), &Tensor::real(digits, shape, values));
+    builder.node("Gather", &[&table, "row_index"], name)
+}
+
+/// Adds the product of values (batch × n) with a matrix (n × m), or with the matrix of each one's row.
+fn add_product(builder: &mut GraphBuilder, portable: &Portable, values: &str, matrix: &str, name: &str) -> String {
+    if !portable.takes_row() {
+        return builder.node("MatMul", &[values, matrix], name);
+    }
+    let rows = builder.node("Unsqueeze", &[values, "second_axis"], &format!("{name}_left"));
+    let products = builder.node("MatMul", &[&rows, matrix], &format!("{name}_of_rows"));
+    builder.node("Squeeze", &[&products, "second_axis"], name)
+}
+
+/// Adds the number of readings outside the limits, if these are known.
+fn add_readings_outside(builder: &mut GraphBuilder, portable: &Portable, digits: Digits) -> bool {
+    let Some(ranges) = portable.ranges() else { return false };
+    let mut limit = |name: &str, pick: fn(&(f64, f64)) -> f64| {
+        let values = ranges.iter().flat_map(|range| range.limits.iter().map(pick));
+        let values = values.map(|value| digits.round(value)).collect();
+        let mut shape = vec![portable.channels];
+        if !portable.takes_row() {
+            return builder.constant(name, &Tensor::real(digits, shape, values));
+        }
+        shape.insert(0, ranges.len());
+        let table = builder.constant(&format!("{name}_of_rows"), &Tensor::real(digits, shape, values));
+        builder.node("Gather", &[&table, "row_index"], name)
+    };
+    let (low, high) = (
+        limit("lowest_ohm", |limits| limits.0),
+        limit("highest_ohm", |limits| limits.1),
+    );
+    let not_below = builder.node("GreaterOrEqual", &["resistances_ohm", &low], "is_not_below");
+    let not_above = builder.node("LessOrEqual", &["resistances_ohm", &high], "is_not_above");
+    let is_inside = builder.node("And", &[&not_below, &not_above], "is_inside");
+    let is_outside = builder.node("Not", &[&is_inside], "is_outside");
+    let counted = builder.cast_to(&is_outside, INT64, "counted_outside");
+    builder.sum(&counted, "second_axis", false, "readings_outside");
+    true
+}
+
+/// Describes an input or output: batch, or batch × `width`.
+fn value(name: &str, elem_type: i32, width: Option<usize>, doc_string: String) -> ValueInfo {
+    let batch = Dimension {
+        dim_param: Some("batch".to_owned()),
+        ..Dimension::default()
+    };
+    let width = width.map(|width| Dimension {
+        dim_value: Some(width as i64),
+        ..Dimension::default()
+    });
+    let shape = TensorShape {
+        dim: std::iter::once(batch).chain(width).collect(),
+    };
+    ValueInfo {
+        name: name.to_owned(),
+        kind: Some(TypeOfValue {
+            tensor_type: Some(TensorType {
+                elem_type,
+                shape: Some(shape),
+            }),
+        }),
+        doc_string,
+    }
+}

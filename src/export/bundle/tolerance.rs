@@ -1,0 +1,69 @@
+use super::{
+    exact::Growth,
+    portable::Portable,
+    weights::{Arithmetic, Digits},
+};
+
+/// Largest deviation of a bundle of floating-point numbers from its network, relative to the widest range of an output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolerance {
+    pub(super) limit: f64,
+    /// The limit of the precision, without regard to the network.
+    usual: f64,
+    /// Change of an output, in parts of its range, per relative error of the changes of the readings.
+    amplification: f64,
+}
+
+impl Tolerance {
+    /// Usual limit of double precision.
+    pub(super) const DOUBLE: f64 = 1e-12;
+    /// Usual limit of single precision.
+    pub(super) const SINGLE: f64 = 1e-5;
+
+    /// The usual limit. Where the `deviation` of an evaluation comes near it, because the network's own sums let rounding
+    /// errors grow so much, the bound on these: each of n numbers that are added up has a relative error of at most some
+    /// n units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
+    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: Growth, deviation: f64) -> Self {
+        /// Other programs add up in another order, and may be so much closer or farther.
+        const NEAR: f64 = 0.5;
+        // Beside the sums: difference, division, logarithm, weight and tangent.
+        let operations = (portable.channels + portable.hidden + 10) as f64;
+        let errors_mm =
+            growth.hidden_mm * arithmetic.hidden.unit_roundoff() + growth.rest_mm * arithmetic.rest.unit_roundoff();
+        let usual = match arithmetic.rest {
+            Digits::Double => Self::DOUBLE,
+            Digits::Single => Self::SINGLE,
+        };
+        let bound = operations * errors_mm / portable.full_scale_mm;
+        Self {
+            limit: if deviation <= NEAR * usual {
+                usual
+            } else {
+                usual.max(bound)
+            },
+            usual,
+            amplification: growth.hidden_mm / portable.full_scale_mm,
+        }
+    }
+
+    /// Remarks on the arithmetic that the network needs.
+    pub(super) fn remarks(self, arithmetic: Arithmetic) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if arithmetic == Arithmetic::MIXED {
+            remarks.push(
+                "the hidden sums are computed in double precision, because their large products nearly cancel; the rest is \
+                 in single precision"
+                    .to_owned(),
+            );
+        }
+        if self.limit > self.usual {
+            remarks.push(format!(
+                "this network amplifies rounding errors up to {:.1e} times (relative to the range of its outputs), so two \
+                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; train with noise \
+                 (--noise) for a network that amplifies less",
+                self.amplification, self.limit, self.usual
+            ));
+        }
+        remarks
+    }
+}
