@@ -1,4 +1,5 @@
 use std::{
+    borrow::Cow,
     error::Error,
     ffi::OsString,
     io::{Write, stderr},
@@ -95,13 +96,33 @@ fn one_line(error: &clap::Error) -> String {
         !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
     });
     let line = said.collect::<Vec<_>>().join("; ");
-    line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+    let line = line.strip_prefix("error: ").unwrap_or(&line);
+    line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
+}
+
+/// A word as given, unless it is too long to be read.
+fn shortened(word: &str) -> Cow<'_, str> {
+    const LONGEST: usize = 200;
+    const BEGINNING: usize = 40;
+    if word.chars().count() <= LONGEST {
+        return Cow::Borrowed(word);
+    }
+    let beginning: String = word.chars().take(BEGINNING).collect();
+    Cow::Owned(format!("{beginning}…"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::CommandFactory;
+
+    #[test]
+    fn endless_values_are_cut_in_messages() {
+        let long = "1".repeat(5000);
+        let error = Arguments::try_parse_from(["decoupler", "simulate", "--array", &long]).unwrap_err();
+        let line = one_line(&error);
+        assert!(line.contains("is not an array scale") && line.len() < 500, "{line}");
+    }
 
     #[test]
     fn the_commands_are_declared_without_contradiction() {
