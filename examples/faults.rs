@@ -14,7 +14,14 @@ use decoupler::{
     sensor::ArrayScale,
 };
 
-const KINDS: [&str; 6] = ["open row", "open column", "short rows", "short columns", "gain", "stuck"];
+const KINDS: [&str; 6] = [
+    "open row",
+    "open column",
+    "short rows",
+    "short columns",
+    "gain",
+    "stuck",
+];
 /// Frames between presses that are decoded, and frames in all with each fault.
 const FRAMES: usize = 20;
 
@@ -37,7 +44,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut settings = Preset::Best.settings_in(Noise::relative(1e-3));
     settings.source.sensor.scale = argument(2, "10x10_5x30").parse()?;
     settings.source.scene.loading = Loading::Indenter(Indenter::default());
-    settings.training.stopping.epochs = 100;
+    (settings.source.samples, settings.source.validation_samples) = (5000, 1000);
+    settings.training.stopping.epochs = 50;
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
     let mut network = CompiledNetworks::<f64>::new(&run.network(), settings.source.sensor.scale.rows());
@@ -46,14 +54,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     for trial in 0..faults {
         let kind = trial % KINDS.len();
         let (fault, wire) = draw(kind, settings.source.sensor.scale, &mut rng);
-        examine(&settings, Seed(trial as u64), fault, wire, &mut network, &mut tallies[kind])?;
+        examine(
+            &settings,
+            Seed(trial as u64),
+            fault,
+            wire,
+            &mut network,
+            &mut tallies[kind],
+        )?;
     }
     println!("fault           right  wrong  of    frames  error: sound  faulty  left out (mm)");
     for (name, tally) in KINDS.iter().zip(&tallies) {
-        let Tally { right, wrong, faults, .. } = tally;
+        let Tally {
+            right, wrong, faults, ..
+        } = tally;
         let frames = tally.frames as f64 / (*right).max(1) as f64;
         let [sound, faulty, left_out] = tally.errors_mm.map(|sum| sum / tally.values.max(1) as f64);
-        println!("{name:<14} {right:>6} {wrong:>6} {faults:>4} {frames:>8.1}       {sound:.4}  {faulty:.4}    {left_out:.4}");
+        println!(
+            "{name:<14} {right:>6} {wrong:>6} {faults:>4} {frames:>8.1}       {sound:.4}  {faulty:.4}    {left_out:.4}"
+        );
     }
     let right: usize = tallies.iter().map(|tally| tally.right).sum();
     println!("right wire named: {right} of {faults}");
@@ -89,7 +108,11 @@ fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWir
             (Fault::Gain { column, relative }, FaultyWire::Column(column))
         }
         _ => {
-            let end = if below(2) == 0 { ConverterEnd::Low } else { ConverterEnd::High };
+            let end = if below(2) == 0 {
+                ConverterEnd::Low
+            } else {
+                ConverterEnd::High
+            };
             (Fault::Stuck { column, end }, FaultyWire::Column(column))
         }
     }
@@ -124,7 +147,9 @@ fn examine(
                 tally.wrong += 1;
                 println!("{fault}: {found}");
             }
-            left_out = Some(LeftOutDecoder::new(sensor, scene, source.rows(), found)?);
+            let mut decoder = LeftOutDecoder::new(sensor, scene, source.rows())?;
+            decoder.leave_out(Some(found));
+            left_out = Some(decoder);
         }
         let Some(left_out) = &mut left_out else { continue };
         let mut error_mm = |decoder: &mut dyn Decoder, frame_ohm: &[f64]| -> Result<f64, Box<dyn Error>> {
@@ -132,7 +157,10 @@ fn examine(
             let rows = answer_mm.chunks_exact(decoder.outputs()).enumerate();
             let errors = rows.flat_map(|(row, answer_mm)| {
                 let truth = source.deformation().row_positions_mm(sensor, row);
-                answer_mm.chunks_exact(3).zip(truth).map(|(node, truth)| (node[2] - truth.z).abs())
+                answer_mm
+                    .chunks_exact(3)
+                    .zip(truth)
+                    .map(|(node, truth)| (node[2] - truth.z).abs())
             });
             Ok(errors.sum())
         };

@@ -49,7 +49,10 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
         Err(failure) if !failure.is_broken_pipe() => {
             // Nobody is left to tell if this fails.
             let _ = match &failure {
-                Failure::Interrupted(_) | Failure::InterruptedTrials { .. } | Failure::InterruptedTrade { .. } => {
+                Failure::Interrupted(_)
+                | Failure::InterruptedTrials { .. }
+                | Failure::InterruptedTrade { .. }
+                | Failure::InterruptedFollow => {
                     writeln!(stderr(), "{failure}")
                 }
                 _ => writeln!(stderr(), "error: {failure}"),

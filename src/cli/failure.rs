@@ -12,7 +12,9 @@ use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
     export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
+    live::{LineError, Source, SourceError},
     scene::Rows,
+    sensor::SensorError,
     training::SettingError,
 };
 
@@ -43,6 +45,18 @@ pub(super) enum Failure {
     InterruptedTrials { done: usize, trials: usize },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
+    #[error("interrupted")]
+    InterruptedFollow,
+    #[error(transparent)]
+    Source(SourceError),
+    #[error("cannot start to read: {}", system_cause(.0))]
+    Reader(io::Error),
+    #[error("{input} is lost: {}; connect it again", system_cause(.source))]
+    Lost { input: Source, source: io::Error },
+    #[error("{0}: {1}")]
+    Line(Source, LineError),
+    #[error(transparent)]
+    Sensor(SensorError),
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -109,9 +123,10 @@ impl Failure {
             Self::Arguments(_) => 2,
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
-            Self::Interrupted(_) | Self::InterruptedTrials { .. } | Self::InterruptedTrade { .. } => {
-                interruption::STATUS
-            }
+            Self::Interrupted(_)
+            | Self::InterruptedTrials { .. }
+            | Self::InterruptedTrade { .. }
+            | Self::InterruptedFollow => interruption::STATUS,
             _ => 1,
         }
     }

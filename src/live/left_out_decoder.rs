@@ -8,7 +8,7 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Decodes with the wires of a named fault left out: the most probable deformation given the other readings, the noise and
+/// Decodes with the wires of a named fault left out, if there is one: the most probable deformation given the other readings, the noise and
 /// the prior of the scene, by the Gauss-Newton method.
 ///
 /// A broken row-wire is decoded from the nodes before its break, and two that touch from the mean of both. A row-wire of
@@ -17,7 +17,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct LeftOutDecoder {
     model: SensorModel,
-    fault: Diagnosis,
+    fault: Option<Diagnosis>,
     rows: Vec<usize>,
     priors: Vec<GaussianPrior>,
     one: RowFit,
@@ -29,14 +29,14 @@ pub struct LeftOutDecoder {
 }
 
 impl LeftOutDecoder {
-    /// Prepares to decode `rows` of `model` in `scene` without the wires of `fault`.
+    /// Prepares to decode `rows` of `model` in `scene`, first with all wires.
     ///
     /// # Errors
     /// A sensor without resistances.
-    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], fault: Diagnosis) -> Result<Self, SensorError> {
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         Ok(Self {
             model: *model,
-            fault,
+            fault: None,
             rows: rows.to_vec(),
             priors: GaussianPrior::of_rows(model, scene, rows, &mut Seed(0).rng(Stream::Expectation)),
             one: RowFit::new(model, scene, 1)?,
@@ -46,8 +46,13 @@ impl LeftOutDecoder {
         })
     }
 
-    /// The fault whose wires are left out.
-    pub fn fault(&self) -> Diagnosis {
+    /// Sets the fault whose wires are left out from now on; `None` for none.
+    pub fn leave_out(&mut self, fault: Option<Diagnosis>) {
+        self.fault = fault;
+    }
+
+    /// Returns the fault whose wires are left out.
+    pub fn fault(&self) -> Option<Diagnosis> {
         self.fault
     }
 
@@ -72,7 +77,11 @@ impl LeftOutDecoder {
                     neighbours.1 += 1.0;
                 }
             }
-            let depth_mm = if neighbours.1 > 0.0 { neighbours.0 / neighbours.1 } else { 0.0 };
+            let depth_mm = if neighbours.1 > 0.0 {
+                neighbours.0 / neighbours.1
+            } else {
+                0.0
+            };
             target.copy_from_slice(&self.model.displaced_mm(row, node, DVec3::Z * depth_mm).to_array());
         }
     }
@@ -92,26 +101,32 @@ impl Decoder for LeftOutDecoder {
         let row = self.rows[row_index];
         let nodes = self.model.scale.nodes_per_row();
         let prior = &self.priors[row_index];
+        let wire = self.fault.map(|fault| fault.wire);
         let whole = View {
             rows: &[(row, prior)],
             readings_ohm: readings,
-            left_out: self.fault.wire.columns(),
+            left_out: wire.map_or([None; 2], FaultyWire::columns),
             nodes,
         };
-        match (self.fault.wire, self.fault.cause) {
-            (FaultyWire::Row(faulty), FaultCause::Broken { before_node: nodes }) if faulty == row => {
+        match (wire, self.fault.map(|fault| fault.cause)) {
+            (Some(FaultyWire::Row(faulty)), Some(FaultCause::Broken { before_node: nodes })) if faulty == row => {
                 self.one.solve(View { nodes, ..whole });
                 self.one.coordinates(row, 0, targets);
             }
-            (FaultyWire::Row(faulty), _) if faulty == row && self.has_neighbours => self.interpolate(row_index, targets),
-            (FaultyWire::Row(faulty), _) if faulty == row => {
+            (Some(FaultyWire::Row(faulty)), _) if faulty == row && self.has_neighbours => {
+                self.interpolate(row_index, targets)
+            }
+            (Some(FaultyWire::Row(faulty)), _) if faulty == row => {
                 self.one.set_to(prior);
                 self.one.coordinates(row, 0, targets);
             }
-            (FaultyWire::Rows(first), _) if self.fault.wire.is_row(row) => {
+            (Some(FaultyWire::Rows(first)), _) if (first..=first + 1).contains(&row) => {
                 let place = row - first;
                 let first_index = row_index - place;
-                let rows = [(first, &self.priors[first_index]), (first + 1, &self.priors[first_index + 1])];
+                let rows = [
+                    (first, &self.priors[first_index]),
+                    (first + 1, &self.priors[first_index + 1]),
+                ];
                 self.two.solve(View { rows: &rows, ..whole });
                 self.two.coordinates(row, place, targets);
             }

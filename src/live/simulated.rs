@@ -120,7 +120,8 @@ impl Simulated {
         self.deformation = self.indenter.press(&self.model, place_mm, depth * self.stroke_mm);
         let columns = self.model.scale.columns();
         for (&row, readings_ohm) in self.rows.iter().zip(readings_ohm.chunks_exact_mut(columns)) {
-            self.model.row_resistances_into(row, self.deformation.row_mm(row), readings_ohm)?;
+            self.model
+                .row_resistances_into(row, self.deformation.row_mm(row), readings_ohm)?;
         }
         if let Some(fault) = &self.fault {
             fault.before_noise(&self.rows, &self.deformation, readings_ohm);
@@ -154,7 +155,9 @@ impl Path {
     fn new(model: &SensorModel, rng: &mut impl Rng) -> Self {
         let (geometry, scale) = (&model.geometry, model.scale);
         let first_mm = geometry.row_node_mm(scale, 0, 0).truncate();
-        let last_mm = geometry.row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1).truncate();
+        let last_mm = geometry
+            .row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1)
+            .truncate();
         Self {
             middle_mm: 0.5 * (first_mm + last_mm),
             reach_mm: 0.5 * (last_mm - first_mm),
@@ -166,7 +169,9 @@ impl Path {
     fn at(&self, time_s: f64) -> (DVec2, f64) {
         let wave = |axis: usize| {
             let pairs = FREQUENCIES_HZ[axis].iter().zip(self.phases[axis]).zip([0.6, 0.4]);
-            pairs.map(|((frequency, phase), share)| share * (TAU * frequency * time_s + phase).sin()).sum::<f64>()
+            pairs
+                .map(|((frequency, phase), share)| share * (TAU * frequency * time_s + phase).sin())
+                .sum::<f64>()
         };
         let place_mm = self.middle_mm + self.reach_mm * DVec2::new(wave(0), wave(1));
         (place_mm, (0.4 + 0.6 * wave(2)).max(0.0))

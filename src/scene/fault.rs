@@ -1,5 +1,6 @@
 use std::{fmt, str::FromStr};
 
+use glam::DVec3;
 use thiserror::Error;
 
 use super::{Deformation, Noise};
@@ -73,7 +74,7 @@ pub enum FaultError {
     )]
     Text(String),
     /// The array, or the scene, has no such wire or node.
-    #[error("fault: there is no {what} {number}; give 1 to {last}")]
+    #[error("there is no {what} {number}; give 1 to {last}")]
     Number {
         /// Kind of wire or node.
         what: &'static str,
@@ -83,10 +84,10 @@ pub enum FaultError {
         last: usize,
     },
     /// A gain out of range.
-    #[error("fault: the error of the gain is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
+    #[error("the error of the gain is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     GainRange(f64),
     /// The scene does not read a row-wire of the fault.
-    #[error("fault: row {0} is not read in this scene; give a row that is, or read all rows")]
+    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
     NotRead(usize),
 }
 
@@ -222,6 +223,16 @@ impl FaultySensor {
         })
     }
 
+    /// The deformation of coordinates in mm, 3·M2 of each row-wire; at rest where there are none.
+    pub(crate) fn deformation<'a>(&self, coordinates_mm: impl Fn(usize) -> Option<&'a [f64]>) -> Deformation {
+        Deformation::from_fn(self.model.scale, |row, node| {
+            coordinates_mm(row).map_or(DVec3::ZERO, |coordinates_mm| {
+                let position_mm = DVec3::from_slice(&coordinates_mm[3 * node..]);
+                self.model.displacement_mm(row, node, position_mm)
+            })
+        })
+    }
+
     /// Replaces the resistances of one snapshot, row by row of those `read`, by what the wires and amplifiers make of
     /// them. `deformation` is the one they belong to.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
@@ -233,7 +244,12 @@ impl FaultySensor {
             let sum = self
                 .model
                 .partial_sum((row, 0..nodes), (column, 0..electrodes), displacements_mm, |_, _| ());
-            (self.model.resistivity_ohm_per_mm / sum).min(full_scale_ohm)
+            // Without any node there is no current; what noise makes of that is the converter's full scale.
+            if sum > 0.0 {
+                self.model.resistivity_ohm_per_mm / sum
+            } else {
+                full_scale_ohm
+            }
         };
         let shared_ohm = |one: f64, other: f64| 2.0 / (1.0 / one + 1.0 / other);
         match self.fault {
@@ -251,7 +267,8 @@ impl FaultySensor {
             Fault::ShortedRows { row } => {
                 if let Some((one, other)) = row_index(row).zip(row_index(row + 1)) {
                     for k in 0..columns {
-                        let shared = shared_ohm(resistances_ohm[one * columns + k], resistances_ohm[other * columns + k]);
+                        let shared =
+                            shared_ohm(resistances_ohm[one * columns + k], resistances_ohm[other * columns + k]);
                         resistances_ohm[one * columns + k] = shared;
                         resistances_ohm[other * columns + k] = shared;
                     }

@@ -38,8 +38,10 @@ pub(super) struct Evidence<'a> {
 
 /// Range of the logarithm of a reading, or of a gain, that is not known: from a seventh to sevenfold.
 const WIDTH: f64 = 4.0;
-/// Column-wires that are examined, those whose readings contradict the others most.
+/// Column-wires that are examined on all lines.
 const MOST_COLUMNS: usize = 8;
+/// Lines by which they are chosen.
+const WORST_LINES: usize = 4;
 
 /// Prediction of one reading without its column.
 #[derive(Clone, Copy)]
@@ -53,11 +55,16 @@ struct Predicted {
 impl Evidence<'_> {
     /// Returns the most probable fault and its χ².
     pub(super) fn compare(mut self) -> Option<(Diagnosis, f64)> {
-        let sound: Vec<Fitted> = (0..self.lines()).map(|line| self.fit(line, [None; 2], self.nodes_per_row)).collect();
+        let sound: Vec<Fitted> = (0..self.lines())
+            .map(|line| self.fit(line, [None; 2], self.nodes_per_row))
+            .collect();
         let mut hypotheses = Vec::new();
         self.add_rows(&sound, &mut hypotheses);
-        let suspects = self.suspects();
-        let left_out: Vec<ColumnLeftOut> = suspects.iter().map(|&column| self.leave_out([Some(column), None])).collect();
+        let suspects = self.suspects(&sound);
+        let left_out: Vec<ColumnLeftOut> = suspects
+            .iter()
+            .map(|&column| self.leave_out([Some(column), None]))
+            .collect();
         for (column, left_out) in suspects.iter().zip(&left_out) {
             self.add_column(*column, left_out, &mut hypotheses);
         }
@@ -93,7 +100,9 @@ impl Evidence<'_> {
     }
 
     fn log_readings(&self, column: usize) -> Vec<f64> {
-        (0..self.lines()).map(|line| self.readings_ohm(line)[column].ln()).collect()
+        (0..self.lines())
+            .map(|line| self.readings_ohm(line)[column].ln())
+            .collect()
     }
 
     fn fit(&mut self, line: usize, left_out: [Option<usize>; 2], nodes: usize) -> Fitted {
@@ -125,19 +134,28 @@ impl Evidence<'_> {
             };
             let wire = FaultyWire::Row(row);
             for before_node in 1..self.nodes_per_row {
-                let broken: Vec<Fitted> = lines.iter().map(|&line| self.fit(line, [None; 2], before_node)).collect();
+                let broken: Vec<Fitted> = lines
+                    .iter()
+                    .map(|&line| self.fit(line, [None; 2], before_node))
+                    .collect();
                 let broken = sum(&broken);
-                add(wire, FaultCause::Broken { before_node }, broken.score, broken.chi_squared);
+                add(
+                    wire,
+                    FaultCause::Broken { before_node },
+                    broken.score,
+                    broken.chi_squared,
+                );
             }
             let readings = lines.iter().flat_map(|&line| {
                 let pairs = self.readings_ohm(line).iter().enumerate();
                 pairs.map(move |(k, ohm)| (k, ohm.ln()))
             });
-            let level = Level::of(readings.map(|(k, misfit)| Predicted {
+            let readings = readings.map(|(k, misfit)| Predicted {
                 misfit,
                 variance: self.one.deviation(row, k).powi(2),
-            }));
-            add(wire, FaultCause::NoSignal, level.score, level.chi_squared);
+            });
+            let (score, chi_squared) = self.no_signal(readings);
+            add(wire, FaultCause::NoSignal, score, chi_squared);
             let unknown = 2.0 * WIDTH.ln() * (lines.len() * self.columns) as f64;
             add(wire, FaultCause::Unknown, unknown, 0.0);
             if let Some(next) = self.rows.iter().position(|&other| other == row + 1) {
@@ -181,18 +199,26 @@ impl Evidence<'_> {
         }
     }
 
-    /// The column-wires whose readings contradict the prediction of the others most, in ascending order.
-    fn suspects(&mut self) -> Vec<usize> {
-        let mut order: Vec<(f64, usize)> = (0..self.columns).map(|column| (0.0, column)).collect();
-        for line in 0..self.lines() {
-            self.fit(line, [None; 2], self.nodes_per_row);
-            for (contradiction, column) in &mut order {
-                *contradiction += self.one.contradiction(*column);
-            }
+    /// The column-wires without which Eq. (2) explains the worst lines of the last frame best, in ascending order.
+    fn suspects(&mut self, sound: &[Fitted]) -> Vec<usize> {
+        let mut lines: Vec<usize> = (self.lines() - self.rows.len()..self.lines()).collect();
+        lines.sort_by(|&a, &b| sound[b].chi_squared.total_cmp(&sound[a].chi_squared));
+        lines.truncate(WORST_LINES);
+        let mut order: Vec<(f64, usize)> = Vec::with_capacity(self.columns);
+        for column in 0..self.columns {
+            let fits = lines
+                .iter()
+                .map(|&line| self.fit(line, [Some(column), None], self.nodes_per_row));
+            order.push((fits.map(|fit| fit.chi_squared).sum(), column));
         }
-        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut suspects: Vec<usize> = order.iter().take(MOST_COLUMNS).map(|(_, column)| *column).collect();
+        // Two columns that touch hide behind each other: leaving one out does not help.
+        if let Some(&(_, best)) = order.first() {
+            suspects.extend([best.saturating_sub(1), (best + 1).min(self.columns - 1)]);
+        }
         suspects.sort_unstable();
+        suspects.dedup();
         suspects
     }
 }
@@ -215,7 +241,10 @@ impl Evidence<'_> {
         let mut slopes = vec![0.0; self.one.unknowns.len()];
         let mut others = slopes.clone();
         let mut found = ColumnLeftOut {
-            rest: Fitted { score: 0.0, chi_squared: 0.0 },
+            rest: Fitted {
+                score: 0.0,
+                chi_squared: 0.0,
+            },
             predicted: vec![Vec::new(); self.nodes_per_column],
             shared: Vec::new(),
             noise: Vec::new(),
@@ -235,7 +264,11 @@ impl Evidence<'_> {
                 } else {
                     self.one.broken_column((row, first, electrodes), &mut slopes)
                 };
-                let misfit = if self.one.is_clipped(log_reading, log_ohm) { 0.0 } else { log_reading - log_ohm };
+                let misfit = if self.one.is_clipped(log_reading, log_ohm) {
+                    0.0
+                } else {
+                    log_reading - log_ohm
+                };
                 let variance = noise + self.one.variance(&mut slopes);
                 predicted.push(Predicted { misfit, variance });
             }
@@ -252,6 +285,21 @@ impl Evidence<'_> {
             }
         }
         found
+    }
+
+    /// Score and χ² of logarithms of readings that do not depend on the deformation: all at the end of the converter's
+    /// range, which is certain without any current, or at another level.
+    fn no_signal(&self, readings: impl Iterator<Item = Predicted> + Clone) -> (f64, f64) {
+        let full_scale = self.one.log_full_scale();
+        if readings.clone().all(|reading| reading.misfit < full_scale) {
+            let level = Level::of(readings);
+            return (level.score, level.chi_squared);
+        }
+        let below = readings.filter(|reading| reading.misfit < full_scale);
+        let square = |reading: &Predicted| (reading.misfit - full_scale).powi(2) / reading.variance;
+        let chi_squared = below.clone().map(|reading| square(&reading)).sum::<f64>();
+        let noise: f64 = below.map(|reading| (TAU * reading.variance).ln()).sum();
+        (chi_squared + noise, chi_squared)
     }
 
     /// Faults of one column-wire.
@@ -274,8 +322,8 @@ impl Evidence<'_> {
         add(FaultCause::Gain { relative }, gain.score, gain.chi_squared);
         let readings = self.log_readings(column);
         let constant = readings.iter().zip(&left_out.noise);
-        let level = Level::of(constant.map(|(&misfit, &variance)| Predicted { misfit, variance }));
-        add(FaultCause::NoSignal, level.score, level.chi_squared);
+        let (score, chi_squared) = self.no_signal(constant.map(|(&misfit, &variance)| Predicted { misfit, variance }));
+        add(FaultCause::NoSignal, score, chi_squared);
         add(FaultCause::Unknown, 2.0 * WIDTH.ln() * readings.len() as f64, 0.0);
     }
 }
@@ -314,7 +362,10 @@ impl Level {
     fn of(values: impl Iterator<Item = Predicted> + Clone) -> Self {
         let precision: f64 = values.clone().map(|value| 1.0 / value.variance).sum();
         let mean = values.clone().map(|value| value.misfit / value.variance).sum::<f64>() / precision;
-        let chi_squared: f64 = values.clone().map(|value| (value.misfit - mean).powi(2) / value.variance).sum();
+        let chi_squared: f64 = values
+            .clone()
+            .map(|value| (value.misfit - mean).powi(2) / value.variance)
+            .sum();
         let noise: f64 = values.map(|value| (TAU * value.variance).ln()).sum();
         Self {
             mean,

@@ -119,7 +119,10 @@ impl FaultMonitor {
             return None;
         }
         self.sound = 0;
-        if self.named().is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire))) {
+        if self
+            .named()
+            .is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire)))
+        {
             self.suspicious = 0;
             return None;
         }
@@ -133,7 +136,11 @@ impl FaultMonitor {
         }
         let found = self.compare();
         let longest = LONGEST_WAIT * Self::PERSISTENCE;
-        let wait = if found.is_some() { Self::PERSISTENCE } else { (2 * self.next_comparison).min(longest) };
+        let wait = if found.is_some() {
+            Self::PERSISTENCE
+        } else {
+            (2 * self.next_comparison).min(longest)
+        };
         self.next_comparison = wait;
         self.suspicious = 0;
         let state = found.map_or(State::Unexplained, State::Named);

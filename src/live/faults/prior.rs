@@ -32,11 +32,19 @@ impl GaussianPrior {
 
     /// Means and covariances of the unknowns of `rows` in `scene`: those of the uniform distribution for random nodes,
     /// and estimated by draws for other loadings.
-    pub(in crate::live) fn of_rows(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Vec<Self> {
+    pub(in crate::live) fn of_rows(
+        model: &SensorModel,
+        scene: &Scene,
+        rows: &[usize],
+        rng: &mut impl Rng,
+    ) -> Vec<Self> {
         let ranges = ranges_mm(model, scene);
         if scene.loading == Loading::RandomNodes {
             // The standard deviation of a uniform distribution is its width/√12.
-            let deviations: Vec<f64> = ranges.iter().map(|(low, high)| (high - low) / 12.0_f64.sqrt()).collect();
+            let deviations: Vec<f64> = ranges
+                .iter()
+                .map(|(low, high)| (high - low) / 12.0_f64.sqrt())
+                .collect();
             return vec![Self::independent(&ranges, &deviations); rows.len()];
         }
         let sampler = scene.sampler(model);
@@ -69,7 +77,10 @@ impl GaussianPrior {
         }
         let mut cholesky = Cholesky::new(n);
         let is_positive = cholesky.factor(&covariance);
-        assert!(is_positive, "the smallest spread makes every covariance positive definite");
+        assert!(
+            is_positive,
+            "the smallest spread makes every covariance positive definite"
+        );
         let mut precision = vec![0.0; n * n];
         // The inverse is symmetric: its columns are its rows.
         for (i, column) in precision.chunks_exact_mut(n).enumerate() {
@@ -100,7 +111,13 @@ impl GaussianPrior {
 /// Lowest and highest value of every unknown of a row-wire in `scene`.
 pub(super) fn ranges_mm(model: &SensorModel, scene: &Scene) -> Vec<(f64, f64)> {
     let (stroke_mm, shift_mm) = (scene.stroke_mm(&model.geometry), scene.movement.largest_shift_mm());
-    let of_axis = |&axis: &usize| if axis == 2 { (0.0, stroke_mm) } else { (-shift_mm, shift_mm) };
+    let of_axis = |&axis: &usize| {
+        if axis == 2 {
+            (0.0, stroke_mm)
+        } else {
+            (-shift_mm, shift_mm)
+        }
+    };
     let axes = scene.movement.axes().indices();
     let nodes = 0..model.scale.nodes_per_row();
     nodes.flat_map(|_| axes.iter().map(of_axis)).collect()

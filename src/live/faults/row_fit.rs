@@ -94,7 +94,11 @@ impl RowFit {
         let mut deviations = Vec::with_capacity(scale.rows() * scale.columns());
         for row in 0..scale.rows() {
             let of_row = model.row_resistances(row, &half_way)?;
-            deviations.extend(of_row.iter().map(|&ohm| source.relative_to(ohm).own.max(SMALLEST_NOISE)));
+            deviations.extend(
+                of_row
+                    .iter()
+                    .map(|&ohm| source.relative_to(ohm).own.max(SMALLEST_NOISE)),
+            );
         }
         let one_row_mm = ranges_mm(model, scene);
         let unknowns = rows * one_row_mm.len() + usize::from(noise.drift > 0.0);
@@ -157,7 +161,11 @@ impl RowFit {
         let read = self.weights.iter().filter(|weight| **weight > 0.0);
         let noise: f64 = read.map(|weight| (TAU / weight).ln()).sum();
         let of_priors: f64 = view.rows.iter().map(|(_, prior)| prior.log_determinant).sum();
-        let of_gain = if self.common > 0.0 { -2.0 * self.common.ln() } else { 0.0 };
+        let of_gain = if self.common > 0.0 {
+            -2.0 * self.common.ln()
+        } else {
+            0.0
+        };
         Fitted {
             score: chi_squared + self.cholesky.log_determinant() - of_priors - of_gain + noise,
             chi_squared,
@@ -177,7 +185,11 @@ impl RowFit {
         // First sums s and their slopes, of all rows, then logarithms of the resistances g/s̄ with s̄ the mean.
         for (place, &(row, _)) in view.rows.iter().enumerate() {
             let unknowns = &self.unknowns[place * n..(place + 1) * n];
-            for (displacement, values) in self.displacements_mm.iter_mut().zip(unknowns.chunks_exact(self.axes.len())) {
+            for (displacement, values) in self
+                .displacements_mm
+                .iter_mut()
+                .zip(unknowns.chunks_exact(self.axes.len()))
+            {
                 for (&axis, &value) in self.axes.iter().zip(values) {
                     displacement[axis] = value;
                 }
@@ -192,7 +204,9 @@ impl RowFit {
                         }
                     };
                     let nodes = (row, 0..view.nodes);
-                    self.log_ohm[k] += self.model.partial_sum(nodes, (k, electrodes), &self.displacements_mm, add);
+                    self.log_ohm[k] += self
+                        .model
+                        .partial_sum(nodes, (k, electrodes), &self.displacements_mm, add);
                 }
             } else {
                 self.conductance.evaluate(&self.model, row, &self.displacements_mm);
@@ -206,14 +220,23 @@ impl RowFit {
         }
         let moving = view.rows.len() * n * columns;
         for slopes in self.slopes[..moving].chunks_exact_mut(columns) {
-            slopes.iter_mut().zip(&self.log_ohm).for_each(|(slope, sum)| *slope /= sum);
+            slopes
+                .iter_mut()
+                .zip(&self.log_ohm)
+                .for_each(|(slope, sum)| *slope /= sum);
         }
         // A gain error η adds to ln R.
         self.slopes[moving..].fill(-1.0);
-        let gain = if self.common > 0.0 { self.unknowns[view.rows.len() * n] } else { 0.0 };
+        let gain = if self.common > 0.0 {
+            self.unknowns[view.rows.len() * n]
+        } else {
+            0.0
+        };
         let per_row = self.model.resistivity_ohm_per_mm * view.rows.len() as f64;
-        self.log_ohm.iter_mut().for_each(|sum| *sum = (per_row / *sum).ln() + gain);
-        let log_full_scale = self.full_scale_ohm.ln();
+        self.log_ohm
+            .iter_mut()
+            .for_each(|sum| *sum = (per_row / *sum).ln() + gain);
+        let log_full_scale = self.log_full_scale();
         let share = 1.0 / (view.rows.len() as f64).sqrt();
         let deviations = &self.deviations[view.rows[0].0 * columns..];
         let mut chi_squared = self.misfit_of_prior(view);
@@ -259,7 +282,9 @@ impl RowFit {
             }
             // y = ln m − ln R has the slope of −ln R, which is what `slopes` has.
             let pairs = slopes.iter().zip(self.misfits.iter().zip(&self.weights));
-            self.step[i] = -pairs.map(|(slope, (misfit, weight))| slope * misfit * weight.sqrt()).sum::<f64>();
+            self.step[i] = -pairs
+                .map(|(slope, (misfit, weight))| slope * misfit * weight.sqrt())
+                .sum::<f64>();
         }
         for (place, (_, prior)) in view.rows.iter().enumerate() {
             for i in 0..n {
@@ -301,7 +326,11 @@ impl RowFit {
                     let width_mm = high_mm - low_mm;
                     let is_depth = self.axes[i % self.axes.len()] == 2;
                     let highest_mm = high_mm + width_mm;
-                    let highest_mm = if is_depth { highest_mm.min(deepest_mm(high_mm)) } else { highest_mm };
+                    let highest_mm = if is_depth {
+                        highest_mm.min(deepest_mm(high_mm))
+                    } else {
+                        highest_mm
+                    };
                     *unknown = unknown.clamp(low_mm - width_mm, highest_mm);
                 }
             }
@@ -314,20 +343,14 @@ impl RowFit {
         None
     }
 
-    /// Square of the misfit of a reading against what the others of the row predict, in proportion to its variance, after a
-    /// fit of one row-wire: y²/σ²/(1 − h), with h the leverage of the reading.
-    pub(super) fn contradiction(&mut self, column: usize) -> f64 {
-        let mut slopes = std::mem::take(&mut self.trial);
-        self.slopes_of(column, &mut slopes);
-        let leverage = self.weights[column] * self.variance(&mut slopes);
-        self.trial = slopes;
-        self.misfits[column].powi(2) / (1.0 - leverage).max(f64::EPSILON)
+    /// Logarithm of the reading from which on the converter clips.
+    pub(super) fn log_full_scale(&self) -> f64 {
+        self.full_scale_ohm.ln()
     }
 
     /// Returns `true` for a reading at the end of the converter's range of a resistance that is beyond it.
     pub(super) fn is_clipped(&self, log_reading: f64, log_ohm: f64) -> bool {
-        let log_full_scale = self.full_scale_ohm.ln();
-        log_reading >= log_full_scale && log_ohm >= log_full_scale
+        log_reading >= self.log_full_scale() && log_ohm >= self.log_full_scale()
     }
 
     /// Variance of ln R in a direction of the unknowns, given by its slopes; they are overwritten.
@@ -352,7 +375,9 @@ impl RowFit {
                 slopes[node * self.axes.len() + place] += slope[axis];
             }
         };
-        let sum = self.model.partial_sum(nodes, (column, 0..electrodes), &self.displacements_mm, add);
+        let sum = self
+            .model
+            .partial_sum(nodes, (column, 0..electrodes), &self.displacements_mm, add);
         slopes.iter_mut().for_each(|slope| *slope /= sum);
         let gain = match slopes.last_mut().zip(self.unknowns.last()) {
             Some((slope, gain)) if self.common > 0.0 => {
