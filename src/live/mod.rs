@@ -2,13 +2,15 @@
 //!
 //! A [`Source`] gives bytes, [`Lines`] their lines, and [`LineParser`] the readings in them. [`FaultMonitor`] watches
 //! whether Eq. (2) explains them and names the wire at fault; [`LeftOutDecoder`] decodes without it. [`Simulated`] needs
-//! no hardware.
+//! no hardware. [`ReZero`] takes the unloaded state from recent frames, and [`Recorder`] keeps frames for a replay.
 
 mod faults;
 mod latency;
 mod left_out_decoder;
 mod line_parser;
 mod lines;
+mod re_zero;
+mod recording;
 mod simulated;
 mod source;
 
@@ -17,5 +19,7 @@ pub use latency::Latencies;
 pub use left_out_decoder::LeftOutDecoder;
 pub use line_parser::{LineError, LineParser, ParsedLine};
 pub use lines::{Keeping, Line, Lines, NextLine};
+pub use re_zero::{ReZero, ReZeroError, ZeroGains};
+pub use recording::{Recorder, Recording, RecordingError};
 pub use simulated::{Simulated, SimulatedError};
 pub use source::{Source, SourceError};
