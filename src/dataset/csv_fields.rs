@@ -1,13 +1,25 @@
 use csv_core::{ReadRecordResult, Reader};
 
 /// Fields of one line of CSV, kept between lines so that none allocates.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct CsvFields {
     parser: Reader,
     text: Vec<u8>,
     /// End of each field in `text`.
     ends: Vec<usize>,
     count: usize,
+}
+
+impl Default for CsvFields {
+    fn default() -> Self {
+        Self {
+            // `Reader::default` has no tables.
+            parser: Reader::new(),
+            text: Vec::new(),
+            ends: Vec::new(),
+            count: 0,
+        }
+    }
 }
 
 impl CsvFields {

@@ -7,8 +7,10 @@
 mod faults;
 mod latency;
 mod left_out_decoder;
+mod line_batch;
 mod line_parser;
 mod lines;
+mod median_polish;
 mod re_zero;
 mod recording;
 mod simulated;

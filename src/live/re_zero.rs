@@ -1,6 +1,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::median_polish::{Polished, median};
+
 /// Takes the unloaded state from recent frames, without erasing a contact that is held.
 ///
 /// From each channel's median over the frames follows its ratio to the resistance at rest. Amplifiers and temperature change
@@ -75,8 +77,6 @@ pub enum ReZeroError {
     },
 }
 
-/// Rounds of median polish: two or three are enough.
-const ROUNDS: usize = 6;
 /// Median absolute deviation of a normal distribution, in standard deviations.
 const NORMAL_MAD: f64 = 0.674_489_750_196_081_7;
 /// Largest gain or loss that counts as a drift.
@@ -133,7 +133,7 @@ impl ReZero {
             of_rows,
             of_columns,
             rest,
-        } = polish(&ratios, self.columns);
+        } = Polished::new(&ratios, self.columns);
         // Mean and spread of what is left in each row, its own part included.
         let mean = |row: usize| {
             let of_row = &rest[row * self.columns..(row + 1) * self.columns];
@@ -218,55 +218,6 @@ impl ZeroGains {
             && self.gains.len() == rows * columns
             && self.in_contact.len() == rows
             && self.gains.iter().all(is_gain)
-    }
-}
-
-/// Values divided into a common part, one of each row and one of each column.
-struct Polished {
-    common: f64,
-    of_rows: Vec<f64>,
-    of_columns: Vec<f64>,
-    /// What remains: rows × columns.
-    rest: Vec<f64>,
-}
-
-fn polish(values: &[f64], columns: usize) -> Polished {
-    let rows = values.len() / columns;
-    let mut found = Polished {
-        common: 0.0,
-        of_rows: vec![0.0; rows],
-        of_columns: vec![0.0; columns],
-        rest: values.to_vec(),
-    };
-    for _ in 0..ROUNDS {
-        for column in 0..columns {
-            let shift = median((0..rows).map(|row| found.rest[row * columns + column]).collect());
-            (0..rows).for_each(|row| found.rest[row * columns + column] -= shift);
-            found.of_columns[column] += shift;
-        }
-        for row in 0..rows {
-            let of_row = &mut found.rest[row * columns..(row + 1) * columns];
-            let shift = median(of_row.to_vec());
-            of_row.iter_mut().for_each(|e| *e -= shift);
-            found.of_rows[row] += shift;
-        }
-        for parts in [&mut found.of_columns, &mut found.of_rows] {
-            let shift = median(parts.clone());
-            parts.iter_mut().for_each(|part| *part -= shift);
-            found.common += shift;
-        }
-    }
-    found
-}
-
-/// Median of values, which must not be empty.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        0.5 * (values[middle - 1] + values[middle])
-    } else {
-        values[middle]
     }
 }
 

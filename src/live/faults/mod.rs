@@ -6,6 +6,7 @@ mod evidence;
 mod monitor;
 mod prior;
 mod row_fit;
+mod row_prediction;
 
 pub use diagnosis::{Diagnosis, FaultCause, FaultyWire};
 pub use monitor::{FaultEvent, FaultMonitor};

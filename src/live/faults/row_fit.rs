@@ -26,23 +26,23 @@ use crate::{
 /// A gain error that the readings of a snapshot share is one more unknown. Nothing allocates after [`Self::new`].
 #[derive(Clone, Debug)]
 pub(in crate::live) struct RowFit {
-    model: SensorModel,
-    axes: &'static [usize],
+    pub(super) model: SensorModel,
+    pub(super) axes: &'static [usize],
     conductance: RowConductance,
     ranges_mm: Vec<(f64, f64)>,
     /// Standard deviation of each reading relative to it: rows of the array × M4.
     deviations: Vec<f64>,
     /// Standard deviation of the gain error of a row; 0 for none.
-    common: f64,
+    pub(super) common: f64,
     /// Reading from which on the converter clips.
-    full_scale_ohm: f64,
+    pub(super) full_scale_ohm: f64,
     /// Unknowns: of each row, then the common gain error.
     pub(super) unknowns: Vec<f64>,
-    displacements_mm: Vec<DVec3>,
+    pub(super) displacements_mm: Vec<DVec3>,
     /// ln R of every column.
     pub(super) log_ohm: Vec<f64>,
     /// −∂ ln R/∂u: unknowns × M4.
-    slopes: Vec<f64>,
+    pub(super) slopes: Vec<f64>,
     /// y/σ, 0 for readings that are left out.
     misfits: Vec<f64>,
     /// 1/σ², 0 for readings that are left out.
@@ -50,7 +50,7 @@ pub(in crate::live) struct RowFit {
     /// One row of slopes times weights.
     weighted: Vec<f64>,
     hessian: Vec<f64>,
-    cholesky: Cholesky,
+    pub(super) cholesky: Cholesky,
     step: Vec<f64>,
     trial: Vec<f64>,
 }
@@ -341,52 +341,6 @@ impl RowFit {
         }
         self.unknowns.copy_from_slice(&self.trial);
         None
-    }
-
-    /// Logarithm of the reading from which on the converter clips.
-    pub(super) fn log_full_scale(&self) -> f64 {
-        self.full_scale_ohm.ln()
-    }
-
-    /// Returns `true` for a reading at the end of the converter's range of a resistance that is beyond it.
-    pub(super) fn is_clipped(&self, log_reading: f64, log_ohm: f64) -> bool {
-        log_reading >= self.log_full_scale() && log_ohm >= self.log_full_scale()
-    }
-
-    /// Variance of ln R in a direction of the unknowns, given by its slopes; they are overwritten.
-    pub(super) fn variance(&self, slopes: &mut [f64]) -> f64 {
-        self.cholesky.solve_lower(slopes);
-        slopes.iter().map(|entry| entry * entry).sum()
-    }
-
-    /// Slopes of −ln R of a column by all unknowns, into `slopes`.
-    pub(super) fn slopes_of(&self, column: usize, slopes: &mut [f64]) {
-        let of_column = self.slopes.iter().skip(column).step_by(self.model.scale.columns());
-        slopes.iter_mut().zip(of_column).for_each(|(to, slope)| *to = *slope);
-    }
-
-    /// ln R of a column that is broken before node `electrodes`, with its slopes as in [`Self::slopes_of`], after a fit of
-    /// one row-wire.
-    pub(super) fn broken_column(&self, (row, column, electrodes): (usize, usize, usize), slopes: &mut [f64]) -> f64 {
-        slopes.fill(0.0);
-        let nodes = (row, 0..self.model.scale.nodes_per_row());
-        let add = |node: usize, slope: DVec3| {
-            for (place, &axis) in self.axes.iter().enumerate() {
-                slopes[node * self.axes.len() + place] += slope[axis];
-            }
-        };
-        let sum = self
-            .model
-            .partial_sum(nodes, (column, 0..electrodes), &self.displacements_mm, add);
-        slopes.iter_mut().for_each(|slope| *slope /= sum);
-        let gain = match slopes.last_mut().zip(self.unknowns.last()) {
-            Some((slope, gain)) if self.common > 0.0 => {
-                *slope = -1.0;
-                *gain
-            }
-            _ => 0.0,
-        };
-        (self.model.resistivity_ohm_per_mm / sum).ln() + gain
     }
 
     /// Coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the view, within the ranges of the scene.
