@@ -36,7 +36,7 @@ pub(super) struct Follow {
     ///
     /// --input is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line is a
     /// row-wire as without --follow, also with the number of the row before the resistances, or a whole snapshot, row by
-    /// row. From a file or pipe every line is decoded; from a port or socket the latest, once a line has waited for 20 ms.
+    /// row. From a file or pipe every line is decoded; from a port or socket the latest, once a line has waited for 0.1 s.
     /// Bad lines are counted and reported.
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,

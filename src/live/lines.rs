@@ -76,8 +76,9 @@ struct State {
 const CHUNK: usize = 1 << 14;
 
 impl Lines {
-    /// Time after which a waiting line is too old if only the latest count.
-    pub const PATIENCE: Duration = Duration::from_millis(20);
+    /// Time after which a waiting line is too old if only the latest count: longer than a busy machine lets a program wait
+    /// for its turn.
+    pub const PATIENCE: Duration = Duration::from_millis(100);
     /// Most bytes of a line, its line break included: 1 MiB, as of any file of readings.
     pub const LONGEST: usize = LONGEST_ROW as usize;
 
