@@ -89,9 +89,8 @@ fn a_file_or_pipe_gives_what_decode_gives() {
         "{report}"
     );
     // Without names, in turn; the numbers of rows are not needed.
-    let plain = device_lines(&folder)
-        .iter()
-        .map(|line| line.split_once(',').unwrap().1.to_owned());
+    let lines = device_lines(&folder);
+    let plain = lines.iter().map(|line| line.split_once(',').unwrap().1.to_owned());
     let mut child = spawn("decode --network n.json --follow", folder.path());
     child
         .stdin
