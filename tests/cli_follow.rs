@@ -290,6 +290,8 @@ fn a_serial_device_is_read_from_a_line_end_on() {
     let folder = trained("--rows known");
     let (mut device, port) = TTYPort::pair().unwrap();
     let name = port.name().unwrap();
+    // Without anybody at its other end a device cannot be written to.
+    let _held = fs::File::open(&name).unwrap();
     drop(port);
     let mut running = Running::new(
         &format!("decode --network n.json --follow --input {name}:115200"),

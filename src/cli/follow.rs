@@ -41,14 +41,14 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,
     /// With --follow: form of the answers [default: csv]
-    #[arg(long, value_name = "csv|jsonl", requires = "follow", hide_possible_values = true)]
+    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every so many seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", requires = "follow", value_parser = number)]
+    #[arg(long, value_name = "SECONDS", value_parser = number)]
     report: Option<f64>,
     /// With --follow: relative noise of the readings (standard deviation) by which faults are judged [default: that of the
     /// network's scene]
-    #[arg(long, value_name = "REL", requires = "follow", value_parser = number)]
+    #[arg(long, value_name = "REL", value_parser = number)]
     noise: Option<f64>,
 }
 
@@ -58,6 +58,19 @@ const WAIT: Duration = Duration::from_millis(100);
 const BETWEEN_CHECKS: Duration = Duration::from_millis(10);
 
 impl Follow {
+    /// Refuses arguments that only --follow uses.
+    pub(super) fn check_unused(&self) -> Result<(), Failure> {
+        let given = [
+            (self.format.is_some(), "--format"),
+            (self.report.is_some(), "--report"),
+            (self.noise.is_some(), "--noise"),
+        ];
+        match given.into_iter().find(|(is_given, _)| *is_given) {
+            Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
+            None => Ok(()),
+        }
+    }
+
     /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
     pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
         let input = input

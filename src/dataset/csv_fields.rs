@@ -26,7 +26,8 @@ impl CsvFields {
     /// Splits a line without its line break.
     pub(crate) fn split(&mut self, line: &[u8]) {
         self.parser.reset();
-        self.text.resize(self.text.len().max(line.len()), 0);
+        // Lines of like lengths need no further room.
+        self.text.resize(self.text.len().max(line.len().next_power_of_two()), 0);
         let (mut rest, mut written) = (line, 0);
         self.count = 0;
         loop {

@@ -133,6 +133,16 @@ impl Evidence<'_> {
                 });
             };
             let wire = FaultyWire::Row(row);
+            let readings = lines.iter().flat_map(|&line| {
+                let pairs = self.readings_ohm(line).iter().enumerate();
+                pairs.map(move |(k, ohm)| (k, ohm.ln()))
+            });
+            let readings = readings.map(|(k, misfit)| Predicted {
+                misfit,
+                variance: self.one.deviation(row, k).powi(2),
+            });
+            let (score, chi_squared) = self.no_signal(readings);
+            add(wire, FaultCause::NoSignal, score, chi_squared);
             for before_node in 1..self.nodes_per_row {
                 let broken: Vec<Fitted> = lines
                     .iter()
@@ -146,16 +156,6 @@ impl Evidence<'_> {
                     broken.chi_squared,
                 );
             }
-            let readings = lines.iter().flat_map(|&line| {
-                let pairs = self.readings_ohm(line).iter().enumerate();
-                pairs.map(move |(k, ohm)| (k, ohm.ln()))
-            });
-            let readings = readings.map(|(k, misfit)| Predicted {
-                misfit,
-                variance: self.one.deviation(row, k).powi(2),
-            });
-            let (score, chi_squared) = self.no_signal(readings);
-            add(wire, FaultCause::NoSignal, score, chi_squared);
             let unknown = 2.0 * WIDTH.ln() * (lines.len() * self.columns) as f64;
             add(wire, FaultCause::Unknown, unknown, 0.0);
             if let Some(next) = self.rows.iter().position(|&other| other == row + 1) {
@@ -226,8 +226,9 @@ impl Evidence<'_> {
 /// Fits of all lines without one or two columns, and what they predict of those.
 struct ColumnLeftOut {
     rest: Fitted,
-    /// The first column left out, unbroken and then broken before each node from 1 on; each for every line.
-    predicted: Vec<Vec<Predicted>>,
+    /// The first column left out, unbroken and then broken before each node from 1 on; each for every line. `None` where the
+    /// reading is certain, beyond the range of the converter.
+    predicted: Vec<Vec<Option<Predicted>>>,
     /// Mean conductance of both columns as ln R̂, with its variance without noise, for every line.
     shared: Vec<(f64, f64)>,
     /// Variance of the noise of the first column, for every line.
@@ -264,13 +265,10 @@ impl Evidence<'_> {
                 } else {
                     self.one.broken_column((row, first, electrodes), &mut slopes)
                 };
-                let misfit = if self.one.is_clipped(log_reading, log_ohm) {
-                    0.0
-                } else {
-                    log_reading - log_ohm
-                };
+                let is_certain = electrodes > 0 && self.one.is_clipped(log_reading, log_ohm);
                 let variance = noise + self.one.variance(&mut slopes);
-                predicted.push(Predicted { misfit, variance });
+                let misfit = log_reading - log_ohm;
+                predicted.push((!is_certain).then_some(Predicted { misfit, variance }));
             }
             if let Some(second) = second {
                 let logs = [self.one.log_ohm[first], self.one.log_ohm[second]];
@@ -312,18 +310,19 @@ impl Evidence<'_> {
                 chi_squared: left_out.rest.chi_squared + chi_squared,
             });
         };
-        for (before_node, predicted) in left_out.predicted.iter().enumerate().skip(1) {
-            let chi_squared: f64 = predicted.iter().map(|p| p.misfit * p.misfit / p.variance).sum();
-            let score = chi_squared + predicted.iter().map(|p| (TAU * p.variance).ln()).sum::<f64>();
-            add(FaultCause::Broken { before_node }, score, chi_squared);
-        }
-        let gain = Level::of(left_out.predicted[0].iter().copied());
-        let relative = gain.mean.exp() - 1.0;
-        add(FaultCause::Gain { relative }, gain.score, gain.chi_squared);
         let readings = self.log_readings(column);
         let constant = readings.iter().zip(&left_out.noise);
         let (score, chi_squared) = self.no_signal(constant.map(|(&misfit, &variance)| Predicted { misfit, variance }));
         add(FaultCause::NoSignal, score, chi_squared);
+        for (before_node, predicted) in left_out.predicted.iter().enumerate().skip(1) {
+            let predicted = predicted.iter().flatten();
+            let chi_squared: f64 = predicted.clone().map(|p| p.misfit * p.misfit / p.variance).sum();
+            let score = chi_squared + predicted.map(|p| (TAU * p.variance).ln()).sum::<f64>();
+            add(FaultCause::Broken { before_node }, score, chi_squared);
+        }
+        let gain = Level::of(left_out.predicted[0].iter().flatten().copied());
+        let relative = gain.mean.exp() - 1.0;
+        add(FaultCause::Gain { relative }, gain.score, gain.chi_squared);
         add(FaultCause::Unknown, 2.0 * WIDTH.ln() * readings.len() as f64, 0.0);
     }
 }
