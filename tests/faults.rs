@@ -176,7 +176,7 @@ fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
         ("open-row:4@3", row(3), FaultCause::Broken { before_node: 2 }),
         ("open-column:7", column(6), FaultCause::NoSignal),
         ("open-column:7@2", column(6), FaultCause::Broken { before_node: 1 }),
-        ("short-rows:5-6", FaultyWire::Rows(4), FaultCause::Shorted),
+        ("short-rows:1-2", FaultyWire::Rows(0), FaultCause::Shorted),
         ("short-columns:3-4", FaultyWire::Columns(2), FaultCause::Shorted),
         ("gain:11=0.05", column(10), FaultCause::Gain { relative: 0.05 }),
         ("gain:18=-0.19", column(17), FaultCause::Gain { relative: -0.19 }),
@@ -245,7 +245,7 @@ fn leaving_the_wire_out_brings_the_answer_back() {
     let (sensor, scene) = sensor_and_scene();
     for (text, gain) in [
         ("open-column:7", 1.5),
-        ("short-rows:5-6", 1.0),
+        ("short-rows:1-2", 1.0),
         ("gain:11=0.05", 1.5),
         ("stuck:2=low", 1.5),
     ] {

@@ -114,7 +114,7 @@ impl Decoder for LeftOutDecoder {
                 self.one.coordinates(row, 0, targets);
             }
             (Some(FaultyWire::Row(faulty)), _) if faulty == row && self.has_neighbours => {
-                self.interpolate(row_index, targets)
+                self.interpolate(row_index, targets);
             }
             (Some(FaultyWire::Row(faulty)), _) if faulty == row => {
                 self.one.set_to(prior);

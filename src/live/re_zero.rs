@@ -162,7 +162,7 @@ impl ReZero {
         };
         let gains: Vec<f64> = (0..ratios.len()).map(|index| log_gain(index).exp()).collect();
         let is_far = |gain: &f64| !(1.0 / LARGEST_GAIN..=LARGEST_GAIN).contains(gain);
-        if let Some(index) = gains.iter().position(|gain| is_far(gain)) {
+        if let Some(index) = gains.iter().position(is_far) {
             return Err(ReZeroError::Gain {
                 row: index / self.columns,
                 column: index % self.columns,
