@@ -100,13 +100,13 @@ impl Network {
                 .max_by(|&a, &b| system[a][pivot].abs().total_cmp(&system[b][pivot].abs()))
                 .unwrap();
             system.swap(pivot, best);
-            for row in 0..n {
-                if row != pivot {
-                    let factor = system[row][pivot] / system[pivot][pivot];
-                    for column in pivot..=n {
-                        system[row][column] -= factor * system[pivot][column];
-                    }
-                }
+            let of_pivot = system[pivot].clone();
+            for (_, equation) in system.iter_mut().enumerate().filter(|(row, _)| *row != pivot) {
+                let factor = equation[pivot] / of_pivot[pivot];
+                equation
+                    .iter_mut()
+                    .zip(&of_pivot)
+                    .for_each(|(entry, other)| *entry -= factor * other);
             }
         }
         (0..n).map(|i| system[i][n] / system[i][i]).collect()
