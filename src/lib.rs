@@ -14,6 +14,7 @@
 //! | [`decoupling`] | readings to deformation, every way we know, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
+//! | [`live`] | frames as they come: sources, re-zero, recorder, faults named from the residual |
 //! | `figure` | what a picture says, for the window and for print (feature `figures`) |
 //! | `export` | files for other programs (feature `files`); `export::bundle` writes networks (feature `bundle`), `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
@@ -107,6 +108,7 @@ pub mod evaluation;
 pub mod export;
 #[cfg(feature = "figures")]
 pub mod figure;
+pub mod live;
 pub mod network;
 pub mod scene;
 pub mod sensor;

@@ -5,10 +5,13 @@
 use decoupler::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{CompiledNetworks, Decoder, TakagiSugeno},
+    live::{
+        Diagnosis, FaultCause, FaultMonitor, FaultyWire, Latencies, LeftOutDecoder, LineParser, ParsedLine, Simulated,
+    },
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
     },
-    scene::{Noise, NoiseSource, RowModel, Scene},
+    scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
@@ -81,5 +84,45 @@ fn the_forward_model_and_its_jacobian_do_not_allocate() {
     for axes in [Axes::Z, Axes::Xyz] {
         let mut conductance = RowConductance::new(&model, axes);
         assert_eq!(allocations(|| conductance.evaluate(&model, 3, &pressed)), 0);
+    }
+}
+
+#[test]
+fn a_line_is_parsed_and_watched_for_faults_without_allocating() {
+    let (model, scene) = (
+        SensorModel::new("10x6_3x18".parse().unwrap()),
+        Scene {
+            noise: Noise::relative(1e-3),
+            rows: Rows::Known,
+            ..Scene::default()
+        },
+    );
+    let mut source = Simulated::new(&model, &scene, Seed(0), 10.0).unwrap();
+    let mut frame_ohm = vec![0.0; source.readings()];
+    let mut parser = LineParser::new(model.scale, scene.rows, true).unwrap();
+    let mut monitor = FaultMonitor::new(&model, &scene, source.rows()).unwrap();
+    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows()).unwrap();
+    decoder.leave_out(Some(Diagnosis {
+        wire: FaultyWire::Column(3),
+        cause: FaultCause::Unknown,
+        probability: 1.0,
+    }));
+    let mut answer_mm = vec![0.0; decoder.outputs()];
+    let mut latencies = Latencies::default();
+    for frame in 0..3 {
+        source.next_frame(&mut frame_ohm).unwrap();
+        let line = frame_ohm.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let found = allocations(|| {
+            let ParsedLine::Snapshot(readings_ohm) = parser.parse(frame + 1, line.as_bytes()).unwrap() else {
+                panic!("a snapshot is parsed");
+            };
+            assert_eq!(monitor.check(readings_ohm), None);
+            decoder
+                .decode_row(4, &readings_ohm[4 * 18..5 * 18], &mut answer_mm)
+                .unwrap();
+            latencies.add(std::time::Duration::from_micros(7));
+        });
+        // The first line shows how many fields there are.
+        assert!(frame == 0 || found == 0, "{frame}: {found}");
     }
 }

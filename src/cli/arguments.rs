@@ -52,7 +52,10 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
         Err(failure) if !failure.is_broken_pipe() => {
             // Nobody is left to tell if this fails.
             let _ = match &failure {
-                Failure::Interrupted(_) | Failure::InterruptedTrials { .. } | Failure::InterruptedTrade { .. } => {
+                Failure::Interrupted(_)
+                | Failure::InterruptedTrials { .. }
+                | Failure::InterruptedTrade { .. }
+                | Failure::InterruptedFollow => {
                     writeln!(stderr(), "{failure}")
                 }
                 _ => writeln!(stderr(), "error: {failure}"),
@@ -119,8 +122,8 @@ mod tests {
     #[test]
     fn endless_values_are_cut_in_messages() {
         let long = "1".repeat(5000);
-        let error = Arguments::try_parse_from(["decoupler", "simulate", "--array", &long]).unwrap_err();
-        let line = one_line(&error);
+        let error = Arguments::try_parse_from(["decoupler", "simulate", "--array", &long]);
+        let line = one_line(&error.err().unwrap());
         assert!(line.contains("is not an array scale") && line.len() < 500, "{line}");
     }
 

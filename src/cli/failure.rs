@@ -12,7 +12,9 @@ use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
     export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError},
+    live::{LineError, Source, SourceError},
     scene::Rows,
+    sensor::SensorError,
     training::SettingError,
 };
 
@@ -49,6 +51,18 @@ pub(super) enum Failure {
     },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
+    #[error("interrupted")]
+    InterruptedFollow,
+    #[error(transparent)]
+    Source(SourceError),
+    #[error("cannot start to read: {}", system_cause(.0))]
+    Reader(io::Error),
+    #[error("{input} is lost: {}; connect it again", system_cause(.source))]
+    Lost { input: Source, source: io::Error },
+    #[error("{0}: {1}")]
+    Line(Source, LineError),
+    #[error(transparent)]
+    Sensor(SensorError),
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -120,9 +134,10 @@ impl Failure {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
-            Self::Interrupted(_) | Self::InterruptedTrials { .. } | Self::InterruptedTrade { .. } => {
-                interruption::STATUS
-            }
+            Self::Interrupted(_)
+            | Self::InterruptedTrials { .. }
+            | Self::InterruptedTrade { .. }
+            | Self::InterruptedFollow => interruption::STATUS,
             _ => 1,
         }
     }

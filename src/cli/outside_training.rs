@@ -32,33 +32,41 @@ impl OutsideTraining {
     ) -> LineOutside {
         let (inputs, outputs) = (network.inputs(), network.outputs());
         let range = inputs.range();
-        let readings = range.map(|range| range.outside(inputs.quantity(), readings_ohm).collect::<Vec<_>>());
-        let coordinates: Vec<usize> = outputs.far_outside(coordinates_mm).collect();
+        let outside = || {
+            range
+                .into_iter()
+                .flat_map(|range| range.outside(inputs.quantity(), readings_ohm))
+        };
+        let far_outside = || outputs.far_outside(coordinates_mm);
+        let of_line = LineOutside {
+            readings: range.map(|_| outside().count()),
+            coordinates: far_outside().count(),
+        };
         self.lines += 1;
-        let first_reading = readings
-            .iter()
-            .flatten()
-            .next()
-            .copied()
-            .zip(range)
-            .map(|(channel, range)| {
-                let limits = range.extremes(channel);
-                described(&format!("r_{}", channel + 1), readings_ohm[channel], "ohm", limits)
+        if of_line.readings.unwrap_or(0) + of_line.coordinates == 0 {
+            return of_line;
+        }
+        self.outside += 1;
+        if self.told.len() < MOST_TOLD {
+            let first_reading = outside().next().zip(range).map(|(channel, range)| {
+                let name = format!("r_{}", channel + 1);
+                described(&name, readings_ohm[channel], "ohm", range.extremes(channel))
             });
-        let first_coordinate = coordinates.first().map(|&channel| {
-            let name = format!("{}_{}", ["x", "y", "z"][channel % 3], channel / 3 + 1);
-            described(&name, coordinates_mm[channel], "mm", outputs.extremes(channel))
-        });
-        if let Some(first) = first_reading.or(first_coordinate) {
-            self.outside += 1;
-            if self.told.len() < MOST_TOLD {
+            let first_coordinate = || {
+                let channel = far_outside().next()?;
+                let name = format!("{}_{}", ["x", "y", "z"][channel % 3], channel / 3 + 1);
+                Some(described(
+                    &name,
+                    coordinates_mm[channel],
+                    "mm",
+                    outputs.extremes(channel),
+                ))
+            };
+            if let Some(first) = first_reading.or_else(first_coordinate) {
                 self.told.push(format!("line {line}: {first}"));
             }
         }
-        LineOutside {
-            readings: readings.map(|readings| readings.len()),
-            coordinates: coordinates.len(),
-        }
+        of_line
     }
 
     /// Warns of the lines on standard error.

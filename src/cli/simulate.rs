@@ -16,6 +16,7 @@ use crate::{
     decoupling::{Decoder, Precision, decode_set},
     evaluation::{DecoderSet, Run, RunError, SimulatedSettings, Simulation, error_remarks},
     export::{AtomicFile, WriteError, write_samples, write_samples_header},
+    scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
 };
 
@@ -40,6 +41,11 @@ pub(super) struct Simulate {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
+    /// Fault of a wire or of the electronics, as it shows in the readings: open-row:ROW or open-column:COLUMN (broken at
+    /// the connector, or with @NODE before that node), short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL (an
+    /// amplifier's error), stuck:COLUMN=low|high (a converter at an end of its range)
+    #[arg(long, value_name = "FAULT")]
+    fault: Option<Fault>,
     #[command(flatten)]
     scene: SceneArguments,
     /// File to write instead of standard output
@@ -69,6 +75,15 @@ impl Simulate {
         settings.seed = Seed(self.seed);
         let (Simulation { sensor, scene, .. }, seed) = (&settings.source, settings.seed);
         let rows = scene.rows.read(self.array.rows()).map_err(SimulationError::from)?;
+        let faulty = match self.fault {
+            Some(fault) => {
+                fault
+                    .check(self.array, &rows)
+                    .map_err(|error| Failure::Arguments(format!("--fault: {error}")))?;
+                Some(FaultySensor::new(sensor, scene.noise.in_test(), fault).map_err(Failure::Sensor)?)
+            }
+            None => None,
+        };
         let mut decoder = self.decoder(&settings)?;
         let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
         let snapshots = self.samples.div_ceil(rows.len());
@@ -76,8 +91,14 @@ impl Simulate {
         for first in (0..snapshots).step_by(BLOCK) {
             let samples = BLOCK.min(snapshots - first) * rows.len();
             let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
+            if let Some(faulty) = &faulty {
+                set.break_before_noise(faulty);
+            }
             set.disturb(sensor, &scene.noise.in_test(), &mut noise_rng)
                 .map_err(RunError::from)?;
+            if let Some(faulty) = &faulty {
+                set.break_after_noise(faulty);
+            }
             let decoded_mm = match &mut decoder {
                 Some(decoder) => Some(decode_set(&mut **decoder, &set).map_err(RunError::from)?),
                 None => None,

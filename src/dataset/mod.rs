@@ -5,9 +5,11 @@
 //! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`] and [`Folds`]
 //! divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
 
+mod csv_fields;
 mod folds;
 mod frames;
 mod per_row;
+mod resistance_columns;
 mod resistance_reader;
 mod samples;
 mod seed;
@@ -15,9 +17,12 @@ mod simulation;
 mod split;
 mod system_error;
 
+pub(crate) use csv_fields::CsvFields;
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError};
 pub use per_row::PerRow;
+pub(crate) use resistance_columns::ResistanceColumns;
+pub(crate) use resistance_reader::LONGEST_ROW;
 pub use resistance_reader::{ReadError, Reading, ResistanceReader};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};

@@ -1,36 +1,34 @@
 use std::io::{self, BufRead, Read};
 
-use csv::{ByteRecord, ReaderBuilder};
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::system_cause;
+use super::{
+    csv_fields::CsvFields,
+    resistance_columns::{ResistanceColumns, number},
+    system_cause,
+};
 
 /// Reads resistances from CSV block by block, so that large files need little memory.
 ///
 /// The file has columns named `r_1` to `r_M4`, in any order and among others, or M4 columns without names.
 pub struct ResistanceReader<R> {
     rows: Rows<R>,
-    /// Column index of each resistance, in the order r_1 to r_M4.
-    columns: Vec<usize>,
-    /// Column index of `row`, if there is such a column.
-    row_column: Option<usize>,
+    channels: usize,
+    columns: ResistanceColumns,
     /// Number of row-wires of the array, if row-wires are to be read.
     row_wires: Option<usize>,
-    /// Number of columns in the file.
-    width: usize,
     /// `true` if the current row was already read while looking for names.
     waiting: bool,
 }
 
-/// Rows of a CSV file with their line numbers. The reader of `csv` would miscount where lines are empty, so it is given
-/// one line at a time.
+/// Rows of a CSV file with their line numbers.
 struct Rows<R> {
     source: R,
     text: Vec<u8>,
     /// Line number of the current row, from 1.
     line: u64,
-    record: ByteRecord,
+    fields: CsvFields,
 }
 
 /// A block of rows of resistances.
@@ -101,7 +99,7 @@ pub enum ReadError {
 }
 
 /// Most bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes some 100 kB.
-const LONGEST_ROW: u64 = 1 << 20;
+pub(crate) const LONGEST_ROW: u64 = 1 << 20;
 
 impl<R: BufRead> Rows<R> {
     /// Advances to the next row that is not blank; returns `false` at the end.
@@ -130,10 +128,7 @@ impl<R: BufRead> Rows<R> {
             if text.contains(&b'\r') {
                 return Err(ReadError::LineBreak(self.line));
             }
-            let mut row = ReaderBuilder::new();
-            let mut row = row.has_headers(false).buffer_capacity(text.len()).from_reader(text);
-            row.read_byte_record(&mut self.record).map_err(io::Error::from)?;
-            self.record.trim();
+            self.fields.split(text);
             return Ok(true);
         }
     }
@@ -149,27 +144,24 @@ impl<R: BufRead> ResistanceReader<R> {
             source,
             text: Vec::new(),
             line: 0,
-            record: ByteRecord::new(),
+            fields: CsvFields::default(),
         };
         if !rows.advance()? {
             return Err(ReadError::Empty);
         }
-        let record = &rows.record;
-        let names: Vec<Option<usize>> = record.iter().map(|name| channel_of(name, channels)).collect();
-        let has_names = names.iter().any(Option::is_some) || record.iter().all(|field| number(field).is_none());
-        let width = record.len();
-        let row_column = record.iter().position(|name| name == b"row").filter(|_| has_names);
+        let fields = &rows.fields;
+        let has_names =
+            ResistanceColumns::has_name(fields, channels) || fields.iter().all(|field| number(field).is_none());
         let columns = if has_names {
-            named_columns(&names, channels)?
+            ResistanceColumns::named(fields, channels)?
         } else {
-            (0..channels).collect()
+            ResistanceColumns::unnamed(channels, false)
         };
         Ok(Self {
             rows,
+            channels,
             columns,
-            row_column,
             row_wires: None,
-            width: if has_names { width } else { channels },
             waiting: !has_names,
         })
     }
@@ -188,20 +180,23 @@ impl<R: BufRead> ResistanceReader<R> {
     /// # Errors
     /// If the file cannot be read, or a row is malformed.
     pub fn read(&mut self, most: usize) -> Result<Option<Reading>, ReadError> {
-        let mut resistances_ohm = Vec::with_capacity(most * self.columns.len());
+        let mut resistances_ohm = Vec::with_capacity(most * self.channels);
         let mut lines = Vec::new();
-        let mut row_wires = self.row_column.and(self.row_wires).map(|_| Vec::new());
+        let of_array = self.row_wires.filter(|_| self.columns.has_row());
+        let mut row_wires = of_array.map(|_| Vec::new());
         while lines.len() < most && (self.waiting || self.rows.advance()?) {
             self.waiting = false;
-            lines.push(self.parse(&mut resistances_ohm)?);
-            if let Some(row_wires) = &mut row_wires {
-                row_wires.extend(self.parse_row_wire()?);
+            let Rows { line, ref fields, .. } = self.rows;
+            self.columns.read(line, fields, &mut resistances_ohm)?;
+            lines.push(line);
+            if let Some((row_wires, rows)) = row_wires.as_mut().zip(of_array) {
+                row_wires.extend(self.columns.row_wire(line, fields, rows)?);
             }
         }
         if lines.is_empty() {
             return Ok(None);
         }
-        let shape = (lines.len(), self.columns.len());
+        let shape = (lines.len(), self.channels);
         let resistances_ohm = Array2::from_shape_vec(shape, resistances_ohm).expect("every row has M4 values");
         Ok(Some(Reading {
             resistances_ohm,
@@ -209,75 +204,6 @@ impl<R: BufRead> ResistanceReader<R> {
             row_wires,
         }))
     }
-
-    /// Appends the resistances of the current row and returns its line number.
-    fn parse(&self, resistances_ohm: &mut Vec<f64>) -> Result<u64, ReadError> {
-        let Rows { line, ref record, .. } = self.rows;
-        let (found, expected) = (record.len(), self.width);
-        if found != expected {
-            return Err(ReadError::Width { line, found, expected });
-        }
-        for &column in &self.columns {
-            let field = &record[column];
-            let value = number(field).filter(|ohm| *ohm > 0.0 && ohm.is_finite());
-            resistances_ohm.push(value.ok_or_else(|| ReadError::Value {
-                line,
-                column: column + 1,
-                text: excerpt(field),
-            })?);
-        }
-        Ok(line)
-    }
-
-    /// Returns the row-wire of the current row, from 0, if requested and given in the file.
-    fn parse_row_wire(&self) -> Result<Option<usize>, ReadError> {
-        let Some((column, rows)) = self.row_column.zip(self.row_wires) else {
-            return Ok(None);
-        };
-        let field = &self.rows.record[column];
-        let number: Option<usize> = std::str::from_utf8(field).ok().and_then(|text| text.parse().ok());
-        match number.filter(|number| (1..=rows).contains(number)) {
-            Some(number) => Ok(Some(number - 1)),
-            None => Err(ReadError::RowWire {
-                line: self.rows.line,
-                column: column + 1,
-                text: excerpt(field),
-                rows,
-            }),
-        }
-    }
-}
-
-/// Returns the text of a field, shortened to 40 characters for a message, control characters escaped.
-fn excerpt(field: &[u8]) -> String {
-    let text: String = String::from_utf8_lossy(field).chars().take(40).collect();
-    if text.contains(char::is_control) {
-        text.escape_debug().to_string()
-    } else {
-        text
-    }
-}
-
-fn number(field: &[u8]) -> Option<f64> {
-    std::str::from_utf8(field).ok()?.trim().parse().ok()
-}
-
-/// Returns k for a column named `r_k`, with k from 1 to `channels`.
-fn channel_of(name: &[u8], channels: usize) -> Option<usize> {
-    let number = std::str::from_utf8(name).ok()?.strip_prefix("r_")?;
-    number.parse().ok().filter(|channel| (1..=channels).contains(channel))
-}
-
-fn named_columns(names: &[Option<usize>], channels: usize) -> Result<Vec<usize>, ReadError> {
-    let column = |channel| {
-        let mut places = (0..names.len()).filter(|&place| names[place] == Some(channel));
-        let place = places.next().ok_or(ReadError::Missing(channel, channels))?;
-        match places.next() {
-            Some(_) => Err(ReadError::Twice(channel)),
-            None => Ok(place),
-        }
-    };
-    (1..=channels).map(column).collect()
 }
 
 #[cfg(test)]

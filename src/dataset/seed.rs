@@ -30,6 +30,10 @@ pub enum Stream {
     TestNoise = 6,
     /// Draws that estimate an expectation, such as the mean and covariance of a scene.
     Expectation = 7,
+    /// Path of the simulated live source.
+    Live = 8,
+    /// Noise of the simulated live source.
+    LiveNoise = 9,
 }
 
 /// Stream of the random initialisations after the first: this number plus the number of the initialisation.

@@ -75,8 +75,11 @@ pub(crate) fn write_decoded(
     writer: &mut dyn Write,
 ) -> io::Result<()> {
     write_numbers(coordinates_mm, writer)?;
-    let count = readings_outside.map_or_else(String::new, |count| count.to_string());
-    writeln!(writer, ",{count},{coordinates_outside}")
+    write!(writer, ",")?;
+    if let Some(count) = readings_outside {
+        write!(writer, "{count}")?;
+    }
+    writeln!(writer, ",{coordinates_outside}")
 }
 
 /// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name after `before`.

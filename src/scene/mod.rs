@@ -1,6 +1,7 @@
 //! The scene: rows read, movement, loading and noise. Nothing that does not vary in the scene is modelled further on.
 
 mod deformation;
+mod fault;
 mod loading;
 mod movement;
 mod noise;
@@ -9,6 +10,7 @@ mod relative_noise;
 mod rows;
 
 pub use deformation::Deformation;
+pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
 pub use loading::{DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
 pub use noise::{Noise, NoiseSource, NoisySets};

@@ -119,6 +119,19 @@ impl Noise {
         }))
     }
 
+    /// The lowest and the highest reading of the converter, or of one of 16 bits if there is none.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance.
+    pub(crate) fn range_ohm(&self, model: &SensorModel) -> Result<(f64, f64), SensorError> {
+        let digitised = Self {
+            converter_bits: self.converter_bits.or(Some(16)),
+            ..*self
+        };
+        let range = |Converter { step_ohm, steps }| (step_ohm, step_ohm * steps);
+        Ok(digitised.converter(model)?.map_or((0.0, f64::INFINITY), range))
+    }
+
     /// Prepares to disturb readings of `model`.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ mod conductance;
 mod fixed_point;
 mod geometry;
 mod identifiability;
+mod partial_sum;
 mod reciprocal_distances;
 mod resistance;
 mod short_number;

@@ -1,9 +1,12 @@
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::press::{Body, Press};
-use crate::{scene::SceneError, sensor::SensorModel};
+use crate::{
+    scene::{Deformation, SceneError},
+    sensor::SensorModel,
+};
 
 /// A body pressed somewhere onto the surface: place, depth, size, direction and tilt are drawn for each snapshot.
 ///
@@ -171,6 +174,26 @@ impl Indenter {
             IndenterShape::Edge { largest_tilt_degrees } => (slope(largest_tilt_degrees), Body::Edge),
         };
         Press::new(body, place, depth_mm, direction, slope, self.spread_mm)
+    }
+}
+
+impl Indenter {
+    /// Deformation of the array when the indenter of middle size, upright, presses `depth_mm` deep at (x, y); a cylinder
+    /// or an edge along y.
+    pub(crate) fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
+        let middle = |span: Span| 0.5 * (span.smallest + span.largest);
+        let body = match self.shape {
+            IndenterShape::Sphere { radius_mm } => Body::Sphere(middle(radius_mm)),
+            IndenterShape::FlatPunch { radius_mm, .. } => Body::FlatPunch(middle(radius_mm)),
+            IndenterShape::Cylinder { radius_mm, .. } => Body::Cylinder(middle(radius_mm)),
+            IndenterShape::Edge { .. } => Body::Edge,
+        };
+        let press = Press::new(body, place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm);
+        Deformation::from_fn(model.scale, |row, node| {
+            let rest_mm = model.geometry.row_node_mm(model.scale, row, node);
+            let depth_at_mm = press.depth_at_mm(rest_mm.x, rest_mm.y);
+            DVec3::Z * depth_at_mm.clamp(0.0, depth_mm)
+        })
     }
 }
 

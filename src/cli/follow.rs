@@ -1,0 +1,161 @@
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use clap::{Args, ValueEnum};
+
+use super::{
+    failure::Failure, follow_answers::Answers, follow_faults::Faults, follow_report::Report, interruption::Graceful,
+    parsers::number,
+};
+use crate::{
+    dataset::SimulationError,
+    export::NetworkFile,
+    live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
+};
+
+/// Form of the answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum Form {
+    /// Lines of CSV in the columns of decode.
+    #[default]
+    Csv,
+    /// One JSON object a line.
+    Jsonl,
+}
+
+// Decoding of frames as they come.
+#[derive(Args)]
+pub(super) struct Follow {
+    /// Decode frames as they come, each answer written to standard output at once
+    ///
+    /// --input is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line is a
+    /// row-wire as without --follow, also with the number of the row before the resistances, or a whole snapshot, row by
+    /// row. From a file or pipe every line is decoded; from a port or socket the latest, once a line has waited for 0.1 s.
+    /// Bad lines are counted and reported.
+    #[arg(long, conflicts_with = "output")]
+    pub(super) follow: bool,
+    /// With --follow: form of the answers [default: csv]
+    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
+    format: Option<Form>,
+    /// With --follow: report rate and latency on standard error every so many seconds; always at the end, and on SIGUSR1
+    #[arg(long, value_name = "SECONDS", value_parser = number)]
+    report: Option<f64>,
+    /// With --follow: relative noise of the readings (standard deviation) by which faults are judged [default: that of the
+    /// network's scene]
+    #[arg(long, value_name = "REL", value_parser = number)]
+    noise: Option<f64>,
+}
+
+/// Longest wait for a line between looks at requests for a report and for the end.
+const WAIT: Duration = Duration::from_millis(100);
+/// Shortest time between checks for faults of frames from a device, so that they cost no frame.
+const BETWEEN_CHECKS: Duration = Duration::from_millis(10);
+
+impl Follow {
+    /// Refuses arguments that only --follow uses.
+    pub(super) fn check_unused(&self) -> Result<(), Failure> {
+        let given = [
+            (self.format.is_some(), "--format"),
+            (self.report.is_some(), "--report"),
+            (self.noise.is_some(), "--noise"),
+        ];
+        match given.into_iter().find(|(is_given, _)| *is_given) {
+            Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
+            None => Ok(()),
+        }
+    }
+
+    /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
+    pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
+        let input = input
+            .to_str()
+            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
+        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
+        if self.report.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
+            return Err(wrong("--report", "give a number of seconds above 0"));
+        }
+        let keeping = source.keeping();
+        let (scene, scale) = (&file.settings.source.scene, file.settings.source.sensor.scale);
+        let mut parser = LineParser::new(scale, scene.rows, keeping == Keeping::All).map_err(SimulationError::from)?;
+        let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
+        let mut faults = Faults::new(&file.settings.source, self.noise)?;
+        let asked = Arc::new(AtomicBool::new(false));
+        // Without the signal there are still reports every so often and at the end.
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
+        let opened = source.open().map_err(Failure::Source)?;
+        let mut lines = Lines::spawn(opened, keeping, source.begins_anywhere()).map_err(Failure::Reader)?;
+        lines.set_kept(answers.rows());
+        let graceful = Graceful::begin();
+        let mut report = Report::new(source);
+        let every = self.report.map(Duration::from_secs_f64);
+        let mut checked: Option<Instant> = None;
+        let end = loop {
+            if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
+                report.tell(lines.dropped());
+            }
+            if graceful.is_end_requested() {
+                break Err(Failure::InterruptedFollow);
+            }
+            let line = match lines.next(WAIT) {
+                NextLine::Line(line) => line,
+                NextLine::None => continue,
+                NextLine::End(Some(error)) => {
+                    let input = report.source().clone();
+                    break Err(Failure::Lost { input, source: error });
+                }
+                NextLine::End(None) => break Ok(()),
+            };
+            let (number, read_at) = (line.number, line.read_at);
+            let Some(text) = line.text else {
+                parser.count_bad();
+                report.bad(&format_args!(
+                    "line {number}: it is longer than {} bytes",
+                    Lines::LONGEST
+                ));
+                continue;
+            };
+            let parsed = match parser.parse(number, text) {
+                Ok(ParsedLine::NoReadings) => continue,
+                Ok(parsed) => parsed,
+                Err(error @ LineError::NoRow(_)) => break Err(Failure::Line(report.source().clone(), error)),
+                Err(error) => {
+                    report.bad(&error);
+                    continue;
+                }
+            };
+            match answers.write(number, parsed, faults.left_out()) {
+                Ok(true) => report.good(read_at.elapsed()),
+                Ok(false) => {
+                    report.bad(&format_args!(
+                        "line {number}: resistances so far from the training range that the network has no answer"
+                    ));
+                    continue;
+                }
+                Err(error) => break Err(Failure::Output(error)),
+            }
+            let is_snapshot = matches!(parsed, ParsedLine::Snapshot(_));
+            let is_due = checked.is_none_or(|checked| checked.elapsed() >= BETWEEN_CHECKS);
+            if faults.take(number, parsed) && (keeping == Keeping::All || is_due) {
+                faults.check(number);
+                checked = Some(Instant::now());
+            }
+            if is_snapshot {
+                lines.set_kept(1);
+            }
+        };
+        report.tell(lines.dropped());
+        answers.warn();
+        end
+    }
+}
+
+fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {
+    Failure::Arguments(format!("{argument}: {reason}"))
+}

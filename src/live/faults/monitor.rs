@@ -1,0 +1,209 @@
+use super::{
+    diagnosis::{Diagnosis, FaultyWire},
+    evidence::Evidence,
+    prior::GaussianPrior,
+    row_fit::{RowFit, View},
+};
+use crate::{
+    scene::Scene,
+    sensor::{SensorError, SensorModel},
+};
+
+/// Watches whether Eq. (2) explains the frames, and names the wire at fault if it does not.
+///
+/// A frame is suspicious if no deformation explains its readings: if the smallest χ² of all rows, by weak priors, exceeds
+/// the value that a sound frame exceeds with a probability of at most 10⁻³. At the true deformation χ² of the readings is
+/// that of their noise, with as many degrees of freedom as readings, and the smallest is never more. When
+/// [`FaultMonitor::PERSISTENCE`] frames in a row are suspicious, the faults that a single wire can have are compared by
+/// their evidence. One is named if its probability is at least [`FaultMonitor::SURE`] and it explains these frames by the
+/// same measure.
+///
+/// Checking a sound frame allocates nothing.
+#[derive(Clone, Debug)]
+pub struct FaultMonitor {
+    one: RowFit,
+    two: RowFit,
+    prior: GaussianPrior,
+    rows: Vec<usize>,
+    columns: usize,
+    nodes_per_row: usize,
+    nodes_per_column: usize,
+    /// χ² of the priors at the worst deformation within the ranges.
+    of_priors: f64,
+    state: State,
+    /// Suspicious frames in a row, each rows × M4.
+    suspicious_ohm: Vec<f64>,
+    /// Number of suspicious frames in a row, stored or not.
+    suspicious: usize,
+    /// Number of suspicious frames at which faults are compared again.
+    next_comparison: usize,
+    /// Number of frames in a row without any fault.
+    sound: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    Sound,
+    Named(Diagnosis),
+    Unexplained,
+}
+
+/// What a frame has made known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultEvent {
+    /// A fault is named: its wires should be left out.
+    Named(Diagnosis),
+    /// The readings contradict Eq. (2), and no fault of a single wire explains them.
+    Unexplained,
+    /// The readings agree with Eq. (2) again.
+    Recovered,
+}
+
+/// Normal deviate that is exceeded with a probability of 10⁻³.
+const DEVIATE: f64 = 3.090_232_306_167_814;
+/// Largest factor of [`FaultMonitor::PERSISTENCE`] between comparisons of frames that nothing explains.
+const LONGEST_WAIT: usize = 1024;
+
+impl FaultMonitor {
+    /// Frames in a row that must be suspicious for a fault to be named, or sound for it to be forgotten.
+    pub const PERSISTENCE: usize = 4;
+    /// Smallest probability at which a fault is named.
+    pub const SURE: f64 = 0.99;
+
+    /// Prepares to check frames of `rows`, with the noise of `scene`, which must have some.
+    ///
+    /// # Errors
+    /// A sensor without resistances.
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
+        let (one, scale) = (RowFit::new(model, scene, 1)?, model.scale);
+        Ok(Self {
+            two: RowFit::new(model, scene, 2)?,
+            prior: GaussianPrior::weak(model, scene),
+            rows: rows.to_vec(),
+            columns: scale.columns(),
+            nodes_per_row: scale.nodes_per_row(),
+            nodes_per_column: scale.nodes_per_column(),
+            // Unknowns within their ranges are at most half a width from the middle.
+            of_priors: 0.25 * (rows.len() * scene.unknowns_per_row(scale)) as f64,
+            state: State::Sound,
+            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * rows.len() * scale.columns()),
+            suspicious: 0,
+            next_comparison: Self::PERSISTENCE,
+            sound: 0,
+            one,
+        })
+    }
+
+    /// Returns the fault that is named at present.
+    pub fn named(&self) -> Option<Diagnosis> {
+        match self.state {
+            State::Named(diagnosis) => Some(diagnosis),
+            State::Sound | State::Unexplained => None,
+        }
+    }
+
+    /// Checks a frame of the row-wires read: rows × M4 readings in ohm, all finite and above 0.
+    ///
+    /// # Panics
+    /// If the frame has another length.
+    pub fn check(&mut self, frame_ohm: &[f64]) -> Option<FaultEvent> {
+        assert_eq!(frame_ohm.len(), self.rows.len() * self.columns);
+        if self.is_explained(frame_ohm, None) {
+            self.suspicious = 0;
+            self.sound += 1;
+            if self.sound == Self::PERSISTENCE && self.state != State::Sound {
+                self.state = State::Sound;
+                self.next_comparison = Self::PERSISTENCE;
+                return Some(FaultEvent::Recovered);
+            }
+            return None;
+        }
+        self.sound = 0;
+        if self
+            .named()
+            .is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire)))
+        {
+            self.suspicious = 0;
+            return None;
+        }
+        if self.suspicious.is_multiple_of(Self::PERSISTENCE) {
+            self.suspicious_ohm.clear();
+        }
+        self.suspicious_ohm.extend_from_slice(frame_ohm);
+        self.suspicious += 1;
+        if self.suspicious < self.next_comparison {
+            return None;
+        }
+        let found = self.compare();
+        let longest = LONGEST_WAIT * Self::PERSISTENCE;
+        let wait = if found.is_some() {
+            Self::PERSISTENCE
+        } else {
+            (2 * self.next_comparison).min(longest)
+        };
+        self.next_comparison = wait;
+        self.suspicious = 0;
+        let state = found.map_or(State::Unexplained, State::Named);
+        let is_known = std::mem::replace(&mut self.state, state) == state;
+        let event = found.map_or(FaultEvent::Unexplained, FaultEvent::Named);
+        (!is_known).then_some(event)
+    }
+
+    /// Returns `true` if some deformation explains the readings without those of `left_out`.
+    fn is_explained(&mut self, frame_ohm: &[f64], left_out: Option<FaultyWire>) -> bool {
+        let limit = quantile(frame_ohm.len(), DEVIATE) + self.of_priors;
+        let mut chi_squared = 0.0;
+        for (&row, readings_ohm) in self.rows.iter().zip(frame_ohm.chunks_exact(self.columns)) {
+            if left_out.is_some_and(|wire| wire.is_row(row)) {
+                continue;
+            }
+            let fitted = self.one.solve(View {
+                rows: &[(row, &self.prior)],
+                readings_ohm,
+                left_out: left_out.map_or([None; 2], FaultyWire::columns),
+                nodes: self.nodes_per_row,
+            });
+            chi_squared += fitted.chi_squared;
+        }
+        chi_squared <= limit
+    }
+
+    /// The fault behind the last suspicious frames, if a single one explains them.
+    fn compare(&mut self) -> Option<Diagnosis> {
+        let evidence = Evidence {
+            one: &mut self.one,
+            two: &mut self.two,
+            prior: &self.prior,
+            rows: &self.rows,
+            columns: self.columns,
+            nodes_per_row: self.nodes_per_row,
+            nodes_per_column: self.nodes_per_column,
+            frames_ohm: &self.suspicious_ohm,
+        };
+        let (diagnosis, chi_squared) = evidence.compare()?;
+        let limit = quantile(self.suspicious_ohm.len(), DEVIATE) + Self::PERSISTENCE as f64 * self.of_priors;
+        (diagnosis.probability >= Self::SURE && chi_squared <= limit).then_some(diagnosis)
+    }
+}
+
+/// Quantile of the χ² distribution at a normal deviate (Wilson and Hilferty, "The distribution of chi-square", PNAS 17,
+/// 1931).
+fn quantile(degrees_of_freedom: usize, deviate: f64) -> f64 {
+    let d = degrees_of_freedom as f64;
+    let spread = 2.0 / (9.0 * d);
+    d * (1.0 - spread + deviate * spread.sqrt()).powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Critical values of the NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.4.
+    #[test]
+    fn quantiles_are_those_of_tables() {
+        for (degrees_of_freedom, expected) in [(30, 59.703), (100, 149.449)] {
+            let found = quantile(degrees_of_freedom, DEVIATE);
+            assert!((found / expected - 1.0).abs() < 3e-3, "{degrees_of_freedom}: {found}");
+        }
+    }
+}

@@ -1,0 +1,360 @@
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::{
+    cholesky::Cholesky,
+    prior::{GaussianPrior, ranges_mm},
+};
+use crate::{
+    scene::Scene,
+    sensor::{RowConductance, SensorError, SensorModel},
+};
+
+/// The most probable deformation of a row-wire, or of two that touch, given its readings, and the evidence for them.
+///
+/// With y_k = ln m_k − ln R_k(u) the misfit of reading m_k, noise of standard deviation σ relative to the reading, and a
+/// Gaussian prior with mean μ and precision P, it minimises
+///
+/// `χ²(u) = Σ_k y_k²/σ_k² + (u − μ)ᵀ P (u − μ)`
+///
+/// by the Gauss-Newton method. The evidence, the probability of the readings whatever the deformation, follows from
+/// Laplace's approximation (MacKay, "Bayesian interpolation", Neural Computation 4, 1992):
+///
+/// `−2 ln p(m) = χ²(û) + ln det H − ln det P + Σ_k ln 2πσ_k²,   H = P + Σ_k ∇y_k ∇y_kᵀ/σ_k²`.
+///
+/// A gain error that the readings of a snapshot share is one more unknown. Nothing allocates after [`Self::new`].
+#[derive(Clone, Debug)]
+pub(in crate::live) struct RowFit {
+    pub(super) model: SensorModel,
+    pub(super) axes: &'static [usize],
+    conductance: RowConductance,
+    ranges_mm: Vec<(f64, f64)>,
+    /// Standard deviation of each reading relative to it: rows of the array × M4.
+    deviations: Vec<f64>,
+    /// Standard deviation of the gain error of a row; 0 for none.
+    pub(super) common: f64,
+    /// Reading from which on the converter clips.
+    pub(super) full_scale_ohm: f64,
+    /// Unknowns: of each row, then the common gain error.
+    pub(super) unknowns: Vec<f64>,
+    pub(super) displacements_mm: Vec<DVec3>,
+    /// ln R of every column.
+    pub(super) log_ohm: Vec<f64>,
+    /// −∂ ln R/∂u: unknowns × M4.
+    pub(super) slopes: Vec<f64>,
+    /// y/σ, 0 for readings that are left out.
+    misfits: Vec<f64>,
+    /// 1/σ², 0 for readings that are left out.
+    weights: Vec<f64>,
+    /// One row of slopes times weights.
+    weighted: Vec<f64>,
+    hessian: Vec<f64>,
+    pub(super) cholesky: Cholesky,
+    step: Vec<f64>,
+    trial: Vec<f64>,
+}
+
+/// Readings of one row-wire, or the geometric means of those of two that touch, and how they are understood.
+#[derive(Clone, Copy)]
+pub(in crate::live) struct View<'a> {
+    /// Row-wires with their priors: one, or two that touch.
+    pub(in crate::live) rows: &'a [(usize, &'a GaussianPrior)],
+    /// Readings in ohm: M4.
+    pub(in crate::live) readings_ohm: &'a [f64],
+    /// Column-wires that are left out.
+    pub(in crate::live) left_out: [Option<usize>; 2],
+    /// Nodes of the row-wire before its break; M2 if it has none.
+    pub(in crate::live) nodes: usize,
+}
+
+/// Fit of one row-wire.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::live) struct Fitted {
+    /// −2 ln of the probability density of the logarithms of the readings.
+    pub(super) score: f64,
+    /// Smallest χ².
+    pub(super) chi_squared: f64,
+}
+
+/// Noise below which none is assumed: the model is no better.
+const SMALLEST_NOISE: f64 = 1e-6;
+/// Decrease of χ² that is not worth a step.
+const TOLERANCE: f64 = 1e-2;
+const MOST_STEPS: usize = 12;
+const MOST_HALVINGS: usize = 6;
+
+impl RowFit {
+    /// Room for fits of `rows` row-wires together, 1 or 2.
+    pub(in crate::live) fn new(model: &SensorModel, scene: &Scene, rows: usize) -> Result<Self, SensorError> {
+        let scale = model.scale;
+        let noise = scene.noise.in_test();
+        let source = noise.source(model)?;
+        let half_way = vec![DVec3::Z * (0.5 * scene.stroke_mm(&model.geometry)); scale.nodes_per_row()];
+        let mut deviations = Vec::with_capacity(scale.rows() * scale.columns());
+        for row in 0..scale.rows() {
+            let of_row = model.row_resistances(row, &half_way)?;
+            deviations.extend(
+                of_row
+                    .iter()
+                    .map(|&ohm| source.relative_to(ohm).own.max(SMALLEST_NOISE)),
+            );
+        }
+        let one_row_mm = ranges_mm(model, scene);
+        let unknowns = rows * one_row_mm.len() + usize::from(noise.drift > 0.0);
+        Ok(Self {
+            model: *model,
+            axes: scene.movement.axes().indices(),
+            conductance: RowConductance::new(model, scene.movement.axes()),
+            ranges_mm: one_row_mm,
+            deviations,
+            // The rows of a snapshot, which are fitted one by one, share it: together they must not be charged for it more
+            // than once.
+            common: noise.drift * (scale.rows() as f64).sqrt(),
+            full_scale_ohm: noise.range_ohm(model)?.1 * (1.0 - 1e-9),
+            unknowns: vec![0.0; unknowns],
+            displacements_mm: vec![DVec3::ZERO; scale.nodes_per_row()],
+            log_ohm: vec![0.0; scale.columns()],
+            slopes: vec![0.0; unknowns * scale.columns()],
+            misfits: vec![0.0; scale.columns()],
+            weights: vec![0.0; scale.columns()],
+            weighted: vec![0.0; scale.columns()],
+            hessian: vec![0.0; unknowns * unknowns],
+            cholesky: Cholesky::new(unknowns),
+            step: vec![0.0; unknowns],
+            trial: vec![0.0; unknowns],
+        })
+    }
+
+    /// Standard deviation of a reading relative to it.
+    pub(super) fn deviation(&self, row: usize, column: usize) -> f64 {
+        self.deviations[row * self.model.scale.columns() + column]
+    }
+
+    /// Finds the most probable deformation.
+    pub(in crate::live) fn solve(&mut self, view: View<'_>) -> Fitted {
+        let n = self.ranges_mm.len();
+        for (unknowns, (_, prior)) in self.unknowns.chunks_exact_mut(n).zip(view.rows) {
+            unknowns.copy_from_slice(&prior.mean_mm);
+        }
+        if self.common > 0.0
+            && let Some(gain) = self.unknowns.last_mut()
+        {
+            *gain = 0.0;
+        }
+        let mut chi_squared = self.evaluate(view);
+        for _ in 0..MOST_STEPS {
+            self.find_step(view);
+            let decrease: f64 = self.step.iter().map(|entry| entry * entry).sum();
+            // ½ gᵀH⁻¹g is the decrease of χ²/2 that the linearised equations promise.
+            if decrease < TOLERANCE {
+                break;
+            }
+            self.cholesky.solve_upper(&mut self.step);
+            let Some(next) = self.take_step(view, chi_squared) else {
+                self.evaluate(view);
+                self.find_step(view);
+                break;
+            };
+            chi_squared = next;
+        }
+        let read = self.weights.iter().filter(|weight| **weight > 0.0);
+        let noise: f64 = read.map(|weight| (TAU / weight).ln()).sum();
+        let of_priors: f64 = view.rows.iter().map(|(_, prior)| prior.log_determinant).sum();
+        let of_gain = if self.common > 0.0 {
+            -2.0 * self.common.ln()
+        } else {
+            0.0
+        };
+        Fitted {
+            score: chi_squared + self.cholesky.log_determinant() - of_priors - of_gain + noise,
+            chi_squared,
+        }
+    }
+
+    /// Takes the mean of a prior for the answer, where no reading tells anything.
+    pub(in crate::live) fn set_to(&mut self, prior: &GaussianPrior) {
+        self.unknowns[..prior.mean_mm.len()].copy_from_slice(&prior.mean_mm);
+    }
+
+    /// Evaluates misfits and slopes at the unknowns; returns χ².
+    fn evaluate(&mut self, view: View<'_>) -> f64 {
+        let (n, columns) = (self.ranges_mm.len(), self.model.scale.columns());
+        self.slopes.fill(0.0);
+        self.log_ohm.fill(0.0);
+        // First sums s and their slopes, of all rows, then logarithms of the resistances g/s̄ with s̄ the mean.
+        for (place, &(row, _)) in view.rows.iter().enumerate() {
+            let unknowns = &self.unknowns[place * n..(place + 1) * n];
+            for (displacement, values) in self
+                .displacements_mm
+                .iter_mut()
+                .zip(unknowns.chunks_exact(self.axes.len()))
+            {
+                for (&axis, &value) in self.axes.iter().zip(values) {
+                    displacement[axis] = value;
+                }
+            }
+            let slopes = &mut self.slopes[place * n * columns..(place + 1) * n * columns];
+            if view.nodes < self.model.scale.nodes_per_row() {
+                for k in 0..columns {
+                    let electrodes = 0..self.model.scale.nodes_per_column();
+                    let add = |node: usize, slope: DVec3| {
+                        for (place, &axis) in self.axes.iter().enumerate() {
+                            slopes[(node * self.axes.len() + place) * columns + k] += slope[axis];
+                        }
+                    };
+                    let nodes = (row, 0..view.nodes);
+                    self.log_ohm[k] += self
+                        .model
+                        .partial_sum(nodes, (k, electrodes), &self.displacements_mm, add);
+                }
+            } else {
+                self.conductance.evaluate(&self.model, row, &self.displacements_mm);
+                for (total, sum) in self.log_ohm.iter_mut().zip(self.conductance.sums()) {
+                    *total += sum;
+                }
+                for (unknown, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
+                    slopes.copy_from_slice(self.conductance.derivatives(unknown));
+                }
+            }
+        }
+        let moving = view.rows.len() * n * columns;
+        for slopes in self.slopes[..moving].chunks_exact_mut(columns) {
+            slopes
+                .iter_mut()
+                .zip(&self.log_ohm)
+                .for_each(|(slope, sum)| *slope /= sum);
+        }
+        // A gain error η adds to ln R.
+        self.slopes[moving..].fill(-1.0);
+        let gain = if self.common > 0.0 {
+            self.unknowns[view.rows.len() * n]
+        } else {
+            0.0
+        };
+        let per_row = self.model.resistivity_ohm_per_mm * view.rows.len() as f64;
+        self.log_ohm
+            .iter_mut()
+            .for_each(|sum| *sum = (per_row / *sum).ln() + gain);
+        let log_full_scale = self.log_full_scale();
+        let share = 1.0 / (view.rows.len() as f64).sqrt();
+        let deviations = &self.deviations[view.rows[0].0 * columns..];
+        let mut chi_squared = self.misfit_of_prior(view);
+        for (k, (misfit, reading)) in self.misfits.iter_mut().zip(view.readings_ohm).enumerate() {
+            let log_reading = reading.ln();
+            let is_clipped = log_reading >= log_full_scale && self.log_ohm[k] >= log_full_scale;
+            let is_read = !(view.left_out.contains(&Some(k)) || is_clipped);
+            let inverse = if is_read { 1.0 / (share * deviations[k]) } else { 0.0 };
+            *misfit = (log_reading - self.log_ohm[k]) * inverse;
+            self.weights[k] = inverse * inverse;
+            chi_squared += *misfit * *misfit;
+        }
+        chi_squared
+    }
+
+    fn misfit_of_prior(&self, view: View<'_>) -> f64 {
+        let n = self.ranges_mm.len();
+        let mut total = 0.0;
+        for (unknowns, (_, prior)) in self.unknowns.chunks_exact(n).zip(view.rows) {
+            for (i, precision) in prior.precision.chunks_exact(n).enumerate() {
+                let pairs = precision.iter().zip(unknowns.iter().zip(&prior.mean_mm));
+                let product: f64 = pairs.map(|(p, (u, mean))| p * (u - mean)).sum();
+                total += (unknowns[i] - prior.mean_mm[i]) * product;
+            }
+        }
+        match self.unknowns.last() {
+            Some(gain) if self.common > 0.0 => total + (gain / self.common).powi(2),
+            _ => total,
+        }
+    }
+
+    /// Linearises where the misfits were evaluated: factors H, and sets the step to L⁻¹ of the gradient of −χ²/2.
+    fn find_step(&mut self, view: View<'_>) {
+        let (n, columns, order) = (self.ranges_mm.len(), self.model.scale.columns(), self.unknowns.len());
+        for i in 0..order {
+            let slopes = &self.slopes[i * columns..(i + 1) * columns];
+            for (weighted, (slope, weight)) in self.weighted.iter_mut().zip(slopes.iter().zip(&self.weights)) {
+                *weighted = slope * weight;
+            }
+            for j in 0..=i {
+                let others = &self.slopes[j * columns..(j + 1) * columns];
+                self.hessian[i * order + j] = self.weighted.iter().zip(others).map(|(a, b)| a * b).sum();
+            }
+            // y = ln m − ln R has the slope of −ln R, which is what `slopes` has.
+            let pairs = slopes.iter().zip(self.misfits.iter().zip(&self.weights));
+            self.step[i] = -pairs
+                .map(|(slope, (misfit, weight))| slope * misfit * weight.sqrt())
+                .sum::<f64>();
+        }
+        for (place, (_, prior)) in view.rows.iter().enumerate() {
+            for i in 0..n {
+                let at = place * n + i;
+                for j in 0..n {
+                    let precision = prior.precision[i * n + j];
+                    if j <= i {
+                        self.hessian[at * order + place * n + j] += precision;
+                    }
+                    self.step[at] -= precision * (self.unknowns[place * n + j] - prior.mean_mm[j]);
+                }
+            }
+        }
+        if self.common > 0.0 {
+            let last = order - 1;
+            self.hessian[last * order + last] += self.common.powi(-2);
+            self.step[last] -= self.unknowns[last] * self.common.powi(-2);
+        }
+        if self.cholesky.factor(&self.hessian) {
+            self.cholesky.solve_lower(&mut self.step);
+        } else {
+            self.step.fill(0.0);
+        }
+    }
+
+    /// Takes the step, halved until χ² falls below `chi_squared`, which is returned; `None` leaves the unknowns where they
+    /// were. No node leaves the ranges by more than their width, nor comes near a column-wire.
+    fn take_step(&mut self, view: View<'_>, chi_squared: f64) -> Option<f64> {
+        let (n, moving) = (self.ranges_mm.len(), view.rows.len() * self.ranges_mm.len());
+        self.trial.copy_from_slice(&self.unknowns);
+        let height_mm = self.model.geometry.height_mm;
+        let deepest_mm = |high_mm: f64| 0.5 * (high_mm + height_mm);
+        for halving in 0..MOST_HALVINGS {
+            let share = 0.5_f64.powi(i32::try_from(halving).unwrap_or(0));
+            for (i, unknown) in self.unknowns.iter_mut().enumerate() {
+                *unknown = self.trial[i] + share * self.step[i];
+                if i < moving {
+                    let (low_mm, high_mm) = self.ranges_mm[i % n];
+                    let width_mm = high_mm - low_mm;
+                    let is_depth = self.axes[i % self.axes.len()] == 2;
+                    let highest_mm = high_mm + width_mm;
+                    let highest_mm = if is_depth {
+                        highest_mm.min(deepest_mm(high_mm))
+                    } else {
+                        highest_mm
+                    };
+                    *unknown = unknown.clamp(low_mm - width_mm, highest_mm);
+                }
+            }
+            let next = self.evaluate(view);
+            if next < chi_squared {
+                return Some(next);
+            }
+        }
+        self.unknowns.copy_from_slice(&self.trial);
+        None
+    }
+
+    /// Coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the view, within the ranges of the scene.
+    pub(in crate::live) fn coordinates(&self, row: usize, place: usize, coordinates_mm: &mut [f64]) {
+        let n = self.ranges_mm.len();
+        let unknowns = self.unknowns[place * n..(place + 1) * n].chunks_exact(self.axes.len());
+        let ranges = self.ranges_mm.chunks_exact(self.axes.len());
+        let nodes = coordinates_mm.chunks_exact_mut(3).zip(unknowns.zip(ranges)).enumerate();
+        for (node, (coordinates_mm, (unknowns, ranges))) in nodes {
+            let mut displacement = DVec3::ZERO;
+            for (&axis, (unknown, (low, high))) in self.axes.iter().zip(unknowns.iter().zip(ranges)) {
+                displacement[axis] = unknown.clamp(*low, *high);
+            }
+            coordinates_mm.copy_from_slice(&self.model.displaced_mm(row, node, displacement).to_array());
+        }
+    }
+}

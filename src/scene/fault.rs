@@ -1,0 +1,327 @@
+use std::{fmt, str::FromStr};
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::{Deformation, Noise};
+use crate::sensor::{ArrayScale, SensorError, SensorModel, short};
+
+/// A fault of the wires or of the electronics.
+///
+/// The readout drives one row-wire, holds the others at ground, and measures the current of each column-wire at virtual
+/// ground, so that a reading has the nodes between its own two wires only. Wires are connected at their first node.
+/// Beyond a break a wire floats, and its nodes carry no current into an amplifier. Two wires that touch share what drives
+/// or measures them, in equal parts: both read 2/(1/R + 1/R′).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// A row-wire is broken before its node `before_node`, counted from 0; at its connector if that is 0.
+    OpenRow {
+        /// Row-wire, from 0.
+        row: usize,
+        /// First node that is cut off.
+        before_node: usize,
+    },
+    /// A column-wire is broken before its node `before_node`, counted from 0; at its connector if that is 0.
+    OpenColumn {
+        /// Column-wire, from 0.
+        column: usize,
+        /// First node that is cut off.
+        before_node: usize,
+    },
+    /// Row-wires `row` and `row` + 1 touch.
+    ShortedRows {
+        /// First of the two, from 0.
+        row: usize,
+    },
+    /// Column-wires `column` and `column` + 1 touch.
+    ShortedColumns {
+        /// First of the two, from 0.
+        column: usize,
+    },
+    /// The gain of a column-wire's amplifier is off: its readings are 1 + `relative` times the resistances.
+    Gain {
+        /// Column-wire, from 0.
+        column: usize,
+        /// Relative error of its readings, above −1.
+        relative: f64,
+    },
+    /// The converter of a column-wire is stuck at an end of its range.
+    Stuck {
+        /// Column-wire, from 0.
+        column: usize,
+        /// End at which it is stuck.
+        end: ConverterEnd,
+    },
+}
+
+/// An end of a converter's range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConverterEnd {
+    /// Its first step.
+    Low,
+    /// Its full scale, as without any current.
+    High,
+}
+
+/// Error in the description of a fault.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FaultError {
+    /// Not the description of a fault.
+    #[error(
+        "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
+         short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
+    )]
+    Text(String),
+    /// The array, or the scene, has no such wire or node.
+    #[error("there is no {what} {number}; give 1 to {last}")]
+    Number {
+        /// Kind of wire or node.
+        what: &'static str,
+        /// Its number, from 1.
+        number: usize,
+        /// The largest number.
+        last: usize,
+    },
+    /// A gain out of range.
+    #[error("the error of the gain is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
+    GainRange(f64),
+    /// The scene does not read a row-wire of the fault.
+    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
+    NotRead(usize),
+}
+
+impl FromStr for Fault {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        let unknown = || FaultError::Text(text.to_owned());
+        let number = |text: &str| match text.parse::<usize>() {
+            Ok(number @ 1..) => Ok(number - 1),
+            _ => Err(unknown()),
+        };
+        let place = |text: &str| match text.split_once('@') {
+            Some((wire, node)) => Ok((number(wire)?, number(node)?)),
+            None => Ok((number(text)?, 0)),
+        };
+        let pair = |text: &str| {
+            let (first, second) = text.split_once('-').ok_or_else(unknown)?;
+            let (first, second) = (number(first)?, number(second)?);
+            if second == first + 1 { Ok(first) } else { Err(unknown()) }
+        };
+        let (kind, rest) = text.trim().split_once(':').ok_or_else(unknown)?;
+        let value = || rest.split_once('=').ok_or_else(unknown);
+        match kind {
+            "open-row" => place(rest).map(|(row, before_node)| Self::OpenRow { row, before_node }),
+            "open-column" => place(rest).map(|(column, before_node)| Self::OpenColumn { column, before_node }),
+            "short-rows" => pair(rest).map(|row| Self::ShortedRows { row }),
+            "short-columns" => pair(rest).map(|column| Self::ShortedColumns { column }),
+            "gain" => {
+                let (column, relative) = value()?;
+                let relative: f64 = relative.parse().map_err(|_| unknown())?;
+                if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
+                    let column = number(column)?;
+                    Ok(Self::Gain { column, relative })
+                } else {
+                    Err(FaultError::GainRange(relative))
+                }
+            }
+            "stuck" => {
+                let (column, end) = value()?;
+                let end = match end {
+                    "low" => ConverterEnd::Low,
+                    "high" => ConverterEnd::High,
+                    _ => return Err(unknown()),
+                };
+                let column = number(column)?;
+                Ok(Self::Stuck { column, end })
+            }
+            _ => Err(unknown()),
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OpenRow { row, before_node } => write!(f, "open-row:{}@{}", row + 1, before_node + 1),
+            Self::OpenColumn { column, before_node } => write!(f, "open-column:{}@{}", column + 1, before_node + 1),
+            Self::ShortedRows { row } => write!(f, "short-rows:{}-{}", row + 1, row + 2),
+            Self::ShortedColumns { column } => write!(f, "short-columns:{}-{}", column + 1, column + 2),
+            Self::Gain { column, relative } => write!(f, "gain:{}={relative}", column + 1),
+            Self::Stuck { column, end } => {
+                let end = match end {
+                    ConverterEnd::Low => "low",
+                    ConverterEnd::High => "high",
+                };
+                write!(f, "stuck:{}={end}", column + 1)
+            }
+        }
+    }
+}
+
+impl Fault {
+    /// Checks that an array has the wires and nodes of this fault, and that the row-wires are among those `read`.
+    ///
+    /// # Errors
+    /// The first wire or node that is missing.
+    pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
+        let within = |what, index: usize, count: usize| {
+            if index < count {
+                return Ok(());
+            }
+            Err(FaultError::Number {
+                what,
+                number: index + 1,
+                last: count,
+            })
+        };
+        let is_read = |row: usize| {
+            within("row-wire", row, scale.rows())?;
+            if read.contains(&row) {
+                Ok(())
+            } else {
+                Err(FaultError::NotRead(row + 1))
+            }
+        };
+        match self {
+            Self::OpenRow { row, before_node } => {
+                is_read(row)?;
+                within("node on a row-wire", before_node, scale.nodes_per_row())
+            }
+            Self::OpenColumn { column, before_node } => {
+                within("column-wire", column, scale.columns())?;
+                within("node on a column-wire", before_node, scale.nodes_per_column())
+            }
+            Self::ShortedRows { row } => is_read(row).and_then(|()| is_read(row + 1)),
+            Self::ShortedColumns { column } => within("column-wire", column + 1, scale.columns()),
+            Self::Gain { column, .. } | Self::Stuck { column, .. } => within("column-wire", column, scale.columns()),
+        }
+    }
+}
+
+/// A fault in the readings of one array: what it does to resistances before their noise, and to readings after it.
+#[derive(Clone, Debug)]
+pub struct FaultySensor {
+    model: SensorModel,
+    fault: Fault,
+    /// Ends of the converter's range. A scene without a converter has one of 16 bits for this purpose.
+    range_ohm: (f64, f64),
+}
+
+impl FaultySensor {
+    /// Prepares `fault` in an array with this noise. The converter reads up to twice the largest resistance at rest, as
+    /// that of the noise does.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance.
+    pub fn new(model: &SensorModel, noise: Noise, fault: Fault) -> Result<Self, SensorError> {
+        Ok(Self {
+            model: *model,
+            fault,
+            range_ohm: noise.range_ohm(model)?,
+        })
+    }
+
+    /// The deformation of coordinates in mm, 3·M2 of each row-wire; at rest where there are none.
+    pub(crate) fn deformation<'a>(&self, coordinates_mm: impl Fn(usize) -> Option<&'a [f64]>) -> Deformation {
+        Deformation::from_fn(self.model.scale, |row, node| {
+            coordinates_mm(row).map_or(DVec3::ZERO, |coordinates_mm| {
+                let position_mm = DVec3::from_slice(&coordinates_mm[3 * node..]);
+                self.model.displacement_mm(row, node, position_mm)
+            })
+        })
+    }
+
+    /// Replaces the resistances of one snapshot, row by row of those `read`, by what the wires and amplifiers make of
+    /// them. `deformation` is the one they belong to.
+    pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
+        let scale = self.model.scale;
+        let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
+        let row_index = |row: usize| read.iter().position(|&other| other == row);
+        let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
+            let displacements_mm = deformation.row_mm(row);
+            let sum = self
+                .model
+                .partial_sum((row, 0..nodes), (column, 0..electrodes), displacements_mm, |_, _| ());
+            // Without any node there is no current; what noise makes of that is the converter's full scale.
+            if sum > 0.0 {
+                self.model.resistivity_ohm_per_mm / sum
+            } else {
+                full_scale_ohm
+            }
+        };
+        let shared_ohm = |one: f64, other: f64| 2.0 / (1.0 / one + 1.0 / other);
+        match self.fault {
+            Fault::OpenRow { row, before_node } => {
+                if let Some(index) = row_index(row) {
+                    let of_row = resistances_ohm[index * columns..].iter_mut().take(columns).enumerate();
+                    of_row.for_each(|(k, ohm)| *ohm = near_ohm(row, before_node, k, scale.nodes_per_column()));
+                }
+            }
+            Fault::OpenColumn { column, before_node } => {
+                for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
+                    ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node);
+                }
+            }
+            Fault::ShortedRows { row } => {
+                if let Some((one, other)) = row_index(row).zip(row_index(row + 1)) {
+                    for k in 0..columns {
+                        let shared =
+                            shared_ohm(resistances_ohm[one * columns + k], resistances_ohm[other * columns + k]);
+                        resistances_ohm[one * columns + k] = shared;
+                        resistances_ohm[other * columns + k] = shared;
+                    }
+                }
+            }
+            Fault::ShortedColumns { column } => {
+                for ohms in resistances_ohm.chunks_exact_mut(columns) {
+                    let shared = shared_ohm(ohms[column], ohms[column + 1]);
+                    ohms[column..column + 2].fill(shared);
+                }
+            }
+            Fault::Gain { column, relative } => {
+                let of_column = resistances_ohm.iter_mut().skip(column).step_by(columns);
+                of_column.for_each(|ohm| *ohm *= 1.0 + relative);
+            }
+            Fault::Stuck { .. } => {}
+        }
+    }
+
+    /// Replaces the readings of one snapshot by what the converter makes of them: where it has no current or is stuck, it
+    /// shows an end of its range without noise.
+    pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
+        let columns = self.model.scale.columns();
+        let (lowest_ohm, full_scale_ohm) = self.range_ohm;
+        let clip = |ohm: &mut f64| *ohm = ohm.min(full_scale_ohm);
+        match self.fault {
+            Fault::OpenRow { row, before_node } => {
+                let of_row = (readings_ohm.chunks_exact_mut(columns).zip(read)).find(|(_, other)| **other == row);
+                for ohm in of_row.into_iter().flat_map(|(ohms, _)| ohms) {
+                    if before_node == 0 {
+                        *ohm = full_scale_ohm;
+                    }
+                    clip(ohm);
+                }
+            }
+            Fault::OpenColumn { column, before_node } => {
+                for ohm in readings_ohm.iter_mut().skip(column).step_by(columns) {
+                    if before_node == 0 {
+                        *ohm = full_scale_ohm;
+                    }
+                    clip(ohm);
+                }
+            }
+            Fault::Gain { column, .. } => readings_ohm.iter_mut().skip(column).step_by(columns).for_each(clip),
+            Fault::Stuck { column, end } => {
+                let stuck_ohm = match end {
+                    ConverterEnd::Low => lowest_ohm,
+                    ConverterEnd::High => full_scale_ohm,
+                };
+                let of_column = readings_ohm.iter_mut().skip(column).step_by(columns);
+                of_column.for_each(|ohm| *ohm = stuck_ohm);
+            }
+            Fault::ShortedRows { .. } | Fault::ShortedColumns { .. } => {}
+        }
+    }
+}
