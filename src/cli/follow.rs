@@ -7,10 +7,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::{
-    failure::Failure, follow_answers::Answers, follow_faults::Faults, follow_report::Report, interruption::Graceful,
+    failure::Failure,
+    follow_answers::{Answers, Form},
+    follow_faults::Faults,
+    follow_report::Report,
+    interruption::Graceful,
     parsers::number,
 };
 use crate::{
@@ -18,16 +22,6 @@ use crate::{
     export::NetworkFile,
     live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
 };
-
-/// Form of the answers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Form {
-    /// Lines of CSV in the columns of decode.
-    #[default]
-    Csv,
-    /// One JSON object a line.
-    Jsonl,
-}
 
 // Decoding of frames as they come.
 #[derive(Args)]

@@ -1,8 +1,9 @@
 use std::io::{self, BufWriter, StdoutLock, Write, stdout};
 
+use clap::ValueEnum;
 use ndarray::ArrayView1;
 
-use super::{failure::Failure, follow::Form, outside_training::OutsideTraining};
+use super::{failure::Failure, outside_training::OutsideTraining};
 use crate::{
     dataset::SimulationError,
     decoupling::{CompiledNetworks, Decoder},
@@ -10,6 +11,16 @@ use crate::{
     live::{LeftOutDecoder, ParsedLine},
     network::Networks,
 };
+
+/// Form of the answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum Form {
+    /// Lines of CSV in the columns of decode.
+    #[default]
+    Csv,
+    /// One JSON object a line.
+    Jsonl,
+}
 
 /// Decodes lines and writes their answers to standard output, without allocation in steady state.
 pub(super) struct Answers<'a> {
