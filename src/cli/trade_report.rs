@@ -186,7 +186,7 @@ fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mu
     writeln!(
         out,
         "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
-         Training time is the sum over all rows and restarts."
+         Training time is the sum over all rows and starts."
     )
 }
 

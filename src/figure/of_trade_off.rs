@@ -66,7 +66,7 @@ pub fn trade_off_figure(level: &TradeLevel, limits: &TradeLimits) -> PlotFigure 
         frame_time(limits.microseconds)
     );
     let marks = [
-        ("no other is better", FRONT),
+        ("Pareto front", FRONT),
         ("Bayesian reference", REFERENCE),
         (&*questions, ANSWER),
         ("their limits", LIMIT),
@@ -98,7 +98,7 @@ fn plot(level: &TradeLevel, limits: &TradeLimits, cost: TradeCost) -> Plot {
         let (x, y) = cost.of(point);
         [x, y]
     };
-    let mut series = vec![Series::new("no other is better", FRONT, front(level, cost))];
+    let mut series = vec![Series::new("Pareto front", FRONT, front(level, cost))];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL {

@@ -197,10 +197,10 @@ fn lists_that_cannot_be_run_say_why_until_mended() {
     driver.click("Table 2");
     driver.enter("Folds", "500");
     assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
-    driver.click("Back to the paper's values");
+    driver.click("Reset to the paper's values");
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Table 1");
-    driver.click("Back to the paper's values");
+    driver.click("Reset to the paper's values");
     assert!(driver.is_enabled("▶ Run"));
 }
 

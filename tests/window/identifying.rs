@@ -86,7 +86,7 @@ fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
     let pitch = analysis(&driver).question.sensor.geometry.node_pitch_mm;
     assert!(pitch > before.source.sensor.geometry.node_pitch_mm, "{pitch}");
     assert_eq!(driver.state().draft, before, "trying changes nothing there");
-    driver.click("Back to the Train view's");
+    driver.click("Reset to the Train view's sensor");
     wait_for_the_answer(&mut driver);
     assert_eq!(analysis(&driver).question, Question::of(&before));
 }
@@ -105,7 +105,7 @@ fn rows_that_mirror_each_other_are_told_until_the_row_is_known() {
     driver.click_button("Row known");
     wait_for_the_answer(&mut driver);
     assert!(!driver.says("cannot be told apart"));
-    assert!(driver.has("Rows most alike: the row is known"));
+    assert!(driver.has("Most similar rows: the row is known"));
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn noise_that_hides_everything_is_told_with_what_to_change() {
     wait_for_the_answer(&mut driver);
     let seen = analysis(&driver).patterns_seen();
     assert!((1..10).contains(&seen), "{seen}");
-    assert!(driver.has(&format!("Patterns out of the noise: {seen} of 10")));
+    assert!(driver.has(&format!("Deformation patterns above the noise: {seen} of 10")));
     assert!(driver.says(&format!("This noise hides {} of 10 patterns", 10 - seen)));
     driver.enter("Relative noise", "1");
     wait_for_the_answer(&mut driver);

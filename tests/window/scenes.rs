@@ -277,7 +277,7 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
     assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(driver.says("even rounding blurs it"));
     driver.train();
-    assert!(driver.says("This scene is badly conditioned (condition number"));
+    assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();
     for row in ["training mean", "linear map", "network", "reference"] {
         let y = table.iter().find(|cell| cell.starts_with(&format!("{row}, Y %")));

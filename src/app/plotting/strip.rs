@@ -111,8 +111,6 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("{}: {text}", chart.label)));
     match hovered {
         Some((number, value)) => response.on_hover_text(format!("Start {}: {}", number + 1, format_number(value))),
-        None => {
-            response.on_hover_text("A dot for each start, the one kept in colour; box: the middle half, line: median")
-        }
+        None => response.on_hover_text("One dot for each start, the kept one in colour; box: quartiles, line: median."),
     };
 }

@@ -79,7 +79,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
                 format_duration(time_left(per_epoch, epochs.saturating_sub(epochs_run)))
             ));
         } else {
-            parts.push(format!("{} in all", format_duration(time)));
+            parts.push(format!("{} in total", format_duration(time)));
         }
     }
     parts

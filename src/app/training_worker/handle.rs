@@ -7,7 +7,7 @@ use std::{
     },
 };
 
-use super::{Event, Request, labour::Labour};
+use super::{Event, Request, training_loop::TrainingLoop};
 use crate::app::job::{Job, Wake};
 
 /// The window's end of the worker.
@@ -30,7 +30,7 @@ impl Worker {
         let mut job = Job::new("training", wake);
         let in_thread = Arc::clone(&cancelled);
         job.start(
-            move |report| Labour::new(report, &in_thread).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {

@@ -381,7 +381,7 @@ mod tests {
         let Some(Notice::Failed(reason)) = &window.notice else {
             panic!("{:?}", window.notice)
         };
-        assert!(reason.contains("another training has taken the place"), "{reason}");
+        assert!(reason.contains("another training has replaced"), "{reason}");
         assert!(!path.exists());
     }
 

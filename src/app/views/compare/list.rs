@@ -59,7 +59,7 @@ fn run_ui(
     ui.label(RichText::new(text).size(type_size().note));
     if *removing == Some(run.id) {
         ui.horizontal(|ui| {
-            ui.label("Remove it for good?");
+            ui.label("Remove this run permanently?");
             if ui.button("Remove").clicked() {
                 effects.push(Effect::RemoveRun(run.id));
                 *removing = None;
@@ -86,7 +86,7 @@ fn run_ui(
         let can_take = !shared.phase.is_busy();
         let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
-        if take.on_hover_text("Take its settings for the next training").clicked() {
+        if take.on_hover_text("Uses its settings for the next training.").clicked() {
             let settings = Box::new(run.file.settings);
             effects.extend([Effect::Configure(settings), Effect::ShowTraining]);
         }

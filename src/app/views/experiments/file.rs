@@ -26,7 +26,7 @@ pub enum ExperimentFile {
 }
 
 /// What a figure is, in a sentence.
-const FIGURE: &str = "The picture on a light ground, at publication size.";
+const FIGURE: &str = "The figure on a light background, at publication size.";
 
 impl ExperimentFile {
     /// In the order offered.
@@ -44,7 +44,7 @@ impl ExperimentFile {
             Self::Cells => (
                 "Table as CSV…",
                 "table",
-                "The figures of every cell with all their digits, as CSV.",
+                "The values of every cell, in full precision, as CSV.",
                 &["csv"],
             ),
             Self::Trials => (
@@ -56,7 +56,7 @@ impl ExperimentFile {
             Self::Markdown => (
                 "Table and verdicts as Markdown…",
                 "table and verdicts",
-                "The table as it is shown, how it was made, and the verdicts, as Markdown.",
+                "The table as shown, the settings behind it and the verdicts, as Markdown.",
                 &["md"],
             ),
             Self::Figure(PictureFormat::Svg) => ("Figure as SVG…", "figure", FIGURE, &["svg"]),

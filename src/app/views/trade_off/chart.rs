@@ -79,7 +79,7 @@ fn point_ui(
             if can_load {
                 "Click to load it into the Train view"
             } else {
-                "A training is under way: it cannot be loaded now"
+                "A training is running: the point cannot be loaded now"
             },
         );
     });

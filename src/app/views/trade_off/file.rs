@@ -31,12 +31,12 @@ impl TradeFile {
 
     /// What the file is called.
     pub fn words(self) -> FileWords {
-        let charts = "Both charts of the level of noise on show, on a light ground, at publication size.";
+        let charts = "Both charts at the displayed noise level, on a light background, at publication size.";
         let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
             Self::Points => (
                 "All points as CSV…",
                 "points",
-                "Every point at every level of noise with all its digits, as CSV.",
+                "Every point at every noise level, in full precision, as CSV.",
                 &["csv"],
             ),
             Self::Charts(PictureFormat::Svg) => ("Charts as SVG…", "charts", charts, &["svg"]),

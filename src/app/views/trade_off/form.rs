@@ -28,7 +28,7 @@ pub struct TradeForm {
     pub samples: usize,
     /// The most epochs of a quick look.
     pub epochs: usize,
-    /// Samples that errors are measured on.
+    /// Number of samples on which the errors are measured.
     pub test_samples: usize,
 }
 

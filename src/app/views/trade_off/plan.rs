@@ -19,7 +19,7 @@ pub struct TradePlan {
     pub decoders: Vec<DecoderKind>,
     /// The most training samples and epochs, if not those of the presets.
     pub at_most: Option<(usize, usize)>,
-    /// Samples that errors are measured on.
+    /// Number of samples on which the errors are measured.
     pub test_samples: usize,
 }
 

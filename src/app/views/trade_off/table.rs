@@ -155,7 +155,8 @@ fn row_ui(
         .hline(line.x_range(), line.bottom(), Stroke::new(0.5, palette.line));
     let response = response.on_hover_cursor(CursorIcon::PointingHand);
     let response = response.on_hover_text(
-        "Click to mark it in the charts. Where a time is blue, no other point has as small an error in as little time.",
+        "Click to mark it in the charts. A blue time is on the Pareto front: no other point has as small an error in \
+         as little time.",
     );
     response.clicked()
 }

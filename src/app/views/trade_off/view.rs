@@ -69,8 +69,8 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
         card_ui(ui, whole, |ui| {
             placeholder_ui(
                 ui,
-                "Press Measure: every decoder appears here with its error, its time for a frame and its training time, \
-                 at several levels of noise.",
+                "Press Measure to see the error, the time for a frame and the training time of every decoder at \
+                 several noise levels.",
             );
         });
         return;
@@ -131,7 +131,7 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
             .enumerate()
             .map(|(level, name)| (level, name.as_str()))
             .collect();
-        segmented_ui(ui, "Noise on show", &options, look.level, false)
+        segmented_ui(ui, "Displayed noise level", &options, look.level, false)
     } else {
         let mut picked = None;
         let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
@@ -162,16 +162,16 @@ fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &TradeLook, effects: &mu
                 }
             }
         });
-        button.on_disabled_hover_text("There is nothing to export before the first point is measured");
+        button.on_disabled_hover_text("Nothing to export yet: no point has been measured");
     });
 }
 
 /// Why a level of noise has no points.
 fn waiting(is_running: bool) -> &'static str {
     if is_running {
-        "The points of this noise appear as they are measured."
+        "Points at this noise level appear here as they are measured."
     } else {
-        "The measurement ended before this noise."
+        "The measurement ended before this noise level."
     }
 }
 

@@ -22,7 +22,7 @@ pub fn measure(job: &mut Job<TradeEvent>, plan: TradePlan) {
     job.start(
         move |report| measure_all(&plan, report),
         |ended| {
-            let ended = ended.map_err(|error| format!("{error}; what is measured stays"));
+            let ended = ended.map_err(|error| format!("{error}; the points measured so far are kept"));
             TradeEvent::Ended(ended.and_then(|measured| measured.map_err(|error| error.to_string())))
         },
     );

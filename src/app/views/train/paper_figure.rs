@@ -36,7 +36,7 @@ impl PaperFigure {
                  paper's spline, ours includes a plane: level nodes give a level surface."
             }
             Self::Six => {
-                "Trains 10×6_3×18 with 12 hidden nodes and shows every node: true as squares, decoupled as discs."
+                "Trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as discs."
             }
             Self::Seven => {
                 "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \

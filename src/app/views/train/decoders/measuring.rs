@@ -79,7 +79,7 @@ impl DecoderMeasuring {
             match news {
                 News::Measured(place, report) => state.take(place, report),
                 News::Ended(Ok(())) => {}
-                News::Ended(Err(error)) => state.end(&format!("{error}: fold the table and unfold it again")),
+                News::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
             }
         }
     }

@@ -23,8 +23,8 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
         _ => "infinite".to_owned(),
     };
     let text = format!(
-        "This scene is badly conditioned (condition number {condition}): whatever the decoder, some deformations cannot be \
-         told apart. The note under Scene says what to change."
+        "This scene is ill-conditioned (condition number {condition}): whatever the decoder, some deformations cannot \
+         be told apart. The note under Scene says what to change."
     );
     note_ui(ui, &text);
 }

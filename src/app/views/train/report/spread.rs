@@ -13,15 +13,15 @@ use crate::{
 const COLUMNS: [Column; 3] = [
     Column {
         heading: "min",
-        meaning: "Of the best start",
+        meaning: "Best start.",
     },
     Column {
         heading: "median",
-        meaning: "Half of the starts are below: what one start would likely have given",
+        meaning: "Median of all starts: what a single start would typically give.",
     },
     Column {
         heading: "max",
-        meaning: "Of the worst start",
+        meaning: "Worst start.",
     },
 ];
 

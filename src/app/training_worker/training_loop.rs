@@ -29,7 +29,7 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// The thread's own state.
-pub(super) struct Labour<'a> {
+pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
     /// The last preparation that is cancelled.
     cancelled: &'a AtomicU64,
@@ -47,7 +47,7 @@ pub(super) struct Labour<'a> {
     next_starts: Instant,
 }
 
-impl<'a> Labour<'a> {
+impl<'a> TrainingLoop<'a> {
     pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64) -> Self {
         Self {
             report,
@@ -257,8 +257,8 @@ impl<'a> Labour<'a> {
 pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
 /// What the window says where a file was asked for before another training began.
-const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
-                        finished trainings are in the run list of the Compare view";
+const REPLACED: &str = "the file was not written, for another training has replaced the one to be saved; finished \
+                        trainings are in the run list of the Compare view";
 
 /// A run, and what the window is to know of it.
 fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
