@@ -140,7 +140,7 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
     }
 }
 
-/// What [`EpochRecord::parameter`] is through all methods of a training.
+/// Returns the name of [`EpochRecord::parameter`] in all methods of a training.
 fn parameter_name(stages: &[Stage]) -> &'static str {
     let mut names = stages.iter().map(|stage| stage.method.parameter_name());
     let first = names.next().unwrap_or("parameter");

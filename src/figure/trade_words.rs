@@ -31,7 +31,7 @@ pub fn training_time(seconds: f64) -> String {
     Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)
 }
 
-/// What a point gains and costs, line by line.
+/// Returns the errors and times of a point, line by line.
 pub fn point_facts(point: &TradePoint) -> Vec<String> {
     let mut facts = vec![format!(
         "Z error {}, {} mm",

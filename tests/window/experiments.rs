@@ -86,8 +86,8 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     }
     driver.settle();
 
-    driver.click("Order by Z % median");
-    driver.click("Order by Z % median");
+    driver.click("Sort by Z % median");
+    driver.click("Sort by Z % median");
     let sort = driver.views().experiments.look.sort;
     assert!(sort.is_descending && sort.column.is_some());
 

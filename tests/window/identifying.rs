@@ -51,7 +51,7 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     let mut driver = open();
     let mut sensor = driver.state().draft.source.sensor;
     shows_condition_of(&driver, &sensor);
-    assert!(driver.says("Without noise every deformation can be told"));
+    assert!(driver.says("Without noise, the readings determine every deformation"));
     driver.enter("Height", "8");
     driver.enter("Column-wires", "40");
     wait_for_the_answer(&mut driver);
@@ -116,7 +116,7 @@ fn noise_that_hides_everything_is_told_with_what_to_change() {
     let seen = analysis(&driver).patterns_seen();
     assert!((1..10).contains(&seen), "{seen}");
     assert!(driver.has(&format!("Deformation patterns above the noise: {seen} of 10")));
-    assert!(driver.says(&format!("This noise hides {} of 10 patterns", 10 - seen)));
+    assert!(driver.says(&format!("The noise hides {} of 10 deformation patterns", 10 - seen)));
     driver.enter("Relative noise", "1");
     wait_for_the_answer(&mut driver);
     assert!(driver.says("the readings hardly narrow the deformation"));

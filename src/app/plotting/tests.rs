@@ -22,7 +22,7 @@ use crate::{
     sensor::{Axes, Identifiability},
 };
 
-/// What can be counted and read in a picture.
+/// Text and counts of marks found in a picture.
 #[derive(Debug, Default, PartialEq)]
 struct Seen {
     /// Discs, rings and dots.

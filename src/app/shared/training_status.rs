@@ -12,7 +12,7 @@ use crate::{
     training::StopReason,
 };
 
-/// What is going on: phase, epoch, error, speed, time left, and why it stopped.
+/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped.
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {

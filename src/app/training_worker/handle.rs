@@ -63,7 +63,7 @@ impl Worker {
         let _ = self.requests.send(request);
     }
 
-    /// Whether a training is being prepared that is not cancelled.
+    /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
         self.asked.get() > self.answered.get().max(self.cancelled.load(Ordering::Relaxed))
     }

@@ -39,7 +39,7 @@ pub(super) struct TrainingLoop<'a> {
     /// Which training `run` is.
     id: Option<RunId>,
     is_paused: bool,
-    /// Whether the window was told what is to be kept of the run.
+    /// True once the window was told the result of the run that is to be kept.
     is_kept: bool,
     /// The start last reported, and how many of its epochs.
     reported: (usize, usize),
@@ -253,10 +253,10 @@ impl<'a> TrainingLoop<'a> {
     }
 }
 
-/// What the window says where the training it shows is not in the worker: only a worker that died lost it.
+/// Message where the training on show is not in the worker: only a worker that died lost it.
 pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
-/// What the window says where a file was asked for before another training began.
+/// Message where a file was asked for before another training began.
 const REPLACED: &str = "the file was not written, for another training has replaced the one to be saved; finished \
                         trainings are in the run list of the Compare view";
 

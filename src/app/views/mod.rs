@@ -33,9 +33,9 @@ pub struct Views {
     pub experiments: ExperimentsView,
     /// Two finished trainings side by side.
     pub compare: CompareView,
-    /// What readings can tell at all.
+    /// View of what the readings determine.
     pub identifiability: IdentifiabilityView,
-    /// What each way of decoding costs and gains.
+    /// View of the speed and the accuracy of each decoder.
     pub trade_off: TradeOffView,
 }
 

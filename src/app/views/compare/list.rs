@@ -59,7 +59,7 @@ fn run_ui(
     ui.label(RichText::new(text).size(type_size().note));
     if *removing == Some(run.id) {
         ui.horizontal(|ui| {
-            ui.label("Remove this run permanently?");
+            ui.label("Remove this run?");
             if ui.button("Remove").clicked() {
                 effects.push(Effect::RemoveRun(run.id));
                 *removing = None;
@@ -116,7 +116,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     }
 }
 
-/// What the run was made with.
+/// Returns the conditions of the run in a line.
 fn conditions(settings: &SimulatedSettings) -> String {
     let starts = match settings.starts {
         1 => String::new(),

@@ -12,7 +12,7 @@ use crate::{
     figure::experiment_figure,
 };
 
-/// What can be written about an experiment.
+/// File that can be written about an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ExperimentFile {
     /// The figures of every cell, as CSV.
@@ -25,7 +25,7 @@ pub enum ExperimentFile {
     Figure(PictureFormat),
 }
 
-/// What a figure is, in a sentence.
+/// Description of a figure in a sentence.
 const FIGURE: &str = "The figure on a light background, at publication size.";
 
 impl ExperimentFile {
@@ -38,7 +38,7 @@ impl ExperimentFile {
         Self::Figure(PictureFormat::Png),
     ];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
             Self::Cells => (

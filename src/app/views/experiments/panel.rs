@@ -20,7 +20,7 @@ use crate::{
 /// The most seeds or repeats.
 const MOST_TRIALS: usize = 1000;
 
-/// What is run: the choice, its lists and numbers, Run and Cancel.
+/// Shows the form: the choice of an experiment, its lists and numbers, Run and Cancel.
 pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "experiment form", |ui| {
         section_heading_ui(ui, "Experiment");
@@ -180,7 +180,7 @@ fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
     ui.add_space(space(1));
 }
 
-/// What a sweep holds, and where it may come from.
+/// Shows the settings common to all cells of a sweep, and a button that takes them from the Train view.
 fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
     let base = &form.template.base;
     let text = format!(

@@ -45,7 +45,7 @@ pub fn results_card_ui(
     ui.label(note.color(dim));
 }
 
-/// What the card needs to show every row in a card of such a width.
+/// Returns the height at which a card of this width shows every row, in points.
 pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
     let width = width - MARGINS;
     let conditions = describe_conditions(&outcome.results.experiment);

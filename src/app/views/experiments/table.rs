@@ -128,7 +128,7 @@ fn heading_ui(ui: &mut Ui, outcome: &Outcome, sort: &mut SortBy, places: &[[f32;
         .hline(line.x_range(), line.bottom(), Stroke::new(1.0, palette.line));
 }
 
-/// What is varied stands at the left of its column, figures at the right.
+/// Draws the text of a cell: names at the left of their column, figures at the right.
 fn cell_text(ui: &Ui, rect: Rect, is_name: bool, text: String, font: FontId, colour: Color32) {
     let (place, anchor) = if is_name {
         (rect.left_center() + vec2(space(1), 0.0), Align2::LEFT_CENTER)

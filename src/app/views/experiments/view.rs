@@ -98,7 +98,7 @@ impl View for ExperimentsView {
     }
 }
 
-/// Why there is no figure yet.
+/// Returns the hint shown while there is no figure yet.
 fn hint(experiments: &ExperimentsView) -> &'static str {
     match (&experiments.running, experiments.outcome()) {
         (Some(running), _) if running.topic == experiments.topic => "The figures appear as the trials finish.",

@@ -1,4 +1,4 @@
-//! What the singular values come to, in words.
+//! Facts derived from the singular values, in words.
 
 use eframe::egui::{Align, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
@@ -27,7 +27,7 @@ pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
     }
 }
 
-/// What holds where nothing is in the way.
+/// Returns the summary shown where there are no warnings.
 fn summary(analysis: &Analysis) -> String {
     let (seen, patterns) = (analysis.patterns_seen(), analysis.worst_row().unknowns());
     if analysis.noise == 0.0 {

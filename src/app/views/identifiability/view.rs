@@ -219,7 +219,7 @@ fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
 }
 
-/// What is looked at, in the line at the bottom.
+/// Shows the state of the analysis in the line at the bottom.
 fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&shown.problem, &shown.analysis) {

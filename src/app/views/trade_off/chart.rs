@@ -1,4 +1,4 @@
-//! What the points of the charts answer to the pointer.
+//! Response of the points of the charts to the pointer.
 
 use eframe::egui::{CursorIcon, Id, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role};
 

@@ -12,7 +12,7 @@ use crate::{
     figure::trade_off_figure,
 };
 
-/// What can be written about a measurement.
+/// File that can be written about a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TradeFile {
     /// Every point of every level of noise, as CSV.
@@ -29,7 +29,7 @@ impl TradeFile {
         Self::Charts(PictureFormat::Png),
     ];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         let charts = "Both charts at the displayed noise level, on a light background, at publication size.";
         let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {

@@ -18,11 +18,11 @@ pub struct TradeForm {
     pub noises: String,
     /// Hidden nodes, as typed.
     pub hidden: String,
-    /// Where the settings of the networks begin.
+    /// Presets on which the settings of the networks are based.
     pub presets: WhichPresets,
     /// Ways of decoding, in the order of [`DecoderKind::ALL`].
     pub decoders: [bool; DecoderKind::ALL.len()],
-    /// How long networks are trained.
+    /// Length of the trainings.
     pub thoroughness: Thoroughness,
     /// The most training samples of a quick look.
     pub samples: usize,
@@ -41,7 +41,7 @@ pub enum WhichPresets {
     Only(Preset),
 }
 
-/// How long networks are trained.
+/// Length of the trainings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thoroughness {
     /// With few samples and epochs: a first look within a minute.
@@ -50,7 +50,7 @@ pub enum Thoroughness {
     Full,
 }
 
-/// Why a form is no measurement yet.
+/// Reasons for which a form is not yet a measurement.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TradeFormError {
@@ -59,7 +59,7 @@ pub enum TradeFormError {
     NotANumber {
         /// The list.
         what: &'static str,
-        /// What was typed.
+        /// Text that was typed.
         text: String,
         /// A list that can be understood.
         example: &'static str,
@@ -69,7 +69,7 @@ pub enum TradeFormError {
     Range {
         /// The list.
         what: &'static str,
-        /// What was typed.
+        /// Text that was typed.
         value: String,
         /// The smallest.
         least: String,
@@ -117,7 +117,7 @@ impl TradeForm {
     /// The measurement in the sensor and scene of `base`, sound as far as can be known before it is run.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If the form is not a possible measurement.
     pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
         let decoders: Vec<_> = chosen

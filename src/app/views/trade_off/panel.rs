@@ -16,7 +16,7 @@ use crate::{
     training::StoppingRules,
 };
 
-/// What is measured: lists, presets, decoders, Measure and Cancel.
+/// Shows the form: lists, presets, decoders, Measure and Cancel.
 pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "trade form", |ui| {
         section_heading_ui(ui, "Measurement");

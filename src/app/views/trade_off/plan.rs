@@ -11,7 +11,7 @@ pub struct TradePlan {
     pub base: SimulatedSettings,
     /// Relative errors of a reading.
     pub noises: Vec<f64>,
-    /// Where the settings of the networks begin.
+    /// Presets on which the settings of the networks are based.
     pub presets: Vec<Preset>,
     /// Hidden nodes.
     pub hidden: Vec<usize>,
@@ -51,7 +51,7 @@ impl TradePlan {
         settings
     }
 
-    /// How many points it has.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         let of_decoder = |kind: &DecoderKind| {
             let networks = if kind.needs_network() { self.hidden.len() } else { 1 };

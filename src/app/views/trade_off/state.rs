@@ -15,18 +15,18 @@ use crate::{
 /// The Trade-off view.
 #[derive(Debug)]
 pub struct TradeOffView {
-    /// What is to be measured.
+    /// Form of the next measurement.
     pub form: TradeForm,
-    /// What runs.
+    /// Measurement that is running.
     pub running: Option<TradeRunning>,
-    /// What is measured.
+    /// Results measured so far.
     pub outcome: Option<TradeOutcome>,
-    /// How it is looked at.
+    /// Level, limits and marked point of the display.
     pub look: TradeLook,
     pub(super) job: Job<TradeEvent>,
 }
 
-/// How a measurement is looked at.
+/// State of the display of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TradeLook {
     /// The level of noise on show.
@@ -44,7 +44,7 @@ pub struct TradeRunning {
     pub begun: Instant,
 }
 
-/// How a measurement ended.
+/// Ending of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TradeEnding {
     /// Every point is there.
@@ -53,16 +53,16 @@ pub enum TradeEnding {
     Cut,
 }
 
-/// What is measured.
+/// Results of a measurement so far.
 #[derive(Clone, Debug)]
 pub struct TradeOutcome {
-    /// What was asked for.
+    /// Plan that is measured.
     pub plan: TradePlan,
     /// One for each level of noise.
     pub levels: Vec<TradeLevel>,
-    /// How it ended, once it has.
+    /// Ending of the measurement, once it has ended.
     pub ending: Option<TradeEnding>,
-    /// How long it took, once it has ended.
+    /// Time it took, once it has ended.
     pub took: Option<Duration>,
 }
 
@@ -86,12 +86,12 @@ impl TradeOffView {
         }
     }
 
-    /// Whether nothing else of this program computes, which would disturb the times.
+    /// Returns true if nothing else of this program computes, which would distort the times.
     pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
         !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
     }
 
-    /// Whether the form can be measured now.
+    /// Returns true if the form can be measured now.
     pub(super) fn can_measure(&self, shared: &Shared) -> bool {
         self.running.is_none() && self.is_quiet(shared) && self.plan(&shared.draft).is_ok()
     }
@@ -110,10 +110,10 @@ impl TradeOffView {
         self.end(Instant::now());
     }
 
-    /// What would be measured in the scene of these settings, or why nothing can be.
+    /// Returns the plan to be measured in the scene of these settings.
     ///
     /// # Errors
-    /// What is wrong with the form.
+    /// If the form is not a possible measurement.
     pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
         self.form.plan(base)
     }

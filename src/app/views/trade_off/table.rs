@@ -106,7 +106,7 @@ fn right_end(line: Rect, from_right: usize) -> Pos2 {
     pos2(line.right() - left_of_it, line.center().y)
 }
 
-/// Whether the row was clicked.
+/// Shows a row. Returns true if it was clicked.
 fn row_ui(
     ui: &mut Ui,
     (point, is_marked): (&TradePoint, bool),

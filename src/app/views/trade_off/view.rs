@@ -166,7 +166,7 @@ fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &TradeLook, effects: &mu
     });
 }
 
-/// Why a level of noise has no points.
+/// Returns the hint shown while a noise level has no points.
 fn waiting(is_running: bool) -> &'static str {
     if is_running {
         "Points at this noise level appear here as they are measured."
@@ -175,7 +175,7 @@ fn waiting(is_running: bool) -> &'static str {
     }
 }
 
-/// What is going on, in the line at the bottom.
+/// Shows the state of the measurement in the line at the bottom.
 fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&trade.running, &trade.outcome) {

@@ -45,14 +45,14 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     }
 }
 
-/// Whether the nodes have error bars.
+/// Shows the choice of error bars on the nodes.
 fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
     ui.add_space(space(3));
     let hint = "± the root mean square error of each node over all snapshots of the test set, in mm.";
     ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
 }
 
-/// What an empty chart is there for.
+/// Returns the hint shown in an empty chart.
 fn hint_of_empty_chart(tab: BottomTab) -> &'static str {
     match tab {
         BottomTab::Loss => "The error of each epoch appears here while the network trains.",

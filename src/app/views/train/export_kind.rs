@@ -9,7 +9,7 @@ use crate::{
     export::{CheckpointFile, NetworkFile, atomic_write, write_errors, write_loss_curves},
 };
 
-/// What can be written about a training.
+/// File that can be written about a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportKind {
     /// The network with everything needed to use and reproduce it, as JSON.
@@ -35,7 +35,7 @@ impl ExportKind {
     /// In the order offered.
     pub const ALL: [Self; 4] = [Self::Network, Self::Errors, Self::LossCurves, Self::Checkpoint];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         match self {
             Self::Network => FileWords {

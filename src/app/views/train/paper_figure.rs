@@ -28,7 +28,7 @@ impl PaperFigure {
         }
     }
 
-    /// What it shows, in a sentence.
+    /// Returns a description of the figure in a sentence.
     pub fn description(self) -> &'static str {
         match self {
             Self::Four => {
@@ -49,7 +49,7 @@ impl PaperFigure {
         }
     }
 
-    /// What is trained for it.
+    /// Returns the settings of the training for the figure.
     pub fn settings(self) -> SimulatedSettings {
         let scale = match self {
             Self::Four => "10×10_5×30",

@@ -66,7 +66,7 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
     picked
 }
 
-/// What can be hoped for in the scene of the draft, where that is known.
+/// Returns the outlook of the scene of the draft, where it is known.
 fn outlook(shared: &Shared) -> Option<&Outlook> {
     let (settings, test) = match (&shared.preview, &shared.run) {
         (Some(preview), _) => (&preview.settings, &preview.test),

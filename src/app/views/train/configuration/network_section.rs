@@ -14,7 +14,7 @@ use crate::{
     scene::{Movement, Rows},
 };
 
-/// What the network is given, and how large it is; changes `draft`.
+/// Shows the inputs and the size of the network; changes `draft`.
 pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Network");
     inputs_ui(ui, draft);
@@ -84,7 +84,7 @@ fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     }
 }
 
-/// How large the networks are.
+/// Shows the size of the networks.
 fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
     let scale = draft.source.sensor.scale;

@@ -8,7 +8,7 @@ use crate::{
     scene::{Noise, NoisySets},
 };
 
-/// What disturbs the readings; changes `noise`. A line tells it where the settings are folded away.
+/// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
 pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
     let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
     if shown.body_response.is_none() && !noise.is_none() {

@@ -6,7 +6,7 @@ use crate::{
     scene::Scene,
 };
 
-/// Where the settings of a network begin; changes `draft`.
+/// Shows the presets on which the settings are based; changes `draft`.
 pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Preset");
     let options = [

@@ -16,7 +16,7 @@ use crate::{
     scene::{Indenter, IndenterShape, Loading, Movement, Rows},
 };
 
-/// What is read, what moves, how it is loaded and what disturbs it; changes `draft`. `outlook` is that of the scene, once
+/// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
 /// it is known.
 pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Option<&Outlook>) {
     section_heading_ui(ui, "Scene");
@@ -36,7 +36,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
     outlook_ui(ui, draft, outlook);
 }
 
-/// How many of what the scene describes; changes `draft`.
+/// Shows the numbers of samples and the seed; changes `draft`.
 pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Samples");
     let rows = draft.source.model_size().map_or(1, |size| size.rows);
@@ -240,7 +240,7 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
     quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
-/// What the scene came to.
+/// Shows the numbers of unknowns and equations of the scene.
 fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
     let text = format!("{} unknowns, {} equations a frame", size.unknowns, size.equations);
@@ -250,7 +250,7 @@ fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     );
 }
 
-/// How badly conditioned the scene is, and what stands in the way.
+/// Shows the condition number of the scene, and its warnings.
 fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
     let condition = outlook.map(|outlook| outlook.worst_row.condition());
     let text = match condition {
@@ -271,7 +271,7 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
     }
 }
 
-/// What scenes of nodes that shift sideways ask of the readings.
+/// Returns the effect of sideways shifts on the readings, in words.
 fn sideways_in_words(outlook: &Outlook) -> String {
     let (worst, noise) = (&outlook.worst_row, outlook.noise);
     if noise > 0.0 {

@@ -14,9 +14,9 @@ use crate::{
     network::Networks,
 };
 
-/// What the thread tells the window.
+/// Message of the thread to the window.
 enum News {
-    /// What the decoder at this place in the list is worth.
+    /// Report of the decoder at this place in the list.
     Measured(usize, Result<DecoderReport, String>),
     /// Nothing more will come.
     Ended(Result<(), JobError>),

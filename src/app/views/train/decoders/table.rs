@@ -108,7 +108,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     }
 }
 
-/// What the reference row is.
+/// Meaning of the reference row.
 pub const REFERENCE: &str = "Bayesian reference: the error that remains given the noise and the loading of the scene, \
                              with Eq. (2) linearised at the actual deformation. On average, no decoder that knows \
                              only the range of the loading, or its mean and covariance, does better. Without noise, \

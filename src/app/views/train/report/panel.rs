@@ -223,7 +223,7 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
     is_wanted.then_some(worst)
 }
 
-/// How many weights the data determine, where the method estimates it.
+/// Shows the number of weights that the data determine, where the method estimates it.
 fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let best = run.history.get(result.best_epoch);
     let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {

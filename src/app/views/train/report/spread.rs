@@ -25,7 +25,7 @@ const COLUMNS: [Column; 3] = [
     },
 ];
 
-/// How the results of several starts spread: a strip of dots and three figures. Nothing for one start.
+/// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
 pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
