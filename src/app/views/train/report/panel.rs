@@ -299,7 +299,7 @@ fn file_ui(
         };
         path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, format!("{verb} {}", words.kind)));
         if path
-            .on_hover_text("Opens a field to type the path instead of choosing the file.")
+            .on_hover_text("Type the path instead of choosing the file.")
             .clicked()
         {
             effects.extend(task().map(Effect::TypePath));
