@@ -10,7 +10,7 @@ pub struct TradePoint {
     pub settings: SimulatedSettings,
     /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
-    /// Training or fitting time in seconds, summed over all rows and restarts.
+    /// Training or fitting time in seconds, summed over all rows and starts.
     pub training_seconds: f64,
     /// Errors of the Bayesian reference in this scene; `None` where a posterior did not converge.
     pub reference: Option<Errors>,
