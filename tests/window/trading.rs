@@ -3,8 +3,8 @@
 use std::fs;
 
 use decoupler::{
-    app::{TradeEnding, TradePlan},
-    evaluation::{Preset, TradePoint, fastest_under, measure_trade, most_accurate_under},
+    app::{TradeOffEnding, TradeOffPlan},
+    evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
     export::format_percent,
 };
 use eframe::egui::vec2;
@@ -19,7 +19,7 @@ fn open() -> Driver {
 }
 
 /// Ridge, Newton and small networks of both presets at two levels of noise.
-fn tiny(driver: &mut Driver) -> TradePlan {
+fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.type_into("Noise levels", "0, 1e-3");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
@@ -40,12 +40,12 @@ fn measure(driver: &mut Driver) {
 }
 
 /// What the library measures by itself.
-fn by_library(plan: &TradePlan, noise: f64) -> Vec<TradePoint> {
+fn by_library(plan: &TradeOffPlan, noise: f64) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for &preset in &plan.presets {
         let settings = plan.settings(preset, noise);
         let on_point = |point| points.push(point);
-        measure_trade(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
+        measure_trade_off(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
     }
     points
 }
@@ -58,7 +58,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     assert_eq!(
         (outcome.points(), outcome.ending),
-        ((16, 16), Some(TradeEnding::Complete))
+        ((16, 16), Some(TradeOffEnding::Complete))
     );
     for level in &outcome.levels {
         for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise)) {
@@ -211,7 +211,7 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     let (done, all) = outcome.points();
     assert!((3..all).contains(&done), "{done} of {all}");
-    assert_eq!(outcome.ending, Some(TradeEnding::Cut));
+    assert_eq!(outcome.ending, Some(TradeOffEnding::Cut));
     assert!(driver.says(&format!("Ended early: {done} of {all} points")));
     // The next begins when the processor is free, and has points of its own only.
     driver.type_into("Hidden nodes", "3");

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use super::{job::Wake, shared::View};
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{TradeEnding, TradePlan};
+pub use trade_off::{TradeOffEnding, TradeOffPlan};
 pub use train::{BottomTab, DecoderResult};
 
 use self::{

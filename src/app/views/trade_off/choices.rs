@@ -2,20 +2,20 @@
 
 use eframe::egui::{Align, Label, Layout, RichText, Ui};
 
-use super::TradeLook;
+use super::TradeOffLook;
 use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
     },
-    evaluation::{TradeLevel, TradePoint},
+    evaluation::{TradeOffLevel, TradeOffPoint},
     export::format_percent,
     figure::trade_words::{frame_time, point_facts, point_name},
 };
 
 /// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
 /// so.
-pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_load: bool) -> Option<usize> {
+pub fn choices_ui(ui: &mut Ui, level: &TradeOffLevel, look: &mut TradeOffLook, can_load: bool) -> Option<usize> {
     let [fastest, most_accurate] = level.answers(&look.limits);
     section_heading_ui(ui, "Recommended decoders");
     let hint = "Finds the decoder with the shortest time for a frame among those whose Z error is at most this, in \
@@ -52,7 +52,7 @@ pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_loa
 fn answer_ui(
     ui: &mut Ui,
     marked: &mut Option<usize>,
-    level: &TradeLevel,
+    level: &TradeOffLevel,
     question: &str,
     chosen: Option<usize>,
     none: &str,
@@ -83,7 +83,7 @@ fn answer_ui(
 }
 
 /// Returns whether the point is to be loaded.
-fn marked_ui(ui: &mut Ui, point: &TradePoint, can_load: bool) -> bool {
+fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
     let mut is_loaded = false;
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

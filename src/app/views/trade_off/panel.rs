@@ -1,6 +1,6 @@
 use eframe::egui::{TextEdit, Ui, vec2};
 
-use super::{Thoroughness, TradeForm, TradeOffView, WhichPresets, names::noise_name};
+use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, names::noise_name};
 use crate::{
     app::{
         shared::{Effect, Shared},
@@ -42,7 +42,7 @@ pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: 
     });
 }
 
-fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
+fn fields_ui(ui: &mut Ui, form: &mut TradeOffForm) {
     let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels with \
                 commas.";
     list_ui(ui, "Noise levels", hint, &mut form.noises);

@@ -6,7 +6,7 @@ use crate::{
 
 /// A measurement as it is run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TradePlan {
+pub struct TradeOffPlan {
     /// Sensor, scene and seed.
     pub base: SimulatedSettings,
     /// Relative errors of a reading.
@@ -23,7 +23,7 @@ pub struct TradePlan {
     pub test_samples: usize,
 }
 
-impl TradePlan {
+impl TradeOffPlan {
     /// The settings of a preset at a level of noise, in the sensor and the scene of [`Self::base`]. Which rows are read,
     /// and what networks are given of the readings, is the preset's.
     pub fn settings(&self, preset: Preset, noise: f64) -> SimulatedSettings {

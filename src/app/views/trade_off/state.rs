@@ -1,52 +1,52 @@
 use std::time::{Duration, Instant};
 
 use super::{
-    TradeForm, TradeFormError, TradePlan,
-    worker::{self, TradeEvent},
+    TradeOffForm, TradeOffFormError, TradeOffPlan,
+    worker::{self, TradeOffEvent},
 };
 use crate::{
     app::{
         job::{Job, Wake},
         shared::{Effect, Shared, View as _},
     },
-    evaluation::{SimulatedSettings, TradeLevel, TradeLimits, TradePoint},
+    evaluation::{SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
 };
 
 /// The Trade-off view.
 #[derive(Debug)]
 pub struct TradeOffView {
     /// Form of the next measurement.
-    pub form: TradeForm,
+    pub form: TradeOffForm,
     /// Measurement that is running.
-    pub running: Option<TradeRunning>,
+    pub running: Option<TradeOffRunning>,
     /// Results measured so far.
-    pub outcome: Option<TradeOutcome>,
+    pub outcome: Option<TradeOffOutcome>,
     /// Level, limits and marked point of the display.
-    pub look: TradeLook,
-    pub(super) job: Job<TradeEvent>,
+    pub look: TradeOffLook,
+    pub(super) job: Job<TradeOffEvent>,
 }
 
 /// State of the display of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TradeLook {
+pub struct TradeOffLook {
     /// The level of noise on show.
     pub level: usize,
     /// The point marked in charts and table, by its place in the level on show.
     pub marked: Option<usize>,
     /// The limits of the two questions.
-    pub limits: TradeLimits,
+    pub limits: TradeOffLimits,
 }
 
 /// A measurement under way.
 #[derive(Clone, Copy, Debug)]
-pub struct TradeRunning {
+pub struct TradeOffRunning {
     /// When it began.
     pub begun: Instant,
 }
 
 /// Ending of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TradeEnding {
+pub enum TradeOffEnding {
     /// Every point is there.
     Complete,
     /// By the user, or by an accident that was told.
@@ -55,18 +55,18 @@ pub enum TradeEnding {
 
 /// Results of a measurement so far.
 #[derive(Clone, Debug)]
-pub struct TradeOutcome {
+pub struct TradeOffOutcome {
     /// Plan that is measured.
-    pub plan: TradePlan,
+    pub plan: TradeOffPlan,
     /// One for each level of noise.
-    pub levels: Vec<TradeLevel>,
+    pub levels: Vec<TradeOffLevel>,
     /// Ending of the measurement, once it has ended.
-    pub ending: Option<TradeEnding>,
+    pub ending: Option<TradeOffEnding>,
     /// Time it took, once it has ended.
     pub took: Option<Duration>,
 }
 
-impl TradeOutcome {
+impl TradeOffOutcome {
     /// Points measured and points asked for.
     pub fn points(&self) -> (usize, usize) {
         let done = self.levels.iter().map(|level| level.points.len()).sum();
@@ -78,10 +78,10 @@ impl TradeOffView {
     /// Nothing measured yet. `wake` is called when there is news.
     pub fn new(wake: Wake) -> Self {
         Self {
-            form: TradeForm::default(),
+            form: TradeOffForm::default(),
             running: None,
             outcome: None,
-            look: TradeLook::default(),
+            look: TradeOffLook::default(),
             job: Job::new("trade-off", wake),
         }
     }
@@ -114,20 +114,20 @@ impl TradeOffView {
     ///
     /// # Errors
     /// If the form is not a possible measurement.
-    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
+    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradeOffPlan, TradeOffFormError> {
         self.form.plan(base)
     }
 
     /// Makes room for the points of `plan`.
-    fn begin(&mut self, plan: TradePlan) {
-        let level = |&noise: &f64| TradeLevel {
+    fn begin(&mut self, plan: TradeOffPlan) {
+        let level = |&noise: &f64| TradeOffLevel {
             noise,
             points: Vec::new(),
         };
         self.look.level = self.look.level.min(plan.noises.len() - 1);
         self.look.marked = None;
-        self.running = Some(TradeRunning { begun: Instant::now() });
-        self.outcome = Some(TradeOutcome {
+        self.running = Some(TradeOffRunning { begun: Instant::now() });
+        self.outcome = Some(TradeOffOutcome {
             levels: plan.noises.iter().map(level).collect(),
             plan,
             ending: None,
@@ -136,7 +136,7 @@ impl TradeOffView {
     }
 
     /// Adds a point to a level.
-    pub fn record(&mut self, level: usize, point: TradePoint) {
+    pub fn record(&mut self, level: usize, point: TradeOffPoint) {
         let level = self.outcome.as_mut().and_then(|outcome| outcome.levels.get_mut(level));
         if let Some(level) = level {
             level.points.push(point);
@@ -150,15 +150,15 @@ impl TradeOffView {
             let (done, all) = outcome.points();
             outcome.took = Some(at - running.begun);
             outcome.ending = Some(if done == all {
-                TradeEnding::Complete
+                TradeOffEnding::Complete
             } else {
-                TradeEnding::Cut
+                TradeOffEnding::Cut
             });
         }
     }
 
     /// The level on show.
-    pub fn shown(&self) -> Option<&TradeLevel> {
+    pub fn shown(&self) -> Option<&TradeOffLevel> {
         self.outcome
             .as_ref()
             .and_then(|outcome| outcome.levels.get(self.look.level))
