@@ -5,7 +5,7 @@
 
 use decoupler::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{Preset, TradeLevel, TradeLimits, measure_trade},
+    evaluation::{Preset, TradeOffLevel, TradeOffLimits, measure_trade_off},
     export::figures::{Picture, PictureFormat},
     figure::{
         Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, Series, node_figure, trade_off_figure,
@@ -225,7 +225,7 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
         let on_point = |point| points.push(point);
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
-        measure_trade(preset, &settings, &[3], &kinds, || false, on_point).unwrap();
+        measure_trade_off(preset, &settings, &[3], &kinds, || false, on_point).unwrap();
     }
     let is_single = |single: bool| {
         let of_bits = points
@@ -236,11 +236,11 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
     let (hollow, filled) = (is_single(true), is_single(false));
     assert_eq!((hollow, filled), (2, 4));
     // Limits out of reach: no answers, whose rings would be hollow too.
-    let limits = TradeLimits {
+    let limits = TradeOffLimits {
         percent: 0.0,
         microseconds: 0.0,
     };
-    let level = TradeLevel { noise: 0.0, points };
+    let level = TradeOffLevel { noise: 0.0, points };
     let picture = Figure::from(trade_off_figure(&level, &limits)).draw();
     let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
     let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();

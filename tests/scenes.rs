@@ -9,8 +9,8 @@ use decoupler::{
     dataset::Seed,
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradePoint, fastest_under, measure_trade,
-        most_accurate_under,
+        DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradeOffPoint, fastest_under,
+        measure_trade_off, most_accurate_under,
     },
     export::{CheckpointFile, NetworkFile},
     scene::{Loading, Movement, Noise, Rows, Scene},
@@ -219,9 +219,9 @@ fn a_trade_has_a_point_for_every_choice() {
         ..small()
     };
     settings.training.stopping.epochs = 3;
-    let mut points: Vec<TradePoint> = Vec::new();
+    let mut points: Vec<TradeOffPoint> = Vec::new();
     let keep = |point| points.push(point);
-    assert!(measure_trade(Preset::Best, &settings, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
+    assert!(measure_trade_off(Preset::Best, &settings, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
@@ -236,6 +236,6 @@ fn a_trade_has_a_point_for_every_choice() {
     );
     let mut none = 0;
     let count = |_| none += 1;
-    assert!(!measure_trade(Preset::Best, &settings, &[2], &DecoderKind::ALL, || true, count).unwrap());
+    assert!(!measure_trade_off(Preset::Best, &settings, &[2], &DecoderKind::ALL, || true, count).unwrap());
     assert_eq!(none, 0);
 }

@@ -28,5 +28,5 @@ mod window;
 use crate::figure::ticks;
 
 pub use shared::{Effect, Notice, Phase, Shared};
-pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeEnding, TradePlan, Views};
+pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeOffEnding, TradeOffPlan, Views};
 pub use window::{DecouplerWindow, DialogKind, OpenError, open};

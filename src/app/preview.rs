@@ -1,4 +1,4 @@
-//! What settings are to show before a training: their test set, and what will stand beside the network.
+//! Preview of settings before a training: their test set and the baselines.
 
 use super::{
     job::{Job, JobError},
@@ -9,13 +9,12 @@ use crate::{
     training::{GradientDescentSettings, Method, TrainingSettings},
 };
 
-/// What the thread tells the window.
+/// Message of the thread to the window.
 #[derive(Debug)]
 pub enum PreviewEvent {
     /// The test set of these settings.
     Drawn(Box<SimulatedSettings>, Result<TestView, TestViewError>),
-    /// What will stand beside the network of these settings; none where that takes long or is impossible, which a
-    /// training would explain.
+    /// Baselines of these settings; none where they take long or are impossible, which a training would explain.
     Compared(Box<SimulatedSettings>, Option<Baselines>),
     /// Neither.
     Failed(JobError),
@@ -37,7 +36,7 @@ pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     );
 }
 
-/// What stands beside the network, without one; nothing where it would keep the next request waiting.
+/// Returns the baselines of the settings; none where measuring them would keep the next request waiting.
 fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> Option<Baselines> {
     /// About a tenth of a second.
     const MOST_TERMS: usize = 50_000_000;

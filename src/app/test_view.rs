@@ -27,7 +27,7 @@ pub struct TestView {
     pub rows: Vec<usize>,
     /// The distance a node can travel.
     pub stroke_mm: f64,
-    /// What can be hoped for in the scene; none where that takes long or cannot be told.
+    /// Outlook of the scene; none where it takes long or cannot be computed.
     pub outlook: Option<Outlook>,
 }
 
@@ -130,7 +130,7 @@ fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
     Outlook::of(&settings.source).ok()
 }
 
-/// Why there is nothing to draw.
+/// Reasons for which there is nothing to draw.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TestViewError {

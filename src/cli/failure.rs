@@ -44,7 +44,7 @@ pub(super) enum Failure {
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
     #[error("noise {noise}, preset {preset}: {cause}; only what was measured before is printed")]
-    TradeLevel {
+    TradeOffLevel {
         noise: f64,
         preset: Preset,
         cause: Box<Failure>,

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Preset, SimulatedSettings, TradeLevel, TradePoint, measure_trade},
+    evaluation::{Preset, SimulatedSettings, TradeOffLevel, TradeOffPoint, measure_trade_off},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::StoppingRules,
@@ -75,7 +75,7 @@ impl Trade {
         let (levels, end) = measure_levels(&noises, &presets, |noise, preset, points| {
             let settings = self.settings(preset, noise)?;
             let is_cancelled = || graceful.is_end_requested();
-            let is_whole = measure_trade(preset, &settings, &self.hidden, &decoders, is_cancelled, |point| {
+            let is_whole = measure_trade_off(preset, &settings, &self.hidden, &decoders, is_cancelled, |point| {
                 bar.set_message(format!("{preset}, {}", point.report.name()));
                 points.push(point);
             })?;
@@ -119,9 +119,9 @@ impl Trade {
 fn measure_levels(
     noises: &[f64],
     presets: &[Preset],
-    mut measure: impl FnMut(f64, Preset, &mut Vec<TradePoint>) -> Result<bool, Failure>,
-) -> (Vec<TradeLevel>, Result<bool, Failure>) {
-    let mut levels: Vec<TradeLevel> = Vec::new();
+    mut measure: impl FnMut(f64, Preset, &mut Vec<TradeOffPoint>) -> Result<bool, Failure>,
+) -> (Vec<TradeOffLevel>, Result<bool, Failure>) {
+    let mut levels: Vec<TradeOffLevel> = Vec::new();
     let mut is_whole = true;
     for &noise in noises {
         let mut points = Vec::new();
@@ -130,7 +130,7 @@ fn measure_levels(
             Ok(())
         });
         if !points.is_empty() {
-            levels.push(TradeLevel { noise, points });
+            levels.push(TradeOffLevel { noise, points });
         }
         match measured {
             Ok(()) => {}
@@ -138,7 +138,7 @@ fn measure_levels(
             Err((_, cause)) if levels.is_empty() => return (levels, Err(cause)),
             Err((preset, cause)) => {
                 let cause = Box::new(cause);
-                return (levels, Err(Failure::TradeLevel { noise, preset, cause }));
+                return (levels, Err(Failure::TradeOffLevel { noise, preset, cause }));
             }
         }
     }
@@ -162,7 +162,7 @@ mod tests {
                     return Err(Failure::Arguments("too wide".to_owned()));
                 }
                 let keep = |point| points.push(point);
-                Ok(measure_trade(
+                Ok(measure_trade_off(
                     preset,
                     &settings,
                     &[],

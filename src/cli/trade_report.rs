@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     decoupling::Precision,
-    evaluation::{SimulatedSettings, TradeCost, TradeLevel, TradePoint, fastest_under, most_accurate_under},
+    evaluation::{SimulatedSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, fastest_under, most_accurate_under},
     export::{format_duration, format_number},
     sensor::ArrayScale,
 };
@@ -24,13 +24,13 @@ pub(super) struct Limits {
 }
 
 /// For each point, true if it is on the Pareto front of decoding time and on that of training time.
-fn fronts(level: &TradeLevel) -> Vec<(bool, bool)> {
-    let decoding = level.front(TradeCost::Decoding).into_iter();
-    decoding.zip(level.front(TradeCost::Training)).collect()
+fn fronts(level: &TradeOffLevel) -> Vec<(bool, bool)> {
+    let decoding = level.front(TradeOffCost::Decoding).into_iter();
+    decoding.zip(level.front(TradeOffCost::Training)).collect()
 }
 
 /// Command that trains the network of `point`.
-fn command(point: &TradePoint) -> String {
+fn command(point: &TradeOffPoint) -> String {
     let settings = &point.settings;
     // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
     let mut of_preset = point.preset.settings_in(settings.source.scene.noise);
@@ -114,11 +114,11 @@ struct Choice {
 }
 
 /// The fastest and the most accurate point within `limits`, for those given.
-fn choices(level: &TradeLevel, limits: Limits) -> [Option<Choice>; 2] {
-    let choice = |limit: Option<f64>, choose: fn(&[TradePoint], f64) -> Option<&TradePoint>| {
+fn choices(level: &TradeOffLevel, limits: Limits) -> [Option<Choice>; 2] {
+    let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<&TradeOffPoint>| {
         let limit = limit?;
         let chosen = choose(&level.points, limit);
-        let is_chosen = |point: &TradePoint| chosen.is_some_and(|chosen| std::ptr::eq(point, chosen));
+        let is_chosen = |point: &TradeOffPoint| chosen.is_some_and(|chosen| std::ptr::eq(point, chosen));
         Some(Choice {
             limit,
             point: level.points.iter().position(is_chosen),
@@ -132,8 +132,8 @@ fn choices(level: &TradeLevel, limits: Limits) -> [Option<Choice>; 2] {
 }
 
 /// Prints one JSON object.
-pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limits) -> Result<(), Failure> {
-    let point = |(point, (on_decoding_front, on_training_front)): (&TradePoint, (bool, bool))| PointReport {
+pub(super) fn print_json(array: ArrayScale, levels: &[TradeOffLevel], limits: Limits) -> Result<(), Failure> {
+    let point = |(point, (on_decoding_front, on_training_front)): (&TradeOffPoint, (bool, bool))| PointReport {
         preset: point.preset.to_string(),
         decoder: point.report.kind.to_string(),
         precision: match point.report.precision {
@@ -154,7 +154,7 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
         on_training_front,
         command: command(point),
     };
-    let level = |level: &TradeLevel| {
+    let level = |level: &TradeOffLevel| {
         let [fastest_under, most_accurate_under] = choices(level, limits);
         LevelReport {
             noise: level.noise,
@@ -171,11 +171,11 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
 }
 
 /// Prints a table for each level of noise.
-pub(super) fn print_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits) -> Result<(), Failure> {
+pub(super) fn print_text(array: ArrayScale, levels: &[TradeOffLevel], limits: Limits) -> Result<(), Failure> {
     print(|output| write_text(array, levels, limits, output))
 }
 
-fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mut impl Write) -> io::Result<()> {
+fn write_text(array: ArrayScale, levels: &[TradeOffLevel], limits: Limits, out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
         "{array}: time for a frame (one thread) and training time against the error of z"
@@ -186,11 +186,11 @@ fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mu
     writeln!(
         out,
         "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
-         Training time is the sum over all rows and restarts."
+         Training time is the sum over all rows and starts."
     )
 }
 
-fn write_level(level: &TradeLevel, limits: Limits, out: &mut impl Write) -> io::Result<()> {
+fn write_level(level: &TradeOffLevel, limits: Limits, out: &mut impl Write) -> io::Result<()> {
     write!(out, "\nNoise {}", level.noise)?;
     if let Some(reference) = level.points.first().and_then(|point| point.reference) {
         let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));

@@ -185,7 +185,7 @@ impl Train {
     }
 }
 
-/// Largest epoch among the restarts.
+/// Largest epoch among the starts.
 fn furthest(run: &Run) -> usize {
     let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
     epochs.max().unwrap_or(0)

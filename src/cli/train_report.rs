@@ -264,7 +264,8 @@ fn write_text(
     if reference.is_some_and(Errors::is_rounding) {
         writeln!(
             out,
-            "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is given."
+            "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \
+             given."
         )?;
     }
     write_decoders(decoders, reference, out)?;
@@ -361,7 +362,8 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     }
     writeln!(
         out,
-        "The residual is the rms relative difference between the readings and those of the decoded deformation; it needs no actual one."
+        "The residual is the rms relative difference between the readings and those of the decoded deformation; it \
+         needs no ground truth."
     )
 }
 

@@ -27,7 +27,7 @@ pub(super) struct TrainingArguments {
     /// Hidden nodes [default: 12]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
-    /// Restarts from different random weights, trained side by side; the best by validation error is kept [default: 1]
+    /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
     starts: Option<usize>,
     /// Training method [default: lm]
@@ -200,8 +200,9 @@ mod tests {
     fn the_defaults_in_the_help_are_those_of_the_library() {
         assert_eq!(parsed("train").settings().unwrap(), SimulatedSettings::default());
         let told = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
-                    --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 --goal 0 --max-fail 6 \
-                    --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples 200 --seed 0";
+                    --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
+                    --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
+                    200 --seed 0";
         assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
     }
 }

@@ -54,7 +54,7 @@ pub struct CrossValidated {
 /// Number and time of the epochs trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Number of epochs, over all restarts and folds.
+    /// Number of epochs, over all starts and folds.
     pub epochs: usize,
     /// Time spent on them.
     pub seconds: f64,

@@ -2,7 +2,7 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings.
+//! [`measure_trade_off`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings.
 
 mod baselines;
 mod cross_validation;
@@ -61,6 +61,6 @@ pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
 pub use target_errors::{TargetErrors, TargetRow};
-pub use trade::{TradePoint, fastest_under, measure_trade, most_accurate_under};
-pub use trade_level::{TradeCost, TradeLevel, TradeLimits};
+pub use trade::{TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
+pub use trade_level::{TradeOffCost, TradeOffLevel, TradeOffLimits};
 pub use workload::{Workload, WorkloadTime};

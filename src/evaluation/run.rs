@@ -16,9 +16,9 @@ use crate::{
     training::{Method, SettingError, StopReason, StoppingRules, TrainerState, check_width},
 };
 
-/// A run: its sets of samples, one training per restart, and the errors of the best network.
+/// A run: its sets of samples, one training per start, and the errors of the best network.
 ///
-/// Restarts share the sets and scalings and differ only in their random initialisation. The *leader* is the restart
+/// Starts share the sets and scalings and differ only in their random initialisation. The *leader* is the start
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
 /// never decides.
 pub struct Run {
@@ -49,8 +49,8 @@ impl Run {
         &self.settings
     }
 
-    /// Runs one epoch of every restart that has not ended, in parallel. Returns the reason for stopping once every
-    /// restart has ended. Results are bit-identical for any number of threads.
+    /// Runs one epoch of every start that has not ended, in parallel. Returns the reason for stopping once every
+    /// start has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
         let begun = Instant::now();
         match self.starts.as_mut_slice() {
@@ -66,7 +66,7 @@ impl Run {
         self.stop_reason()
     }
 
-    /// Time that all restarts together have taken by the clock, without pauses; `None` if the run was resumed and the
+    /// Time that all starts together have taken by the clock, without pauses; `None` if the run was resumed and the
     /// time before is not known. [`StartTrainer::elapsed`] adds up the times of trainings that ran side by side.
     pub fn wall_time(&self) -> Option<Duration> {
         self.wall_time
@@ -79,13 +79,13 @@ impl Run {
         self
     }
 
-    /// Stops every restart at the user's request.
+    /// Stops every start at the user's request.
     pub fn stop(&mut self) {
         self.starts.iter_mut().for_each(StartTrainer::stop);
     }
 
-    /// Returns the reason for stopping once every restart has ended: the leader's, or [`StopReason::Stopped`] if the
-    /// user stopped any restart before its end.
+    /// Returns the reason for stopping once every start has ended: the leader's, or [`StopReason::Stopped`] if the
+    /// user stopped any start before its end.
     pub fn stop_reason(&self) -> Option<StopReason> {
         let reasons = self.starts.iter().map(StartTrainer::stop_reason);
         let reasons: Vec<_> = reasons.collect::<Option<_>>()?;
@@ -100,7 +100,7 @@ impl Run {
         RunFlaw::of(self.leader())
     }
 
-    /// Continues every restart from its present weights with another method: [`Trainer::continue_with`].
+    /// Continues every start from its present weights with another method: [`Trainer::continue_with`].
     ///
     /// # Errors
     /// If a setting is out of range, or the networks are too wide for the method; nothing is then changed.
@@ -109,7 +109,7 @@ impl Run {
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
         check_width(&method, rows[0].present().shape(), samples, trainings)?;
-        // Restarts have the same shapes, so either the first is refused or none.
+        // Starts have the same shapes, so either the first is refused or none.
         for start in &mut self.starts {
             start.continue_with(method)?;
         }
@@ -117,7 +117,7 @@ impl Run {
         Ok(())
     }
 
-    /// Changes the stopping rules of every restart: [`Trainer::set_stopping`].
+    /// Changes the stopping rules of every start: [`Trainer::set_stopping`].
     ///
     /// # Errors
     /// If a setting is out of range; nothing is then changed.
@@ -129,7 +129,7 @@ impl Run {
         Ok(())
     }
 
-    /// Trainings of all restarts.
+    /// Trainings of all starts.
     pub fn trainers(&self) -> &[StartTrainer] {
         &self.starts
     }
@@ -144,7 +144,7 @@ impl Run {
         &self.starts[self.leader_number()]
     }
 
-    /// Returns a record of each restart. Decodes the test set once per restart.
+    /// Returns a record of each start. Decodes the test set once per start.
     pub fn starts(&self) -> Vec<StartRecord> {
         let record = |trainer: &StartTrainer| {
             let best = trainer.best_records();
@@ -162,7 +162,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// Returns the states of all trainings for [`Self::resume`]: restart by restart, and in each row by row.
+    /// Returns the states of all trainings for [`Self::resume`]: start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts.iter().flat_map(StartTrainer::states).collect()
     }

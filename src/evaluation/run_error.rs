@@ -93,7 +93,7 @@ pub enum RunError {
     /// A saved training cannot be resumed.
     #[error("start {}: {source}", .start + 1)]
     Resume {
-        /// Index of the restart, from 0.
+        /// Index of the start, from 0.
         start: usize,
         /// Reason given by the trainer.
         source: ResumeError,

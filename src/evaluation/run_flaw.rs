@@ -17,7 +17,7 @@ pub struct RunFlaw {
 }
 
 impl RunFlaw {
-    /// Finds the defect of one restart whose trainings have all ended.
+    /// Finds the defect of one start whose trainings have all ended.
     pub(super) fn of(start: &StartTrainer) -> Option<Self> {
         start.stop_reason()?;
         let numbered = start.rows().iter().enumerate();

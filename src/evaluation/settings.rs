@@ -23,7 +23,7 @@ pub struct RunSettings<S = Source> {
     pub inputs: InputChoice,
     /// Number of hidden nodes.
     pub hidden: usize,
-    /// Number of restarts: trainings from different random initialisations, the best of which by validation error is
+    /// Number of starts: trainings from different random initialisations, the best of which by validation error is
     /// kept.
     pub starts: usize,
     /// Training method, its settings, and the stopping rules.
@@ -35,7 +35,7 @@ pub struct RunSettings<S = Source> {
 /// Settings of a run on simulated samples.
 pub type SimulatedSettings = RunSettings<Simulation>;
 
-/// Largest number of restarts in a run: enough for the distribution of its results, and within memory.
+/// Largest number of starts in a run: enough for the distribution of its results, and within memory.
 pub const MOST_STARTS: usize = 100;
 
 /// Error for a number out of its range.
@@ -101,7 +101,7 @@ impl<S> RunSettings<S> {
         }
     }
 
-    /// Checks the numbers of hidden nodes and restarts; the other parts are checked where they are used.
+    /// Checks the numbers of hidden nodes and starts; the other parts are checked where they are used.
     ///
     /// # Errors
     /// The first number out of range.
@@ -176,7 +176,7 @@ struct Record {
     seed: Seed,
 }
 
-/// Default for files written before there were several restarts.
+/// Default for files written before there were several starts.
 fn one_start() -> usize {
     1
 }

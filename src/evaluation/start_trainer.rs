@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// Trainings of one restart: one shared by all row-wires, or one per row-wire where the row is known, in parallel.
+/// Trainings of one start: one shared by all row-wires, or one per row-wire where the row is known, in parallel.
 ///
 /// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
 pub struct StartTrainer {
@@ -19,7 +19,7 @@ pub struct StartTrainer {
 }
 
 impl StartTrainer {
-    /// Combines the trainings of one restart.
+    /// Combines the trainings of one start.
     ///
     /// # Panics
     /// If `rows` is empty.

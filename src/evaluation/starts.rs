@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::training::StopReason;
 
-/// Result of one restart of a run.
+/// Result of one start of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartRecord {
@@ -21,14 +21,14 @@ pub struct StartRecord {
 }
 
 impl StartRecord {
-    /// Returns the error by which the best restart is selected: on the validation set, or on the training set if
+    /// Returns the error by which the best start is selected: on the validation set, or on the training set if
     /// nothing is held out.
     pub fn deciding_mse(&self) -> f64 {
         self.validation_mse.unwrap_or(self.train_mse)
     }
 }
 
-/// Returns the index of the best restart, from 0: the first with the lowest selection error.
+/// Returns the index of the best start, from 0: the first with the lowest selection error.
 pub fn best_start(starts: &[StartRecord]) -> Option<usize> {
     lowest(starts.iter().map(StartRecord::deciding_mse))
 }

@@ -3,20 +3,20 @@ use crate::decoupling::{DecoderKind, Precision};
 
 /// One decoder on the trade-off between speed and accuracy.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TradePoint {
+pub struct TradeOffPoint {
     /// Preset from which the settings were derived.
     pub preset: Preset,
     /// Settings of the run; the hidden nodes matter only if the decoder has a network.
     pub settings: SimulatedSettings,
     /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
-    /// Training or fitting time in seconds, summed over all rows and restarts.
+    /// Training or fitting time in seconds, summed over all rows and starts.
     pub training_seconds: f64,
     /// Errors of the Bayesian reference in this scene; `None` where a posterior did not converge.
     pub reference: Option<Errors>,
 }
 
-impl TradePoint {
+impl TradeOffPoint {
     /// Returns AveZerr in percent; infinite if undefined.
     pub fn z_percent(&self) -> f64 {
         self.report.errors.z_percent.unwrap_or(f64::INFINITY)
@@ -49,13 +49,13 @@ impl TradePoint {
 ///
 /// # Errors
 /// If the settings are invalid.
-pub fn measure_trade(
+pub fn measure_trade_off(
     preset: Preset,
     settings: &SimulatedSettings,
     hidden: &[usize],
     decoders: &[DecoderKind],
     is_cancelled: impl Fn() -> bool,
-    mut on_point: impl FnMut(TradePoint),
+    mut on_point: impl FnMut(TradeOffPoint),
 ) -> Result<bool, RunError> {
     let mut set = DecoderSet::new(settings, None)?;
     let test = settings.draw_test()?;
@@ -68,7 +68,7 @@ pub fn measure_trade(
         }
         let report = set.measure(kind, Precision::Double, &test)?;
         let report = report.expect("it needs no network");
-        on_point(TradePoint {
+        on_point(TradeOffPoint {
             preset,
             settings: *settings,
             training_seconds: report.cost.fit_seconds,
@@ -93,7 +93,7 @@ pub fn measure_trade(
         for &kind in &with_network {
             for &precision in kind.precisions() {
                 let report = set.measure(kind, precision, &test)?.expect("it has its network");
-                on_point(TradePoint {
+                on_point(TradeOffPoint {
                     preset,
                     settings,
                     report,
@@ -117,13 +117,13 @@ pub(super) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
 }
 
 /// Returns the point with the least decoding time among those with an error of at most `percent`.
-pub fn fastest_under(points: &[TradePoint], percent: f64) -> Option<&TradePoint> {
+pub fn fastest_under(points: &[TradeOffPoint], percent: f64) -> Option<&TradeOffPoint> {
     let good = points.iter().filter(|point| point.z_percent() <= percent);
     good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
 }
 
 /// Returns the point with the least error among those that decode a frame within `microseconds`.
-pub fn most_accurate_under(points: &[TradePoint], microseconds: f64) -> Option<&TradePoint> {
+pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Option<&TradeOffPoint> {
     let quick = points.iter().filter(|point| point.report.cost.frame_us <= microseconds);
     quick.min_by(|a, b| a.z_percent().total_cmp(&b.z_percent()))
 }

@@ -1,11 +1,11 @@
 use super::{
-    TradePoint,
+    TradeOffPoint,
     trade::{fastest_under, most_accurate_under, pareto_front},
 };
 
 /// Cost weighed against the error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum TradeCost {
+pub enum TradeOffCost {
     /// Time to decode a frame on one thread.
     #[default]
     Decoding,
@@ -13,12 +13,12 @@ pub enum TradeCost {
     Training,
 }
 
-impl TradeCost {
+impl TradeOffCost {
     /// Both costs, in the order offered to the user.
     pub const ALL: [Self; 2] = [Self::Decoding, Self::Training];
 
     /// Returns the cost (microseconds of decoding, or seconds of training) and the error of z in percent.
-    pub fn of(self, point: &TradePoint) -> (f64, f64) {
+    pub fn of(self, point: &TradeOffPoint) -> (f64, f64) {
         match self {
             Self::Decoding => point.decoding(),
             Self::Training => point.training(),
@@ -36,14 +36,14 @@ impl TradeCost {
 
 /// Limits of the questions "fastest under" and "most accurate under".
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TradeLimits {
+pub struct TradeOffLimits {
     /// Largest Z error, in percent.
     pub percent: f64,
     /// Longest time of a frame, in microseconds.
     pub microseconds: f64,
 }
 
-impl Default for TradeLimits {
+impl Default for TradeOffLimits {
     fn default() -> Self {
         Self {
             percent: 1.0,
@@ -54,23 +54,23 @@ impl Default for TradeLimits {
 
 /// Points of the trade-off at one noise level.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TradeLevel {
+pub struct TradeOffLevel {
     /// Relative error of a reading.
     pub noise: f64,
     /// Points in the order in which they were measured.
-    pub points: Vec<TradePoint>,
+    pub points: Vec<TradeOffPoint>,
 }
 
-impl TradeLevel {
+impl TradeOffLevel {
     /// Marks the points on the Pareto front for this cost.
-    pub fn front(&self, cost: TradeCost) -> Vec<bool> {
+    pub fn front(&self, cost: TradeOffCost) -> Vec<bool> {
         let points: Vec<_> = self.points.iter().map(|point| cost.of(point)).collect();
         pareto_front(&points)
     }
 
     /// Returns the indices of the points that answer "fastest under" and "most accurate under".
-    pub fn answers(&self, limits: &TradeLimits) -> [Option<usize>; 2] {
-        let index = |chosen: Option<&TradePoint>| {
+    pub fn answers(&self, limits: &TradeOffLimits) -> [Option<usize>; 2] {
+        let index = |chosen: Option<&TradeOffPoint>| {
             let chosen = chosen?;
             self.points.iter().position(|point| std::ptr::eq(point, chosen))
         };

@@ -37,7 +37,7 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
-pub use trade_file::write_trade;
+pub use trade_file::write_trade_off;
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
 pub use workload_words::describe_workload;

@@ -2,7 +2,7 @@ use std::io::{self, Write};
 
 use crate::{
     decoupling::Precision,
-    evaluation::{TradeCost, TradeLevel},
+    evaluation::{TradeOffCost, TradeOffLevel},
 };
 
 /// Writes every point of every level as CSV. Numbers are written so that reading gives the same bits; where there is none
@@ -10,14 +10,14 @@ use crate::{
 ///
 /// # Errors
 /// Any error of `writer`.
-pub fn write_trade(levels: &[TradeLevel], writer: &mut dyn Write) -> io::Result<()> {
+pub fn write_trade_off(levels: &[TradeOffLevel], writer: &mut dyn Write) -> io::Result<()> {
     writeln!(
         writer,
         "noise,preset,decoder,precision,hidden,samples,epochs,z_percent,z_mm,frame_us,training_s,residual,\
          reference_z_percent,reference_z_mm,on_decoding_front,on_training_front"
     )?;
     for level in levels {
-        let [decoding, training] = TradeCost::ALL.map(|cost| level.front(cost));
+        let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
         for ((point, on_decoding), on_training) in level.points.iter().zip(decoding).zip(training) {
             let report = &point.report;
             let precision = match report.precision {

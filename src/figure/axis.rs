@@ -37,7 +37,7 @@ pub struct PlotAxis {
     pub name: String,
     /// Linear or logarithmic.
     pub scale: AxisScale,
-    /// Where the ticks are.
+    /// Rule that places the ticks.
     pub ticks: TickRule,
     /// Values that are always in view; where one is the least or the largest, the axis ends there.
     pub includes: Vec<f64>,

@@ -140,7 +140,7 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
     }
 }
 
-/// What [`EpochRecord::parameter`] is through all methods of a training.
+/// Returns the name of [`EpochRecord::parameter`] in all methods of a training.
 fn parameter_name(stages: &[Stage]) -> &'static str {
     let mut names = stages.iter().map(|stage| stage.method.parameter_name());
     let first = names.next().unwrap_or("parameter");
@@ -191,7 +191,10 @@ mod tests {
         assert!(highest(&state.plots[0]) < 4.0);
         assert!((12.0..14.0).contains(&highest(&state.plots[1])));
         let words = loss.plots[0].words(&loss.plots[0].series[0], &loss.plots[0].series[0].points[2]);
-        assert!(words.contains("1.00e300"), "the pointer reads the true error: {words}");
+        assert!(
+            words.contains("1.00e300"),
+            "the pointer reads the actual error: {words}"
+        );
         let start_without_error = loss_figure(&[epoch(0, 0.0, 0), epoch(1, 1e9, 0)], &[], 0);
         assert_eq!(start_without_error.plots[0].y.place(1e9), Some(9.0));
     }

@@ -116,7 +116,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         Series {
             points: ours.collect(),
             ..Series::new(
-                "ours: median, least to largest",
+                "ours: median, smallest to largest",
                 joined(Look::marker(Hue::Blue, Marker::Disc)),
                 [],
             )
@@ -220,7 +220,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
     let keys = keys.chain(is_published.then_some(published)).collect();
     let is_zero = |cell: &CellSummary| cell.y_percent.median == Some(0.0);
-    let note = "Y is constant: our error of it is 0 and below its axis.";
+    let note = "Y is constant: its error is 0 and lies below the axis.";
     PlotFigure {
         plots: plots.into(),
         keys,

@@ -19,7 +19,7 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
     let others = rows.iter().enumerate().filter(|(index, _)| *index != worst);
     let others = others.map(|(_, row)| Series::new(format!("row {}", row.row + 1), pale, numbered(row)));
     let strongest = rows.get(worst).map(|row| {
-        let name = format!("row {}, the worst", row.row + 1);
+        let name = format!("row {}, worst", row.row + 1);
         Series::new(name, strong, numbered(row))
     });
     let series: Vec<Series> = others.chain(strongest).collect();
@@ -29,7 +29,7 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
     }
     let mut lines = Vec::new();
     if hidden_below_per_mm > 0.0 {
-        let (name, hue, style) = ("noise hides what is below", Hue::Orange, LineStyle::Dashed);
+        let (name, hue, style) = ("noise hides values below", Hue::Orange, LineStyle::Dashed);
         lines.push(ReferenceLine::new(name, LineAt::Y(hidden_below_per_mm), hue, style));
         keys.push(Key::new(name, Look::line(hue, style)));
     }

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{Preset, TradeCost, TradeLevel, TradeLimits, TradePoint, format::format_percent},
+    evaluation::{Preset, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, format::format_percent},
 };
 
 const FRONT: Look = Look {
@@ -36,8 +36,8 @@ const ANSWER: Look = Look {
 /// The points at one level of noise, one plot for each cost: colours tell the decoder, discs and diamonds the preset,
 /// hollow marks 32 bits. With the Pareto front, the Bayesian reference, and the answers to the two questions with their
 /// limits.
-pub fn trade_off_figure(level: &TradeLevel, limits: &TradeLimits) -> PlotFigure {
-    let plots: Vec<Plot> = TradeCost::ALL.map(|cost| plot(level, limits, cost)).into();
+pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
+    let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
     let mut keys = Vec::new();
     for kind in DecoderKind::ALL {
         let is_there = level.points.iter().any(|point| point.report.kind == kind);
@@ -66,7 +66,7 @@ pub fn trade_off_figure(level: &TradeLevel, limits: &TradeLimits) -> PlotFigure 
         frame_time(limits.microseconds)
     );
     let marks = [
-        ("no other is better", FRONT),
+        ("Pareto front", FRONT),
         ("Bayesian reference", REFERENCE),
         (&*questions, ANSWER),
         ("their limits", LIMIT),
@@ -93,16 +93,16 @@ fn marker(preset: Preset, precision: Precision) -> Marker {
     }
 }
 
-fn plot(level: &TradeLevel, limits: &TradeLimits, cost: TradeCost) -> Plot {
-    let at = |point: &TradePoint| {
+fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> Plot {
+    let at = |point: &TradeOffPoint| {
         let (x, y) = cost.of(point);
         [x, y]
     };
-    let mut series = vec![Series::new("no other is better", FRONT, front(level, cost))];
+    let mut series = vec![Series::new("Pareto front", FRONT, front(level, cost))];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL {
-                let is_of = |point: &&TradePoint| {
+                let is_of = |point: &&TradeOffPoint| {
                     (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
                 };
                 let points = level.points.iter().filter(is_of).map(|point| PlotPoint {
@@ -144,7 +144,7 @@ fn plot(level: &TradeLevel, limits: &TradeLimits, cost: TradeCost) -> Plot {
     let is_among = |limit: f64, axis: usize| {
         places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
     };
-    if cost == TradeCost::Decoding {
+    if cost == TradeOffCost::Decoding {
         if is_among(limits.microseconds, 0) {
             plot.lines
                 .push(line("longest time", LineAt::X(limits.microseconds), LIMIT));
@@ -161,7 +161,7 @@ fn line(name: &str, at: LineAt, look: Look) -> ReferenceLine {
 }
 
 /// From point to point that no other beats, in steps: between them nothing better was measured.
-fn front(level: &TradeLevel, cost: TradeCost) -> Vec<[f64; 2]> {
+fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
     let chosen = level.points.iter().zip(level.front(cost));
     let places = chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
         let (x, y) = cost.of(point);

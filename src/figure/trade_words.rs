@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use crate::evaluation::{
-    TradePoint,
+    TradeOffPoint,
     format::{format_duration, format_number, format_percent},
 };
 
 /// `Network f32, best preset, 12 hidden`.
-pub fn point_name(point: &TradePoint) -> String {
+pub fn point_name(point: &TradeOffPoint) -> String {
     let mut name = point.report.kind.name(point.report.precision).to_owned();
     name += &format!(", {} preset", point.preset);
     if let Some(hidden) = point.hidden() {
@@ -31,8 +31,8 @@ pub fn training_time(seconds: f64) -> String {
     Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)
 }
 
-/// What a point gains and costs, line by line.
-pub fn point_facts(point: &TradePoint) -> Vec<String> {
+/// Returns the errors and times of a point, line by line.
+pub fn point_facts(point: &TradeOffPoint) -> Vec<String> {
     let mut facts = vec![format!(
         "Z error {}, {} mm",
         format_percent(point.report.errors.z_percent),

@@ -29,7 +29,7 @@ pub struct Noise {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoisySets {
-    /// Training and test alike: the network learns what noise does.
+    /// Training and test samples: the network learns to handle the noise.
     #[default]
     Both,
     /// Training only.

@@ -185,7 +185,7 @@ pub(crate) fn choose_method(driver: &mut Driver, name: &str) {
 #[test]
 fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_back() {
     let mut driver = Driver::open();
-    let reset = "Back to the paper's settings";
+    let reset = "Reset to the paper's settings";
     assert!(!driver.is_enabled(reset));
     driver.click("Geometry");
     driver.enter("Height", "8");
@@ -213,7 +213,7 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         driver.get("Actual surface").value().unwrap().contains("to 7.9")
             || driver.get("Actual surface").value().unwrap().contains("to 8")
     );
-    driver.click("Back to the assumed geometry");
+    driver.click("Reset to the assumed geometry");
     assert_eq!(driver.state().draft.source.sensor.geometry, Geometry::default());
     assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 1e3);
     driver.enter("Hidden nodes", "3");

@@ -86,8 +86,8 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     }
     driver.settle();
 
-    driver.click("Order by Z % median");
-    driver.click("Order by Z % median");
+    driver.click("Sort by Z % median");
+    driver.click("Sort by Z % median");
     let sort = driver.views().experiments.look.sort;
     assert!(sort.is_descending && sort.column.is_some());
 
@@ -197,10 +197,10 @@ fn lists_that_cannot_be_run_say_why_until_mended() {
     driver.click("Table 2");
     driver.enter("Folds", "500");
     assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
-    driver.click("Back to the paper's values");
+    driver.click("Reset to the paper's values");
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Table 1");
-    driver.click("Back to the paper's values");
+    driver.click("Reset to the paper's values");
     assert!(driver.is_enabled("▶ Run"));
 }
 

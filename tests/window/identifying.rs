@@ -51,7 +51,7 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     let mut driver = open();
     let mut sensor = driver.state().draft.source.sensor;
     shows_condition_of(&driver, &sensor);
-    assert!(driver.says("Without noise every deformation can be told"));
+    assert!(driver.says("Without noise, the readings determine every deformation"));
     driver.enter("Height", "8");
     driver.enter("Column-wires", "40");
     wait_for_the_answer(&mut driver);
@@ -86,7 +86,7 @@ fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
     let pitch = analysis(&driver).question.sensor.geometry.node_pitch_mm;
     assert!(pitch > before.source.sensor.geometry.node_pitch_mm, "{pitch}");
     assert_eq!(driver.state().draft, before, "trying changes nothing there");
-    driver.click("Back to the Train view's");
+    driver.click("Reset to the Train view's sensor");
     wait_for_the_answer(&mut driver);
     assert_eq!(analysis(&driver).question, Question::of(&before));
 }
@@ -105,7 +105,7 @@ fn rows_that_mirror_each_other_are_told_until_the_row_is_known() {
     driver.click_button("Row known");
     wait_for_the_answer(&mut driver);
     assert!(!driver.says("cannot be told apart"));
-    assert!(driver.has("Rows most alike: the row is known"));
+    assert!(driver.has("Most similar rows: the row is known"));
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn noise_that_hides_everything_is_told_with_what_to_change() {
     wait_for_the_answer(&mut driver);
     let seen = analysis(&driver).patterns_seen();
     assert!((1..10).contains(&seen), "{seen}");
-    assert!(driver.has(&format!("Patterns out of the noise: {seen} of 10")));
-    assert!(driver.says(&format!("This noise hides {} of 10 patterns", 10 - seen)));
+    assert!(driver.has(&format!("Deformation patterns above the noise: {seen} of 10")));
+    assert!(driver.says(&format!("The noise hides {} of 10 deformation patterns", 10 - seen)));
     driver.enter("Relative noise", "1");
     wait_for_the_answer(&mut driver);
     assert!(driver.says("the readings hardly narrow the deformation"));

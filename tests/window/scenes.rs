@@ -40,7 +40,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     assert!(driver.has("18 inputs, 12 outputs, 198 weights"));
     driver.click_button("Known");
     // (18 + 1) · 6 + (6 + 1) · 6: x of a known row does not vary.
-    assert!(driver.has("10 networks of 18 inputs, 6 outputs and 156 weights: 1560 in all"));
+    assert!(driver.has("10 networks of 18 inputs, 6 outputs and 156 weights: 1560 in total"));
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
@@ -270,14 +270,14 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
         format!("Condition number {number}")
     };
     assert_eq!(condition(&driver), of(&driver.state().draft));
-    assert!(!driver.says("badly conditioned"));
+    assert!(!driver.says("ill-conditioned"));
     driver.click_button("x, y, z");
     assert!(driver.has("180 unknowns, 180 equations a frame"));
     wait_for_scene(&mut driver);
     assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(driver.says("even rounding blurs it"));
     driver.train();
-    assert!(driver.says("This scene is badly conditioned (condition number"));
+    assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();
     for row in ["training mean", "linear map", "network", "reference"] {
         let y = table.iter().find(|cell| cell.starts_with(&format!("{row}, Y %")));

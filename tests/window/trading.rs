@@ -3,8 +3,8 @@
 use std::fs;
 
 use decoupler::{
-    app::{TradeEnding, TradePlan},
-    evaluation::{Preset, TradePoint, fastest_under, measure_trade, most_accurate_under},
+    app::{TradeOffEnding, TradeOffPlan},
+    evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
     export::format_percent,
 };
 use eframe::egui::vec2;
@@ -19,14 +19,14 @@ fn open() -> Driver {
 }
 
 /// Ridge, Newton and small networks of both presets at two levels of noise.
-fn tiny(driver: &mut Driver) -> TradePlan {
+fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.type_into("Noise levels", "0, 1e-3");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
         driver.click(decoder);
     }
-    driver.enter("Samples at most", "100");
-    driver.enter("Epochs at most", "3");
+    driver.enter("Maximum samples", "100");
+    driver.enter("Maximum epochs", "3");
     driver.enter("Test samples", "20");
     assert!(driver.has("16 points"), "{:#?}", driver.texts());
     driver.views().trade_off.plan(&driver.state().draft).unwrap()
@@ -40,12 +40,12 @@ fn measure(driver: &mut Driver) {
 }
 
 /// What the library measures by itself.
-fn by_library(plan: &TradePlan, noise: f64) -> Vec<TradePoint> {
+fn by_library(plan: &TradeOffPlan, noise: f64) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for &preset in &plan.presets {
         let settings = plan.settings(preset, noise);
         let on_point = |point| points.push(point);
-        measure_trade(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
+        measure_trade_off(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
     }
     points
 }
@@ -58,7 +58,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     assert_eq!(
         (outcome.points(), outcome.ending),
-        ((16, 16), Some(TradeEnding::Complete))
+        ((16, 16), Some(TradeOffEnding::Complete))
     );
     for level in &outcome.levels {
         for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise)) {
@@ -108,7 +108,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     let marked = driver.views().trade_off.look.marked.unwrap();
     assert_eq!(driver.views().trade_off.shown().unwrap().points[marked], fastest);
     driver.enter("Fastest under", "1e-12");
-    assert!(driver.has("Nothing measured here is as accurate."));
+    assert!(driver.has("No measured decoder is this accurate."));
 
     driver.click("Load into Train view");
     assert_eq!((driver.shown(), driver.state().draft), ("Train", fastest.settings));
@@ -194,8 +194,8 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     tiny(&mut driver);
     let sizes: Vec<String> = (3..40).map(|hidden| hidden.to_string()).collect();
     driver.type_into("Hidden nodes", &sizes.join(" "));
-    driver.enter("Samples at most", "2000");
-    driver.enter("Epochs at most", "200");
+    driver.enter("Maximum samples", "2000");
+    driver.enter("Maximum epochs", "200");
     driver.click("▶ Measure");
     driver.wait("the first points", |driver| {
         let outcome = driver.views().trade_off.outcome.as_ref();
@@ -211,11 +211,11 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     let (done, all) = outcome.points();
     assert!((3..all).contains(&done), "{done} of {all}");
-    assert_eq!(outcome.ending, Some(TradeEnding::Cut));
+    assert_eq!(outcome.ending, Some(TradeOffEnding::Cut));
     assert!(driver.says(&format!("Ended early: {done} of {all} points")));
     // The next begins when the processor is free, and has points of its own only.
     driver.type_into("Hidden nodes", "3");
-    driver.enter("Epochs at most", "3");
+    driver.enter("Maximum epochs", "3");
     measure(&mut driver);
     assert_eq!(driver.views().trade_off.outcome.as_ref().unwrap().points(), (16, 16));
 }
@@ -242,7 +242,7 @@ fn charts_and_form_keep_to_a_narrow_window() {
     measure(&mut driver);
     driver.settle();
     assert!(driver.get("Export").rect().max.x < 1024.0);
-    for label in ["▶ Measure", "■ Cancel", "Samples at most"] {
+    for label in ["▶ Measure", "■ Cancel", "Maximum samples"] {
         for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
             assert!(rect.max.x < 272.0, "{label}: {rect}");
         }

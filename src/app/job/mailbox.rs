@@ -19,7 +19,7 @@ pub(super) struct Mailbox<E> {
 
 struct Inside<E> {
     events: VecDeque<E>,
-    /// Whether the youngest of `events` is a progress, which the next progress replaces.
+    /// True if the youngest of `events` is a progress, which the next progress replaces.
     has_progress: bool,
     has_ended: bool,
 }
@@ -84,7 +84,7 @@ impl<E> Report<E> {
         Self { mailbox, wake }
     }
 
-    /// Whether the work is to end.
+    /// Returns true if the work is to end.
     pub(in crate::app) fn is_cancelled(&self) -> bool {
         self.mailbox.is_cancelled.load(Ordering::Relaxed)
     }

@@ -25,7 +25,7 @@ pub(super) use mailbox::{Report, Wake};
 /// Longest time that closing waits for work that was cancelled. What takes longer ends with the program.
 const LONGEST_WAIT: Duration = Duration::from_millis(150);
 
-/// Why work ended without a result.
+/// Reasons for which work ends without a result.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum JobError {
     /// A defect in the program.
@@ -45,7 +45,7 @@ pub enum JobError {
 pub(super) struct Job<E> {
     name: &'static str,
     wake: Wake,
-    /// Whether the work computes for long, and so yields to the window.
+    /// True if the work computes for long, and so yields to the window.
     yields: bool,
     newest: Option<Piece<E>>,
 }
@@ -123,7 +123,7 @@ impl<E> Job<E> {
         self.heard()?.next_event()
     }
 
-    /// Whether an event is still to come.
+    /// Returns true while an event is still to come.
     pub(super) fn is_under_way(&self) -> bool {
         self.heard().is_some_and(Mailbox::has_more)
     }

@@ -14,7 +14,7 @@ use crate::{
 /// Width of the scale of colours with its numbers and name, in points.
 const SCALE_WIDTH: f32 = space(18);
 
-/// What the user did with a cell.
+/// Click or hover on a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellPointed {
     /// Clicked it.

@@ -18,7 +18,7 @@ use crate::{
 
 /// Opacity of the tint of a span of an axis.
 const SPAN_TINT: f32 = 0.12;
-/// What the number at a tick takes with the room around it, in points.
+/// Width of a tick's number with the room around it, in points.
 const NUMBER_WIDTH: f64 = 50.0;
 const NUMBER_HEIGHT: f64 = 16.0;
 /// The least distance of grid lines, in points; the plot tells its scale by it.

@@ -10,24 +10,24 @@ use crate::{
     figure::{Key, Plot, PlotFigure},
 };
 
-/// What the pointer does in a plot.
+/// Response of a plot to the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pointer {
     /// It moves and zooms, and shows the words of the point under it.
     Moves,
-    /// What lies on the plot answers it.
+    /// The marks on the plot respond to it.
     Picks,
 }
 
 /// A plot as it stands on the screen.
 pub struct DrawnPlot<'a> {
-    /// What is drawn.
+    /// Plot that is drawn.
     pub plot: &'a Plot,
     transform: PlotTransform,
 }
 
 impl DrawnPlot<'_> {
-    /// Where a point stands; `None` if an axis has no place for it.
+    /// Position of a point on the screen; `None` if an axis has no place for it.
     pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
         let [x, y] = self.plot.place(x, y)?;
         Some(self.transform.position_from_point(&Place::new(x, y)))

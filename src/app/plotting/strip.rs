@@ -12,15 +12,15 @@ use crate::{
 /// One dot for each value on a line, with a box over the middle half of them.
 #[derive(Clone, Copy, Debug)]
 pub struct StripChart<'a> {
-    /// What the picture shows, for assistive technology.
+    /// Name of the picture, for assistive technology.
     pub label: &'static str,
-    /// What is measured, below the axis.
+    /// Name of the axis, drawn below it.
     pub axis: &'static str,
     /// The values; those that are not numbers have no dot.
     pub values: &'a [Option<f64>],
     /// The place of the value in the accent colour.
     pub marked: usize,
-    /// How the values spread.
+    /// Quartiles and extremes of the values.
     pub spread: Spread,
 }
 
@@ -111,8 +111,6 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("{}: {text}", chart.label)));
     match hovered {
         Some((number, value)) => response.on_hover_text(format!("Start {}: {}", number + 1, format_number(value))),
-        None => {
-            response.on_hover_text("A dot for each start, the one kept in colour; box: the middle half, line: median")
-        }
+        None => response.on_hover_text("One dot for each start, the kept one in colour; box: quartiles, line: median."),
     };
 }

@@ -11,9 +11,9 @@ use crate::{
     dataset::FoldUnit,
     decoupling::DecoderKind,
     evaluation::{
-        CrossValidation, Preset, Run, SimulatedSettings, TradeLevel, TradeLimits,
+        CrossValidation, Preset, Run, SimulatedSettings, TradeOffLevel, TradeOffLimits,
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments},
-        measure_trade,
+        measure_trade_off,
     },
     figure::{
         Figure, compared_losses_figure, error_histogram_figure, experiment_figure, loss_figure, node_figure,
@@ -22,7 +22,7 @@ use crate::{
     sensor::{Axes, Identifiability},
 };
 
-/// What can be counted and read in a picture.
+/// Text and counts of marks found in a picture.
 #[derive(Debug, Default, PartialEq)]
 struct Seen {
     /// Discs, rings and dots.
@@ -189,15 +189,15 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     for preset in Preset::ALL {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network, DecoderKind::Newton];
         let on_point = |point| points.push(point);
-        measure_trade(preset, &small(preset), &[3], &kinds, || false, on_point).unwrap();
+        measure_trade_off(preset, &small(preset), &[3], &kinds, || false, on_point).unwrap();
     }
-    let level = TradeLevel { noise: 0.0, points };
-    let limits = TradeLimits {
+    let level = TradeOffLevel { noise: 0.0, points };
+    let limits = TradeOffLimits {
         percent: 50.0,
         microseconds: 1e9,
     };
     let trade_off = same("trade-off", trade_off_figure(&level, &limits));
-    for word in ["Network", "best preset, 32 bits", "no other is better"] {
+    for word in ["Network", "best preset, 32 bits", "Pareto front"] {
         assert!(trade_off.words.contains(word), "{word}: {trade_off:?}");
     }
     let settings = small(Preset::Paper);

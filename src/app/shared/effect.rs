@@ -1,7 +1,7 @@
 use super::{FileTask, Look, Notice};
 use crate::{evaluation::SimulatedSettings, training::TrainerState};
 
-/// What a view asks of the window, which does it in one place once everything is drawn.
+/// Request of a view to the window, which carries all of them out in one place once everything is drawn.
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// Change the settings of the next training.
@@ -34,6 +34,6 @@ pub enum Effect {
     RemoveRun(u64),
     /// Tell the user.
     Tell(Notice),
-    /// What the user was told has been dealt with.
+    /// The user has dismissed the notice.
     DismissNotice,
 }

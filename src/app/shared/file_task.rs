@@ -10,28 +10,28 @@ use crate::app::training_worker::{RunId, WriteRun};
 /// does until the path is known changes nothing.
 #[derive(Clone, Debug)]
 pub struct FileTask {
-    /// What it is called.
+    /// Words that describe the file.
     pub words: FileWords,
     /// Its name, unless the user says otherwise.
     pub suggestion: String,
-    /// What to do with it.
+    /// Read or write, and of which content.
     pub purpose: Purpose,
 }
 
-/// What a file is called.
+/// Words that describe a kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileWords {
     /// The words on its button.
     pub name: &'static str,
-    /// What it holds, in a word or two.
+    /// Content in a word or two.
     pub kind: &'static str,
-    /// What it is, in a sentence.
+    /// Content in a sentence.
     pub description: &'static str,
     /// Extensions that it may have, without the dot; the first unless the user says otherwise.
     pub extensions: &'static [&'static str],
 }
 
-/// What to do with a file once its path is known.
+/// Action on a file once its path is known.
 #[derive(Clone, Debug)]
 pub enum Purpose {
     /// Take up the training saved in it.
@@ -52,7 +52,7 @@ impl Contents {
     /// Writes the file.
     ///
     /// # Errors
-    /// Why it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         (self.0)(path)
     }
@@ -79,7 +79,7 @@ impl FileTask {
         }
     }
 
-    /// Whether it is read, not written.
+    /// Returns true if the file is read, not written.
     pub fn is_read(&self) -> bool {
         matches!(self.purpose, Purpose::Open)
     }
@@ -89,7 +89,7 @@ impl FileTask {
         if self.is_read() { "Open" } else { "Save" }
     }
 
-    /// Where it goes unless the user says otherwise.
+    /// Returns the path that is suggested to the user.
     pub fn suggested_path(&self) -> PathBuf {
         std::env::current_dir().unwrap_or_default().join(&self.suggestion)
     }

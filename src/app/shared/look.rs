@@ -1,6 +1,6 @@
 use crate::figure::surface::{OrbitCamera, ViewMode};
 
-/// How surfaces are looked at, in whatever view.
+/// Camera and mode in which all views draw surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Shared by all surfaces.
@@ -11,7 +11,7 @@ pub struct Look {
     pub is_dark: bool,
 }
 
-/// What is shown of a network.
+/// Surface shown of a network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RightCard {
     /// The surface that it found.

@@ -1,5 +1,5 @@
-//! What all views read: the settings, the training on show, the run list, and how surfaces are looked at; and what a view
-//! may ask for.
+//! State shared by all views (the settings, the training on show, the run list, the look of surfaces) and the effects
+//! that a view may ask for.
 
 mod effect;
 mod file_task;

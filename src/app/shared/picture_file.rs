@@ -13,8 +13,8 @@ use crate::{
 pub const SURFACES: FileWords = FileWords {
     name: "Surfaces, PNG or SVG…",
     kind: "picture of the surfaces",
-    description: "The surfaces as they are in view, with the camera and the error card, for print: on a light ground, as PNG \
-                  or SVG as the name ends.",
+    description: "The surfaces as shown, with the error card, on a light background for print. The extension of the \
+                  file name selects PNG or SVG.",
     extensions: &["png", "svg"],
 };
 
@@ -22,7 +22,8 @@ pub const SURFACES: FileWords = FileWords {
 pub const CHART: FileWords = FileWords {
     name: "Chart, PNG or SVG…",
     kind: "picture of the chart",
-    description: "The chart in view, for print: on a light ground, as PNG or SVG as the name ends.",
+    description: "The chart as shown, on a light background for print. The extension of the file name selects PNG or \
+                  SVG.",
     extensions: &["png", "svg"],
 };
 

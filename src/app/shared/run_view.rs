@@ -12,30 +12,30 @@ use crate::{
 pub struct RunView {
     /// Which it is.
     pub id: RunId,
-    /// What it is trained with.
+    /// Settings it is trained with.
     pub settings: SimulatedSettings,
-    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
+    /// Settings on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
     /// for from where it stood.
     pub asked: SimulatedSettings,
     /// Weights and biases of the network.
     pub weights: usize,
     /// Its test set.
     pub test: TestView,
-    /// What stands beside the network.
+    /// Errors of the baselines.
     pub baselines: Baselines,
-    /// What the paper reports for this configuration.
+    /// Errors that the paper reports for this configuration.
     pub published: Option<PublishedErrors>,
     /// Every epoch of the leader so far.
     pub history: Vec<EpochRecord>,
     /// The methods that the leader went through.
     pub stages: Vec<Stage>,
-    /// How each start stood when last looked at; empty where there is one only.
+    /// State of each start when last reported; empty where there is one only.
     pub starts: Vec<StartRecord>,
-    /// What the best network makes of the test set, and what that is worth.
+    /// Result of the best network on the test set.
     pub result: Option<RunResult>,
-    /// Why it ended, if it has.
+    /// Reason for which it ended, if it has.
     pub stop_reason: Option<StopReason>,
-    /// Whether it stands as in the checkpoint that it was opened from.
+    /// True while it stands as in the checkpoint that it was opened from.
     pub is_saved: bool,
 }
 

@@ -6,26 +6,26 @@ use crate::{
     training::StopReason,
 };
 
-/// What all views read.
+/// State that all views read.
 #[derive(Debug)]
 pub struct Shared {
     /// Settings of the next training.
     pub draft: SimulatedSettings,
-    /// What the worker is doing.
+    /// State of the worker.
     pub phase: Phase,
-    /// What is known about the draft before it is trained.
+    /// Facts about the draft before it is trained.
     pub preview: Option<Preview>,
     /// The present or last training.
     pub run: Option<RunView>,
     /// The run list.
     pub runs: RunList,
-    /// How surfaces are looked at.
+    /// Camera and mode of surfaces.
     pub look: Look,
     /// The names of the views whose threads compute.
     pub working: Vec<&'static str>,
 }
 
-/// What the worker is doing.
+/// State of the worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Waiting for the user.
@@ -43,20 +43,20 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Whether a training is under way, held or not; its settings cannot change then.
+    /// Returns true while a training is running or paused; its settings cannot change then.
     pub fn is_busy(self) -> bool {
         matches!(self, Self::Preparing | Self::Training | Self::Paused)
     }
 }
 
-/// What is known about settings before a training.
+/// Facts about settings before a training.
 #[derive(Debug)]
 pub struct Preview {
     /// The settings.
     pub settings: SimulatedSettings,
     /// Their test set.
     pub test: TestView,
-    /// What will stand beside the network, once it is measured.
+    /// Baselines, once they are measured.
     pub baselines: Option<Baselines>,
 }
 
@@ -95,14 +95,14 @@ impl Shared {
         }
     }
 
-    /// What the worker is doing while it does nothing: it waits after the last training, or for the first.
+    /// Returns the phase of an idle worker: that of the ended training, or idle before the first.
     pub fn phase_at_rest(&self) -> Phase {
         let ended = self.run.as_ref().and_then(|run| run.stop_reason);
         ended.map_or(Phase::Idle, Phase::Ended)
     }
 
-    /// Whether the training on show can go on from its present weights as the settings say: only what its sets and
-    /// networks are made of must be as it was. What is held goes on by itself unless the method or the stopping change.
+    /// Returns true if the training on show can continue from its present weights with the draft: its sets and networks
+    /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
         let Some(run) = self.shown_run() else { return false };
         let may_go_on = match self.phase {

@@ -12,7 +12,7 @@ use crate::{
     training::StopReason,
 };
 
-/// What is going on: phase, epoch, error, speed, time left, and why it stopped.
+/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped.
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
@@ -79,7 +79,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
                 format_duration(time_left(per_epoch, epochs.saturating_sub(epochs_run)))
             ));
         } else {
-            parts.push(format!("{} in all", format_duration(time)));
+            parts.push(format!("{} in total", format_duration(time)));
         }
     }
     parts

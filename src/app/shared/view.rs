@@ -17,7 +17,7 @@ pub trait View: Debug {
     /// Takes what its threads have to tell and follows what is shared, also while another view is on show.
     fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Whether its threads compute.
+    /// Returns true while its threads compute.
     fn is_working(&self) -> bool {
         false
     }
@@ -25,7 +25,7 @@ pub trait View: Debug {
     /// Does what the keys of this frame mean.
     fn take_shortcuts(&mut self, _ctx: &Context, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// How a window so many points wide is divided.
+    /// Returns the columns of a window of this width in points.
     fn columns(&self, _window_width: f32) -> Columns {
         Columns {
             form_width: space(68),
@@ -45,7 +45,7 @@ pub trait View: Debug {
     /// Its middle.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// What is going on, in the line at the bottom: the training, unless it has something of its own.
+    /// Shows the status line at the bottom: that of the training, unless the view has one of its own.
     fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
         training_status_ui(ui, shared);
     }
@@ -56,6 +56,6 @@ pub trait View: Debug {
 pub struct Columns {
     /// Width of the one on the left, in points.
     pub form_width: f32,
-    /// Whether there is one on the right.
+    /// True if there is a column on the right.
     pub has_report: bool,
 }

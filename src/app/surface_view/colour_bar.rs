@@ -11,7 +11,7 @@ const STRIPS: usize = 128;
 /// The scale of colours beside one or more surfaces, as a vertical bar with ticks.
 #[derive(Clone, Debug)]
 pub struct ColourBar<'a> {
-    /// What the colours stand for.
+    /// Scale of the colours.
     pub scale: &'a ColourScale,
     /// Dark or light.
     pub theme: &'a Theme,

@@ -20,7 +20,7 @@ use crate::{
 pub struct SurfaceView<'a> {
     /// Name for assistive technology and tests, and the id among its siblings: "Actual surface".
     pub label: &'a str,
-    /// What is shown.
+    /// Surface that is drawn.
     pub surface: &'a Surface,
     /// A node to mark, for instance the one hovered in a neighbouring view.
     pub marked_node: Option<usize>,
@@ -28,14 +28,14 @@ pub struct SurfaceView<'a> {
     pub theme: &'a Theme,
 }
 
-/// What the user did to a [`SurfaceView`].
+/// Response of a [`SurfaceView`] to the pointer.
 #[derive(Clone, Debug)]
 pub struct SurfaceViewResponse {
     /// The camera, turned by drags, scrolling and keys.
     pub camera: OrbitCamera,
     /// The node under the pointer.
     pub hovered_node: Option<usize>,
-    /// Where that node is on the screen.
+    /// Position of that node on the screen.
     pub hovered_at: Option<Pos2>,
     /// Of the whole card.
     pub response: Response,

@@ -19,7 +19,7 @@ pub struct Palette {
     pub text: Color32,
     /// Text of second rank: units, ticks, hints.
     pub dim: Color32,
-    /// What is selected, the network's own result, the one primary button.
+    /// Colour of the selection, the network's own result and the one primary button.
     pub accent: Color32,
     /// The primary button under the pointer.
     pub accent_hovered: Color32,

@@ -7,7 +7,7 @@ use std::{
     },
 };
 
-use super::{Event, Request, labour::Labour};
+use super::{Event, Request, training_loop::TrainingLoop};
 use crate::app::job::{Job, Wake};
 
 /// The window's end of the worker.
@@ -30,7 +30,7 @@ impl Worker {
         let mut job = Job::new("training", wake);
         let in_thread = Arc::clone(&cancelled);
         job.start(
-            move |report| Labour::new(report, &in_thread).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {
@@ -63,7 +63,7 @@ impl Worker {
         let _ = self.requests.send(request);
     }
 
-    /// Whether a training is being prepared that is not cancelled.
+    /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
         self.asked.get() > self.answered.get().max(self.cancelled.load(Ordering::Relaxed))
     }

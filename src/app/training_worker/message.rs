@@ -21,7 +21,7 @@ use crate::{
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
 };
 
-/// What the window asks of the worker.
+/// Request of the window to the worker.
 #[derive(Debug)]
 pub enum Request {
     /// Begin a training; one in progress is dropped.
@@ -42,7 +42,7 @@ pub enum Request {
     Export(RunId, WriteRun, PathBuf, Sender<Result<(), String>>),
 }
 
-/// What the worker tells the window.
+/// Message of the worker to the window.
 #[derive(Debug)]
 pub enum Event {
     /// A training has begun, or why it cannot.
@@ -76,33 +76,33 @@ impl RunId {
     }
 }
 
-/// What is known when a training begins.
+/// Facts known when a training begins.
 #[derive(Debug)]
 pub struct Began {
     /// Which it is.
     pub id: RunId,
-    /// What was asked for.
+    /// Settings asked for.
     pub settings: SimulatedSettings,
     /// Weights and biases of the network.
     pub weights: usize,
     /// The test set.
     pub test: TestView,
-    /// What stands beside the network.
+    /// Errors of the baselines.
     pub baselines: Baselines,
 }
 
-/// How a training stands.
+/// State of a training.
 #[derive(Debug)]
 pub struct Progress {
     /// Epochs of the leader since the last report, or all where another start has taken the lead.
     pub epochs: Vec<EpochRecord>,
     /// The methods that the leader went through.
     pub stages: Vec<Stage>,
-    /// How each start stands, where there are several; now and then only.
+    /// State of each start, where there are several; now and then only.
     pub starts: Option<Vec<StartRecord>>,
-    /// What the training has come to.
+    /// Result so far.
     pub result: RunResult,
-    /// Why the training has ended, if it has.
+    /// Reason for which the training has ended, if it has.
     pub stop_reason: Option<StopReason>,
 }
 
@@ -123,7 +123,7 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
     history.extend(newer);
 }
 
-/// What the best network so far makes of the test set, and what it cost.
+/// Result of the best network so far on the test set, and its cost.
 #[derive(Clone, Debug)]
 pub struct RunResult {
     /// Coordinates: samples × 3·M2.
@@ -136,7 +136,7 @@ pub struct RunResult {
     pub flaw: Option<RunFlaw>,
     /// Epochs run by the start that is furthest.
     pub epochs_run: usize,
-    /// How many starts have ended.
+    /// Number of starts that have ended.
     pub starts_ended: usize,
     /// Time of the training by the clock, all starts side by side, if it is known.
     pub wall_time: Option<Duration>,

@@ -3,9 +3,9 @@
 
 mod continuation;
 mod handle;
-mod labour;
 mod message;
+mod training_loop;
 
 pub use handle::Worker;
-pub use labour::LOST;
 pub use message::{Began, Event, Progress, Request, RunId, RunResult, WriteRun, append_epochs};
+pub use training_loop::LOST;

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use super::{job::Wake, shared::View};
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{TradeEnding, TradePlan};
+pub use trade_off::{TradeOffEnding, TradeOffPlan};
 pub use train::{BottomTab, DecoderResult};
 
 use self::{
@@ -33,9 +33,9 @@ pub struct Views {
     pub experiments: ExperimentsView,
     /// Two finished trainings side by side.
     pub compare: CompareView,
-    /// What readings can tell at all.
+    /// View of what the readings determine.
     pub identifiability: IdentifiabilityView,
-    /// What each way of decoding costs and gains.
+    /// View of the speed and the accuracy of each decoder.
     pub trade_off: TradeOffView,
 }
 

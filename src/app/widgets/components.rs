@@ -271,7 +271,7 @@ pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-/// What is going on, behind a dot of its colour; what follows in the line keeps its distance.
+/// Shows a state behind a dot of its colour; what follows in the line keeps its distance.
 pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.spacing_mut().item_spacing.x = space(4);
     let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
@@ -279,7 +279,7 @@ pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// How much is done, as a bar over the available width; `name` is what is being done.
+/// Shows a progress bar over the available width; `name` is what is being done.
 pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32) -> Response {
     let palette = &Theme::of(ui).palette;
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), space(1)), Sense::hover());

@@ -17,7 +17,7 @@ pub struct Column {
 /// A named row with one cell for each column.
 pub struct Row {
     pub name: &'static str,
-    /// What it is, under the pointer; empty for nothing.
+    /// Meaning of the column or row, shown under the pointer; empty for none.
     pub meaning: &'static str,
     pub cells: Vec<String>,
     pub colour: Color32,

@@ -152,7 +152,7 @@ impl DecouplerWindow {
     }
 }
 
-/// Whether both draw the same test set.
+/// Returns true if both draw the same test set.
 pub(super) fn have_same_test_set(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
     let test_set = |settings: &SimulatedSettings| {
         (
@@ -165,7 +165,7 @@ pub(super) fn have_same_test_set(a: &SimulatedSettings, b: &SimulatedSettings) -
     test_set(a) == test_set(b)
 }
 
-/// Whether both draw the same samples, trained on or not.
+/// Returns true if both draw the same samples, trained on or not.
 pub(super) fn have_same_sets(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
     let samples = |settings: &SimulatedSettings| (settings.source.samples, settings.source.validation_samples);
     have_same_test_set(a, b) && samples(a) == samples(b)

@@ -8,7 +8,7 @@ use crate::app::{
     widgets::{ghost_button, primary_button},
 };
 
-/// How far the wish to close the window has come.
+/// Stage of closing the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Closing {
     /// The user is asked what becomes of the unfinished training.
@@ -56,7 +56,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Whether closing loses epochs.
+    /// Returns true if closing loses epochs.
     fn has_unfinished_training(&self) -> bool {
         let is_saved = self.shared.run.as_ref().is_some_and(|run| run.is_saved);
         matches!(self.shared.phase, Phase::Training | Phase::Paused) && !is_saved

@@ -86,7 +86,7 @@ impl DecouplerWindow {
         self
     }
 
-    /// What all views read.
+    /// State that all views read.
     pub fn shared(&self) -> &Shared {
         &self.shared
     }
@@ -101,7 +101,7 @@ impl DecouplerWindow {
         self.names[self.shown].1
     }
 
-    /// What the user is told.
+    /// Notice that is shown to the user.
     pub fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
     }
@@ -204,8 +204,8 @@ impl DecouplerWindow {
     }
 }
 
-/// Whether the user did something in this frame that parts of the window already drawn may depend on: one frame more
-/// shows it everywhere. A pointer that merely moves changes nothing.
+/// Returns true if an input of this frame may change parts of the window that are already drawn, so that one more frame
+/// is needed. A pointer that merely moves changes nothing.
 fn changes_something(ctx: &Context) -> bool {
     ctx.input(|input| {
         let is_change = |event: &Event| match event {
@@ -259,7 +259,7 @@ mod tests {
         window.answer(task, path);
     }
 
-    /// What the user asks for who wants to save the network on show.
+    /// Returns the task of saving the network on show.
     fn save_task(window: &DecouplerWindow) -> FileTask {
         let write = |run: &Run, path: &Path| {
             let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
@@ -381,7 +381,7 @@ mod tests {
         let Some(Notice::Failed(reason)) = &window.notice else {
             panic!("{:?}", window.notice)
         };
-        assert!(reason.contains("another training has taken the place"), "{reason}");
+        assert!(reason.contains("another training has replaced"), "{reason}");
         assert!(!path.exists());
     }
 

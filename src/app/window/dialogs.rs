@@ -17,7 +17,7 @@ use crate::app::{
 /// be found out; a person who cancels as fast is asked in the window.
 const NO_PERSON: Duration = Duration::from_secs(1);
 
-/// What became of a question for a path.
+/// Answer to a question for a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// The user chose this file.
@@ -28,7 +28,7 @@ pub enum Answer {
     NoDialog,
 }
 
-/// Where questions for a path go.
+/// Dialog in which the user is asked for a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DialogKind {
     /// The desktop's own dialog.
@@ -82,7 +82,7 @@ impl Dialogs {
         Some((task, answer))
     }
 
-    /// Whether an answer is still to come.
+    /// Returns true while an answer is still to come.
     pub fn is_asking(&self) -> bool {
         !self.asked.is_empty()
     }

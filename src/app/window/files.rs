@@ -12,7 +12,7 @@ use crate::app::job::{Job, JobError, Wake};
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// What became of a file: whether it could be written, unless the thread failed.
+/// Result of writing a file, unless the thread failed.
 type Written = Result<Result<(), String>, JobError>;
 
 /// Files that are being written.

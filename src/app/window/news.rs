@@ -152,7 +152,7 @@ impl DecouplerWindow {
             Event::Died(reason) => {
                 shared.phase = Phase::Died;
                 let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
-                let text = format!("The training ended unexpectedly{reason}. What is shown can still be looked at.");
+                let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notice = Some(Notice::Failed(text));
             }
             // The worker keeps these to itself.

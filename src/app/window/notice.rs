@@ -5,7 +5,7 @@ use crate::app::{
     theme::{Theme, radius},
 };
 
-/// What the user says to a notice.
+/// Reply of the user to a notice.
 pub enum Reply {
     /// It has been read.
     Dismiss,

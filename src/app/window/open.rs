@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{DecouplerWindow, DialogKind};
 
-/// Why the window cannot open.
+/// Reasons for which the window cannot open.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
@@ -19,7 +19,7 @@ pub enum OpenError {
     Failed,
 }
 
-/// What a bare system lacks.
+/// Advice on the packages that a bare system lacks.
 const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommon-x11-0 libgl1-mesa-dri, or work in a \
                         terminal: `decoupler train --help`";
 

@@ -11,13 +11,13 @@ use crate::app::{
 /// A file waiting for its path.
 #[derive(Clone, Debug)]
 pub struct Saving {
-    /// What to do with it.
+    /// Task of the file at the path.
     pub task: FileTask,
     /// The path typed so far.
     pub path: String,
 }
 
-/// What the user says to the question for a path.
+/// Reply of the user to the question for a path.
 pub enum Reply {
     /// This is it.
     Path(PathBuf),

@@ -125,7 +125,7 @@ impl Experiment {
             .map_or(1, |cross_validation| cross_validation.repeats)
     }
 
-    /// Number of networks trained per trial, each with as many restarts as the settings say.
+    /// Number of networks trained per trial, each with as many starts as the settings say.
     pub(super) fn folds(&self) -> usize {
         self.cross_validation
             .map_or(1, |cross_validation| cross_validation.folds)
@@ -226,7 +226,7 @@ impl PaperTable {
     }
 
     /// Returns the experiment that reproduces the table. The paper does not say how long it trained: epochs and
-    /// restarts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation
+    /// starts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation
     /// set only selects the weights.
     pub fn experiment(self) -> Experiment {
         let with = |axis, epochs, starts, cross_validation| {

@@ -20,7 +20,7 @@ pub struct CellSummary {
     pub method: &'static str,
     /// Largest number of epochs.
     pub epochs: usize,
-    /// Number of restarts per network.
+    /// Number of starts per network.
     pub starts: usize,
     /// First seed of the cell.
     pub seed: Seed,
@@ -42,9 +42,9 @@ pub struct CellSummary {
     pub linear_z_percent: Option<f64>,
     /// AveZerr of the best answer possible with so few hidden nodes.
     pub bound_z_percent: Option<f64>,
-    /// Mean number of epochs per restart.
+    /// Mean number of epochs per start.
     pub epochs_run: Option<f64>,
-    /// Training time of a network, over all its restarts.
+    /// Training time of a network, over all its starts.
     pub training_seconds: Option<f64>,
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub epoch_ms: Option<f64>,

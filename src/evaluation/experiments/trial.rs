@@ -26,7 +26,7 @@ pub struct Trial {
     pub bottleneck: Errors,
     /// Number of networks trained: 1, or one per fold.
     pub networks: usize,
-    /// Number of epochs, over all restarts and folds.
+    /// Number of epochs, over all starts and folds.
     pub epochs: usize,
     /// Time spent on them.
     pub seconds: f64,
@@ -50,7 +50,7 @@ pub struct TrialFailure {
 }
 
 impl Trial {
-    /// Training time of one network, over all its restarts.
+    /// Training time of one network, over all its starts.
     pub(super) fn seconds_per_network(&self) -> f64 {
         self.seconds / self.networks.max(1) as f64
     }

@@ -12,7 +12,7 @@ const PITCH: std::ops::RangeInclusive<f32> = 0.09..=1.5;
 const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=8.0;
 const PAN: std::ops::RangeInclusive<f32> = -2.0..=2.0;
 
-/// Where the plot is seen from.
+/// Camera that orbits the plot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct OrbitCamera {

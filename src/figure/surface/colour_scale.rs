@@ -14,7 +14,7 @@ use crate::figure::ticks::{multiples, round_steps, tick_text};
 
 const BAR_WIDTH: f32 = 12.0;
 
-/// What the colours stand for.
+/// Scale of colours: a quantity and its range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColourScale {
     /// Quantity of the values.

@@ -20,7 +20,7 @@ const LABELS: Vec2 = Vec2::new(72.0, 56.0);
 /// Free edge of a card, in points.
 const EDGE: f32 = 8.0;
 
-/// What a renderer gives a surface to be laid out.
+/// Space, text metrics and colours with which a surface is laid out.
 pub struct Card<'a> {
     /// The space to fill.
     pub bounds: Bounds,

@@ -68,7 +68,7 @@ impl<'a> Field<'a> {
         [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)].map(|(ix, iy)| self.grid.index(ix, iy))
     }
 
-    /// Whether a cell has values; in the margin also whether they stay in the box, for extrapolation knows no bounds.
+    /// Returns true if a cell has values and, in the extrapolated margin, they stay in the box.
     pub(super) fn is_drawn(&self, ix: usize, iy: usize) -> bool {
         let is_inside = self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
         let is_shown = |value: f64| value.is_finite() && (is_inside || self.shown.contains(&value));

@@ -15,7 +15,7 @@ const MARGIN_OPACITY: f32 = 0.6;
 const CONTOUR_LEVELS: usize = 10;
 const CONTOUR_OPACITY: f32 = 0.34;
 
-/// How places become points.
+/// Mapping of places to points on the screen.
 pub(super) enum Stage<'a> {
     /// In space, lit.
     Space(&'a Projection),
@@ -24,7 +24,7 @@ pub(super) enum Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// Where a place with a value is on the screen.
+    /// Returns the position on the screen of a place with a value.
     pub(super) fn point(&self, place: DVec3) -> Vec2 {
         match self {
             Self::Space(projection) => projection.point(place),
@@ -43,7 +43,7 @@ impl Stage<'_> {
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
-    /// Where it is.
+    /// Position on the screen.
     pub at: Vec2,
     /// Its colour under the light.
     pub colour: Rgb,
@@ -54,9 +54,9 @@ pub struct Vertex {
 /// A piece of a contour line, about one point wide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourLine {
-    /// Where it begins.
+    /// First end.
     pub from: Vec2,
-    /// Where it ends.
+    /// Second end.
     pub to: Vec2,
     /// Black on light colours, white on dark ones.
     pub is_black: bool,
@@ -75,7 +75,7 @@ pub struct Mesh {
     cells: Vec<u32>,
     /// Contour lines in the order of painting.
     lines: Vec<ContourLine>,
-    /// Where each strip of cells and its lines end.
+    /// End of each strip of cells and of its lines.
     strips: Vec<[usize; 2]>,
 }
 
@@ -223,7 +223,7 @@ mod tests {
         surface::SurfaceMap,
     };
 
-    /// How far from the eye a triangle is at a place on the screen; `None` beside it.
+    /// Returns the distance from the eye to a triangle at a place on the screen; `None` beside it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
         let [a, b, c] = corners.map(|(at, _)| at);
         let whole = (b - a).perp_dot(c - a);

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::surface::Grid;
 
-/// How near the pointer must be to a node, in points.
+/// Distance within which the pointer is at a node, in points.
 const REACH: f32 = 10.0;
 const HIDDEN_OPACITY: f32 = 0.1;
 /// More dots than this, nearer to each other than that, are not drawn.
@@ -21,7 +21,7 @@ const CROWDED: f32 = 10.0;
 struct Dot {
     at: Vec2,
     is_hidden: bool,
-    /// Whether it lies beyond the axes and is drawn at their edge.
+    /// True if it lies beyond the axes and is drawn at their edge.
     is_beyond: bool,
 }
 
@@ -74,7 +74,7 @@ impl Dots {
             .map(|(node, _)| node)
     }
 
-    /// Where a node is on the screen.
+    /// Returns the position of a node on the screen.
     pub fn position(&self, node: usize) -> Option<Vec2> {
         self.dots.get(node).copied().flatten().map(|dot| dot.at)
     }

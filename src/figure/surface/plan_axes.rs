@@ -80,7 +80,7 @@ impl<'a> PlanAxes<'a> {
         x.chain(y).collect()
     }
 
-    /// Where a place is on the screen.
+    /// Returns the position of a place on the screen.
     pub(super) fn point(&self, place_mm: DVec2) -> Vec2 {
         let from_corner = ((place_mm - self.min_mm) * self.points_per_mm).as_vec2();
         Vec2::new(self.frame.min.x + from_corner.x, self.frame.max.y - from_corner.y)

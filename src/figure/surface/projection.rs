@@ -119,12 +119,12 @@ impl Projection {
         fitted
     }
 
-    /// Where a place is on the screen.
+    /// Returns the position of a place on the screen.
     pub(super) fn point(&self, place_mm: DVec3) -> Vec2 {
         self.point_of_unit(self.plot_box.unit(place_mm))
     }
 
-    /// Where a place in box units is on the screen.
+    /// Returns the position on the screen of a place in box units.
     pub(super) fn point_of_unit(&self, unit: Vec3) -> Vec2 {
         let seen = self.matrix.project_point3(unit);
         Vec2::new(seen.x, -seen.y) * self.scale + self.offset

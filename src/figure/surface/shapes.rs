@@ -28,9 +28,9 @@ pub enum Ink {
 /// A straight line, one point wide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Where it begins.
+    /// First end.
     pub from: Vec2,
-    /// Where it ends.
+    /// Second end.
     pub to: Vec2,
     /// Its colour.
     pub ink: Ink,

@@ -1,4 +1,4 @@
-//! What a picture of surfaces says.
+//! Figure of surfaces, described for the renderers.
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -94,7 +94,7 @@ impl SurfaceFigure {
         scales
     }
 
-    /// What is to be known about all surfaces: "Between the nodes: bilinear."
+    /// Returns the note common to all surfaces: "Between the nodes: bilinear."
     pub fn note(&self) -> String {
         let mut kinds: Vec<String> = Vec::new();
         for kind in self

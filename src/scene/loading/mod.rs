@@ -23,9 +23,9 @@ pub enum Loading {
     /// Every node is displaced by independent, uniformly distributed amounts: the paper's experiments.
     #[default]
     RandomNodes,
-    /// A smooth random surface: neighbours move alike within the correlation length.
+    /// A smooth random surface: nodes within the correlation length move alike.
     SmoothField {
-        /// Distance over which displacements resemble each other.
+        /// Distance over which the displacements of nodes stay correlated, in mm.
         correlation_length_mm: f64,
     },
     /// A body of known shape is pressed somewhere onto the surface.

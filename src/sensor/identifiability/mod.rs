@@ -1,4 +1,4 @@
-//! What the readings of a row-wire can tell of its deformation.
+//! Identifiability: how well the readings of a row-wire determine its deformation.
 
 mod alike_rows;
 mod error;

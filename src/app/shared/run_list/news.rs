@@ -21,7 +21,7 @@ impl RunList {
                 RunsEvent::Died(reason) => {
                     self.path = None;
                     let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
-                    let text = format!("Runs are not kept from now on{reason}. Start the program again.");
+                    let text = format!("New runs are no longer kept{reason}. Restart the program.");
                     notice = Some(Notice::Failed(text));
                 }
             }

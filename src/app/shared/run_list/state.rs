@@ -10,7 +10,7 @@ pub const PLACES: [&str; 2] = ["A", "B"];
 pub struct RunList {
     /// The runs, and which two are compared.
     pub workspace: KeptRuns,
-    /// Where runs are kept; `None` while they are not.
+    /// Folder in which runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
 }
 

@@ -51,7 +51,7 @@ const FIGURES: [(&str, FigureOf); 18] = [
     ("method", |run| {
         run.file.settings.training.method.short_name().to_owned()
     }),
-    ("best epoch of all", |run| {
+    ("best epoch", |run| {
         let training = &run.file.training;
         let epochs = training.history.last().map_or(0, |epoch| epoch.epoch);
         format!("{} of {epochs}", training.best_epoch)

@@ -59,7 +59,7 @@ fn run_ui(
     ui.label(RichText::new(text).size(type_size().note));
     if *removing == Some(run.id) {
         ui.horizontal(|ui| {
-            ui.label("Remove it for good?");
+            ui.label("Remove this run?");
             if ui.button("Remove").clicked() {
                 effects.push(Effect::RemoveRun(run.id));
                 *removing = None;
@@ -86,7 +86,7 @@ fn run_ui(
         let can_take = !shared.phase.is_busy();
         let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
-        if take.on_hover_text("Take its settings for the next training").clicked() {
+        if take.on_hover_text("Uses its settings for the next training.").clicked() {
             let settings = Box::new(run.file.settings);
             effects.extend([Effect::Configure(settings), Effect::ShowTraining]);
         }
@@ -116,7 +116,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     }
 }
 
-/// What the run was made with.
+/// Returns the conditions of the run in a line.
 fn conditions(settings: &SimulatedSettings) -> String {
     let starts = match settings.starts {
         1 => String::new(),

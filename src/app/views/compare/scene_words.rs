@@ -7,7 +7,7 @@ use crate::{
     scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
 };
 
-/// What a run differs in from the paper's scene and inputs; empty if in nothing.
+/// Returns the differences between a run and the paper's scene and inputs, in words; empty if there are none.
 pub fn unlike_paper(settings: &SimulatedSettings) -> Vec<String> {
     let paper = SimulatedSettings::default();
     let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);

@@ -13,11 +13,11 @@ use crate::{
 
 /// The Compare view.
 pub struct CompareView {
-    /// What is drawn in the two places.
+    /// Contents of the two places.
     pub places: [Place; 2],
     /// Snapshot of both test sets.
     pub snapshot: usize,
-    /// What is shown of both networks.
+    /// Surface shown of both networks.
     pub card: RightCard,
     /// The run that the user is asked about before it is removed.
     pub removing: Option<u64>,
@@ -29,9 +29,9 @@ pub struct CompareView {
 pub struct Place {
     /// The run in it.
     id: Option<u64>,
-    /// What is drawn of it, once it is prepared.
+    /// Surfaces of the run, once they are prepared.
     pub compared: Option<Compared>,
-    /// Where that comes from.
+    /// Job that prepares them.
     job: Option<Job<Result<Box<Compared>, String>>>,
 }
 
@@ -40,7 +40,7 @@ pub struct Place {
 pub struct Compared {
     /// Its test set.
     pub test: TestView,
-    /// What its network makes of it: samples × 3·M2.
+    /// Coordinates that its network decodes: samples × 3·M2.
     pub decoupled_mm: Arc<Array2<f64>>,
     /// The snapshot on show: actual, decoupled, difference.
     pub frames: [Frame; 3],
@@ -89,7 +89,7 @@ impl CompareView {
         }
     }
 
-    /// How many snapshots the larger of the two test sets has.
+    /// Returns the number of snapshots of the larger of the two test sets.
     pub(super) fn snapshots(&self) -> usize {
         let compared = self.places.iter().filter_map(|place| place.compared.as_ref());
         compared

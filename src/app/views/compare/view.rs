@@ -127,12 +127,12 @@ impl CompareView {
                 match place {
                     0 => {
                         let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                        let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                        let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
                         effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
                     }
                     _ => {
                         let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
-                        let picked = segmented_ui(ui, "What the cards show", &cards, self.card, false);
+                        let picked = segmented_ui(ui, "Displayed surface", &cards, self.card, false);
                         self.card = picked.unwrap_or(self.card);
                     }
                 }
@@ -148,7 +148,7 @@ impl CompareView {
             Some(surface) => surface_ui(ui, place, surface, look, effects),
             None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
             None => {
-                let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
+                let text = format!("Press {} next to a run in the list to show it here.", PLACES[place]);
                 placeholder_ui(ui, &text);
             }
         }

@@ -7,7 +7,7 @@ use crate::{
     training::Method,
 };
 
-/// What an axis can vary.
+/// Setting that an axis can vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AxisKind {
     /// Hidden nodes.
@@ -27,7 +27,7 @@ pub enum AxisKind {
 /// An axis as the user types it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AxisForm {
-    /// What is varied.
+    /// Setting that is varied.
     pub kind: AxisKind,
     /// Its values, separated by commas or blanks.
     pub values: String,
@@ -42,7 +42,7 @@ pub enum ListError {
     Number {
         /// The axis.
         name: &'static str,
-        /// What was typed.
+        /// Text that was typed.
         text: String,
         /// A list that is understood.
         example: &'static str,
@@ -53,7 +53,7 @@ pub enum ListError {
     /// Not a method.
     #[error("'{text}' is not a method: write {known}")]
     Method {
-        /// What was typed.
+        /// Text that was typed.
         text: String,
         /// The names there are.
         known: String,

@@ -12,7 +12,7 @@ use crate::{
     figure::experiment_figure,
 };
 
-/// What can be written about an experiment.
+/// File that can be written about an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ExperimentFile {
     /// The figures of every cell, as CSV.
@@ -25,8 +25,8 @@ pub enum ExperimentFile {
     Figure(PictureFormat),
 }
 
-/// What a figure is, in a sentence.
-const FIGURE: &str = "The picture on a light ground, at publication size.";
+/// Description of a figure in a sentence.
+const FIGURE: &str = "The figure on a light background, at publication size.";
 
 impl ExperimentFile {
     /// In the order offered.
@@ -38,13 +38,13 @@ impl ExperimentFile {
         Self::Figure(PictureFormat::Png),
     ];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
             Self::Cells => (
                 "Table as CSV…",
                 "table",
-                "The figures of every cell with all their digits, as CSV.",
+                "The values of every cell, in full precision, as CSV.",
                 &["csv"],
             ),
             Self::Trials => (
@@ -56,7 +56,7 @@ impl ExperimentFile {
             Self::Markdown => (
                 "Table and verdicts as Markdown…",
                 "table and verdicts",
-                "The table as it is shown, how it was made, and the verdicts, as Markdown.",
+                "The table as shown, the settings behind it and the verdicts, as Markdown.",
                 &["md"],
             ),
             Self::Figure(PictureFormat::Svg) => ("Figure as SVG…", "figure", FIGURE, &["svg"]),

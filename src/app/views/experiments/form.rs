@@ -12,7 +12,7 @@ pub struct Form {
     pub axes: Vec<AxisForm>,
 }
 
-/// Why a form is no experiment yet.
+/// Reasons for which a form is not yet an experiment.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FormError {
@@ -31,7 +31,7 @@ pub enum FormError {
 const MOST_CELLS: usize = 400;
 
 impl Form {
-    /// What `topic` begins with: the paper's own values, or a small sweep.
+    /// Returns the default form of `topic`: the paper's own values, or a small sweep.
     pub fn new(topic: Topic) -> Self {
         match topic {
             Topic::Table(table) => {
@@ -57,7 +57,7 @@ impl Form {
     /// The experiment, sound as far as can be known before it is run.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If it is not a possible experiment.
     pub fn experiment(&self) -> Result<Experiment, FormError> {
         let mut axes = Vec::new();
         for axis in &self.axes {

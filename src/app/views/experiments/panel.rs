@@ -20,7 +20,7 @@ use crate::{
 /// The most seeds or repeats.
 const MOST_TRIALS: usize = 1000;
 
-/// What is run: the choice, its lists and numbers, Run and Cancel.
+/// Shows the form: the choice of an experiment, its lists and numbers, Run and Cancel.
 pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "experiment form", |ui| {
         section_heading_ui(ui, "Experiment");
@@ -34,7 +34,7 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
         ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, &shared.draft));
         match experiments.checked() {
             Ok(trials) => {
-                dim_ui(ui, &how_much(&form, *trials));
+                dim_ui(ui, &size_in_words(&form, *trials));
             }
             Err(problem) => {
                 ui.add_space(space(1));
@@ -49,8 +49,8 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
         ui.add_space(space(2));
         let paper = Form::new(experiments.topic);
         let text = match experiments.topic {
-            Topic::Table(_) => "Back to the paper's values",
-            Topic::Sweep => "Back to the first sweep",
+            Topic::Table(_) => "Reset to the paper's values",
+            Topic::Sweep => "Reset to the default sweep",
         };
         let can_reset = is_idle && form == *experiments.form() && form != paper;
         if ui.add_enabled(can_reset, Button::new(text)).clicked() {
@@ -69,14 +69,14 @@ fn what_it_does(topic: Topic) -> &'static str {
             "Errors of networks with different numbers of hidden nodes on the paper's array."
         }
         Topic::Table(PaperTable::CrossValidation) => {
-            "Cross-validation of a large and a small dataset, dealt anew in each repeat, and the scatter of Fig. 5."
+            "Cross-validation of a large and a small dataset, shuffled anew in each repeat, and the scatter of Fig. 5."
         }
         Topic::Table(PaperTable::ArrayScales) => "Errors on arrays of different scales, with 12 hidden nodes.",
-        Topic::Sweep => "Any two settings against each other, all others held.",
+        Topic::Sweep => "Any two settings varied against each other, all others fixed.",
     }
 }
 
-fn how_much(form: &Form, trials: usize) -> String {
+fn size_in_words(form: &Form, trials: usize) -> String {
     let folds = form.template.cross_validation.map_or(1, |validation| validation.folds);
     let networks = trials.saturating_mul(folds).saturating_mul(form.template.base.starts);
     let plural = if networks == 1 { "" } else { "s" };
@@ -107,19 +107,19 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettin
         base_ui(ui, form, draft);
     }
     let template = &mut form.template;
-    let hint = "How many seeds in succession each cell is tried with: the spread of the results.";
+    let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
     count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MOST_TRIALS);
-    let hint = "The first of the seeds; the same seeds give the same figures.";
+    let hint = "First of the consecutive seeds. The same seeds give the same results.";
     field_ui(ui, "First seed", hint, |ui| {
         let drag = DragValue::new(&mut template.base.seed.0)
             .speed(0.1)
             .update_while_editing(false);
         ui.add_sized([space(16), space(6)], drag)
     });
-    let hint = "The most epochs of a training. The paper does not say how long it trained.";
+    let hint = "Largest number of epochs per training. The paper does not state its own.";
     let epochs = &mut template.base.training.stopping.epochs;
     count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MOST_EPOCHS);
-    let hint = "Trainings from different random weights, of which the best by validation error counts.";
+    let hint = "Number of trainings from different random weights; the one with the lowest validation error counts.";
     count_ui(ui, "Starts", hint, &mut template.base.starts, 1..=MOST_STARTS);
 }
 
@@ -131,21 +131,21 @@ fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
     count_ui(
         ui,
         "Folds",
-        "k: into how many parts the samples are dealt.",
+        "Number of folds, k, into which the samples are split.",
         &mut validation.folds,
         2..=MOST_TRIALS,
     );
-    let hint = "How often the samples are dealt anew, for each seed.";
+    let hint = "Number of shuffles into new folds, for each seed.";
     count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MOST_TRIALS);
     let units = [(FoldUnit::Sample, "By sample"), (FoldUnit::Snapshot, "By snapshot")];
-    if let Some(unit) = segmented_ui(ui, "What is dealt", &units, validation.unit, true) {
+    if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.unit, true) {
         validation.unit = unit;
     }
     dim_ui(
         ui,
         match validation.unit {
-            FoldUnit::Sample => "As the paper: rows of one snapshot stand on both sides.",
-            FoldUnit::Snapshot => "Whole snapshots: nothing of a test sample's moment is known.",
+            FoldUnit::Sample => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
+            FoldUnit::Snapshot => "Whole snapshots: no training sample is from the same moment as a test sample.",
         },
     );
 }
@@ -180,7 +180,7 @@ fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
     ui.add_space(space(1));
 }
 
-/// What a sweep holds, and where it may come from.
+/// Shows the settings common to all cells of a sweep, and a button that takes them from the Train view.
 fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
     let base = &form.template.base;
     let text = format!(
@@ -191,9 +191,9 @@ fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
         base.training.method.name()
     );
     dim_ui(ui, &text);
-    let button = ui.add_enabled(base != draft, Button::new("Take the settings of the Train view"));
+    let button = ui.add_enabled(base != draft, Button::new("Use the settings of the Train view"));
     if button
-        .on_hover_text("Sensor, scene, network and training as they are set there")
+        .on_hover_text("Copies the sensor, scene, network and training settings from the Train view.")
         .clicked()
     {
         form.template.base = *draft;
@@ -206,7 +206,7 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
         let size = vec2(half, space(7));
         let run = ui.add_enabled(experiments.can_run(), primary_button("▶ Run").min_size(size));
         if run
-            .on_hover_text("Run all trainings in the background (Ctrl+Enter)")
+            .on_hover_text("Runs all trainings in the background (Ctrl+Enter).")
             .clicked()
         {
             experiments.run(effects);
@@ -214,7 +214,7 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
         let can_cancel = experiments.running.is_some();
         let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
         if cancel
-            .on_hover_text("End it; what is finished stays (Ctrl+.)")
+            .on_hover_text("Ends the experiment; finished trials are kept (Ctrl+.).")
             .clicked()
         {
             experiments.cancel();
@@ -228,7 +228,7 @@ fn progress_ui(ui: &mut Ui, running: &Running) {
     progress_bar_ui(ui, "Experiment", share);
     let left = match running.time_left {
         Some(time) => format!("about {} left", format_duration(time)),
-        None => "time left not known yet".to_owned(),
+        None => "estimating the time left".to_owned(),
     };
     dim_ui(
         ui,

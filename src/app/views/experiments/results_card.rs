@@ -45,7 +45,7 @@ pub fn results_card_ui(
     ui.label(note.color(dim));
 }
 
-/// What the card needs to show every row in a card of such a width.
+/// Returns the height at which a card of this width shows every row, in points.
 pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
     let width = width - MARGINS;
     let conditions = describe_conditions(&outcome.results.experiment);
@@ -81,7 +81,7 @@ fn export_ui(ui: &mut Ui, topic: Topic, outcome: &Outcome, effects: &mut Vec<Eff
                 }
             }
         });
-        button.on_disabled_hover_text("There is nothing to export before the first trial is finished");
+        button.on_disabled_hover_text("Nothing to export yet: no trial has finished");
     });
 }
 
@@ -90,12 +90,12 @@ fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Share
     let can_open = marked.is_some() && !shared.phase.is_busy();
     let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let why_not = if marked.is_some() {
-        "A training is under way there: its settings cannot change now"
+        "A training is running in the Train view: its settings cannot be changed now"
     } else {
-        "Click a cell of the table or the picture first"
+        "Click a cell of the table or the figure first"
     };
     let button = button
-        .on_hover_text("Show the network of the marked cell, that of its median trial, with its settings and surfaces")
+        .on_hover_text("Shows the network of the median trial of the marked cell, with its settings and surfaces.")
         .on_disabled_hover_text(why_not);
     if let (true, Some(cell)) = (button.clicked(), marked) {
         open_cell(shared, outcome, cell, effects);

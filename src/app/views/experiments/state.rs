@@ -22,7 +22,7 @@ use crate::{
     training::EpochRecord,
 };
 
-/// What the Experiments view is about.
+/// Experiment of the view: a table of the paper, or a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
     /// A table of the paper.
@@ -62,18 +62,18 @@ impl Topic {
 /// The Experiments view.
 #[derive(Debug)]
 pub struct ExperimentsView {
-    /// What is looked at.
+    /// Experiment on show.
     pub topic: Topic,
-    /// How it is looked at.
+    /// Ordering and marked cell of the table.
     pub look: ExperimentLook,
-    /// What runs.
+    /// Experiment that is running.
     pub running: Option<Running>,
     pub(super) job: Job<ExperimentEvent>,
     forms: HashMap<Topic, CheckedForm>,
     outcomes: HashMap<Topic, Outcome>,
 }
 
-/// How an experiment is looked at.
+/// State of the display of an experiment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExperimentLook {
     /// The cell marked in table and picture.
@@ -85,9 +85,9 @@ pub struct ExperimentLook {
 #[derive(Debug)]
 struct CheckedForm {
     form: Form,
-    /// How many trials it has, or why it is no experiment.
+    /// Number of trials, or the reason for which the form is no experiment.
     checked: Result<usize, String>,
-    /// What it would fill in, with the published figures.
+    /// Results to be filled in, with the published figures.
     preview: Option<Outcome>,
 }
 
@@ -113,13 +113,13 @@ pub struct Running {
     pub done: usize,
     /// Trials there are.
     pub trials: usize,
-    /// How long the others take, once that can be told.
+    /// Estimated time of the remaining trials, once there is one.
     pub time_left: Option<Duration>,
     /// When it began.
     pub begun: Instant,
 }
 
-/// How an experiment ended.
+/// Ending of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// Every trial has come to something.
@@ -128,7 +128,7 @@ pub enum Ending {
     Cut,
 }
 
-/// What is known of an experiment, as it is shown.
+/// Results of an experiment so far.
 #[derive(Debug)]
 pub struct Outcome {
     /// Everything; shared with a file being written.
@@ -139,11 +139,11 @@ pub struct Outcome {
     pub figure: Figure,
     /// The figures behind it.
     pub summaries: Vec<CellSummary>,
-    /// What they say about the paper's claims.
+    /// Verdicts on the paper's claims.
     pub verdicts: Vec<Verdict>,
-    /// Whether it has ended, and how.
+    /// Ending of the experiment, once it has ended.
     pub ending: Option<Ending>,
-    /// How long it took, once it has ended.
+    /// Time it took, once it has ended.
     pub took: Option<Duration>,
     kept_bytes: usize,
 }
@@ -224,7 +224,7 @@ impl ExperimentsView {
         &self.forms[&self.topic].form
     }
 
-    /// How many trials the form has, or why it cannot be run.
+    /// Returns the number of trials of the form, or the reason for which it cannot be run.
     pub fn checked(&self) -> &Result<usize, String> {
         &self.forms[&self.topic].checked
     }
@@ -240,7 +240,7 @@ impl ExperimentsView {
         self.forms.insert(self.topic, checked);
     }
 
-    /// Whether what is looked at can be run now.
+    /// Returns true if the experiment on show can be run now.
     pub fn can_run(&self) -> bool {
         self.running.is_none() && self.checked().is_ok()
     }
@@ -304,12 +304,12 @@ impl ExperimentsView {
         });
     }
 
-    /// What is known of the experiment looked at.
+    /// Returns the results of the experiment on show.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcomes.get(&self.topic)
     }
 
-    /// What is to be shown of it: what is known or, before anything is run, the published figures.
+    /// Returns the results to show: those of the experiment or, before it is run, the published figures.
     pub fn shown(&self) -> Option<&Outcome> {
         self.outcome().or(self.forms[&self.topic].preview.as_ref())
     }

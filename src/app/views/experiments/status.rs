@@ -6,7 +6,7 @@ use crate::{
     export::format_duration,
 };
 
-/// What is going on, in the line at the bottom.
+/// Shows the state of the experiment in the line at the bottom.
 pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&experiments.running, experiments.outcome()) {

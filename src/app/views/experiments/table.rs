@@ -96,10 +96,10 @@ fn heading_ui(ui: &mut Ui, outcome: &Outcome, sort: &mut SortBy, places: &[[f32;
         let rect = cell_rect(line, *place);
         let response = ui.interact(rect, ui.scope_id().with(("heading", column)), Sense::click());
         let is_sorted = sort.column == Some(column);
-        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Order by {heading}")));
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {heading}")));
         let response = response
             .on_hover_cursor(CursorIcon::PointingHand)
-            .on_hover_text("Order the table by this column");
+            .on_hover_text("Sorts the table by this column.");
         if response.clicked() {
             let is_descending = is_sorted && !sort.is_descending;
             *sort = SortBy {
@@ -128,7 +128,7 @@ fn heading_ui(ui: &mut Ui, outcome: &Outcome, sort: &mut SortBy, places: &[[f32;
         .hline(line.x_range(), line.bottom(), Stroke::new(1.0, palette.line));
 }
 
-/// What is varied stands at the left of its column, figures at the right.
+/// Draws the text of a cell: names at the left of their column, figures at the right.
 fn cell_text(ui: &Ui, rect: Rect, is_name: bool, text: String, font: FontId, colour: Color32) {
     let (place, anchor) = if is_name {
         (rect.left_center() + vec2(space(1), 0.0), Align2::LEFT_CENTER)
@@ -178,7 +178,7 @@ fn row_ui(ui: &mut Ui, outcome: &Outcome, cell: usize, is_marked: bool, places: 
             let figure = ui.interact(rect, ui.scope_id().with(("figure", cell, column)), Sense::hover());
             figure.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{name}, {heading}: {text}")));
             if heading.starts_with("linear") && loses {
-                figure.on_hover_text("The linear map does better here than the network");
+                figure.on_hover_text("The linear map is more accurate here than the network.");
             }
         }
     }

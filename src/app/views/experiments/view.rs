@@ -86,7 +86,7 @@ impl View for ExperimentsView {
                 placeholder_ui(ui, hint(self));
                 return;
             }
-            section_heading_ui(ui, "What this run says");
+            section_heading_ui(ui, "Verdicts");
             scrolled_ui(ui, "verdicts", |ui| verdicts_ui(ui, outcome));
         });
         ui.allocate_rect(whole, Sense::hover());
@@ -98,12 +98,12 @@ impl View for ExperimentsView {
     }
 }
 
-/// Why there is no figure yet.
+/// Returns the hint shown while there is no figure yet.
 fn hint(experiments: &ExperimentsView) -> &'static str {
     match (&experiments.running, experiments.outcome()) {
         (Some(running), _) if running.topic == experiments.topic => "The figures appear as the trials finish.",
-        (_, Some(_)) => "It ended before the first trial was finished.",
-        _ => "Press Run: our figures appear beside the published ones as they come.",
+        (_, Some(_)) => "The experiment ended before its first trial finished.",
+        _ => "Press Run: our figures appear beside the published ones as the trials finish.",
     }
 }
 

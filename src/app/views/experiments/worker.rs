@@ -26,7 +26,7 @@ pub fn run(job: &mut Job<ExperimentEvent>, experiment: Experiment) {
             )
         },
         |ended| {
-            let ended = ended.map_err(|error| format!("{error}; what is finished stays"));
+            let ended = ended.map_err(|error| format!("{error}; the finished trials are kept"));
             ExperimentEvent::Ended(ended.and_then(|run| run.map_err(|error| error.to_string())))
         },
     );

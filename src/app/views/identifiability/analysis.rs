@@ -11,7 +11,7 @@ use crate::{
     surface::{SurfaceError, SurfaceMap},
 };
 
-/// What is looked at: a sensor, what happens to it, and how far it is pressed.
+/// Question to be analysed: a sensor, its scene, and the compression of its nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Question {
     /// The sensor.
@@ -33,10 +33,10 @@ impl Question {
     }
 }
 
-/// What the readings of an array can tell.
+/// Identifiability of an array: what its readings determine.
 #[derive(Clone, Debug)]
 pub struct Analysis {
-    /// What was asked.
+    /// Question that was analysed.
     pub question: Question,
     /// Each row-wire that is read.
     pub rows: Vec<Identifiability>,
@@ -48,7 +48,7 @@ pub struct Analysis {
     pub prior_mm: f64,
     /// The most similar rows, if a decoder must tell them apart.
     pub alike: Option<RowPair>,
-    /// What stands in the way, worst first.
+    /// Warnings, worst first.
     pub warnings: Vec<IdentifiabilityWarning>,
     /// The surface through the nodes.
     pub surface: Arc<SurfaceMap>,
@@ -58,7 +58,7 @@ pub struct Analysis {
     pub sensitivities: Vec<Frame>,
 }
 
-/// Why nothing can be told.
+/// Reasons for which a question has no answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -151,7 +151,7 @@ impl Analysis {
         self.noise / self.prior_mm
     }
 
-    /// How many patterns of the worst row stand out of the noise.
+    /// Number of deformation patterns of the worst row above the noise.
     pub fn patterns_seen(&self) -> usize {
         let values = self.worst_row().singular_values_per_mm.iter();
         values.filter(|&&value| value > self.hidden_below_per_mm()).count()

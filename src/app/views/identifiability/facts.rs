@@ -1,4 +1,4 @@
-//! What the singular values come to, in words.
+//! Facts derived from the singular values, in words.
 
 use eframe::egui::{Align, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
@@ -13,7 +13,7 @@ use crate::{
 
 /// Warnings with what to change, then the figures.
 pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
-    section_heading_ui(ui, "What the readings tell");
+    section_heading_ui(ui, "Findings");
     if analysis.warnings.is_empty() {
         let text = RichText::new(summary(analysis)).size(type_size().note);
         ui.label(text.color(Theme::of(ui).palette.good));
@@ -27,17 +27,17 @@ pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
     }
 }
 
-/// What holds where nothing is in the way.
+/// Returns the summary shown where there are no warnings.
 fn summary(analysis: &Analysis) -> String {
     let (seen, patterns) = (analysis.patterns_seen(), analysis.worst_row().unknowns());
     if analysis.noise == 0.0 {
-        "Without noise every deformation can be told from the readings.".to_owned()
+        "Without noise, the readings determine every deformation.".to_owned()
     } else if seen == patterns {
-        "Every deformation pattern stands out of this noise.".to_owned()
+        "Every deformation pattern is above the noise.".to_owned()
     } else {
         format!(
-            "This noise hides {} of {patterns} patterns: of those a decoder can only answer what is likely. To see more, \
-             lower the noise, reduce the height, widen the node pitch, or add column-wires.",
+            "The noise hides {} of {patterns} deformation patterns: for those, a decoder can only give the most \
+             likely value. To see more, lower the noise, reduce the height, widen the node pitch, or add column-wires.",
             patterns - seen
         )
     }
@@ -65,18 +65,18 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
     let mut facts = vec![
         (
             "Unknowns of a row",
-            "Coordinates to be found from the readings of one row-wire.",
+            "Number of coordinates to decode from the readings of one row-wire.",
             worst.unknowns().to_string(),
         ),
         (
             "Readings of a row",
-            "One resistance for each column-wire.",
+            "Number of resistances measured for one row-wire, one for each column-wire.",
             worst.equations.to_string(),
         ),
         (
             "Condition number",
-            "Largest singular value over the smallest, in the row that sees its worst pattern least: how much worse that \
-             pattern is seen than the best.",
+            "Largest singular value of the worst row divided by its smallest: how much better the best deformation \
+             pattern is seen than the worst.",
             condition,
         ),
         (
@@ -85,8 +85,8 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
             (worst.row + 1).to_string(),
         ),
         (
-            "Rows most alike",
-            "The two row-wires with the most similar readings at rest, and by how much they differ (relative).",
+            "Most similar rows",
+            "The two row-wires with the most similar readings at rest, and their relative difference.",
             alike,
         ),
     ];
@@ -102,29 +102,31 @@ fn noise_facts(analysis: &Analysis) -> [(&'static str, &'static str, String); 4]
     let spread = if spread_mm.is_finite() {
         format!("{} mm", format_number(spread_mm))
     } else {
-        "not at all".to_owned()
+        "infinite".to_owned()
     };
     let share = 100.0 * worst.remaining_share(analysis.noise, analysis.prior_mm);
     let prior = format_number(analysis.prior_mm);
     [
         (
             "Noise of a reading",
-            "Relative, one standard deviation, from all sources of the scene.",
+            "Relative standard deviation of one reading, from all noise sources of the scene.",
             format_number(analysis.noise),
         ),
         (
-            "Patterns out of the noise",
-            "Patterns of the worst row that readings narrow more than the scene alone does.",
+            "Deformation patterns above the noise",
+            "Number of deformation patterns of the worst row that the readings determine better than the scene alone \
+             does.",
             format!("{} of {}", analysis.patterns_seen(), worst.unknowns()),
         ),
         (
-            "Worst pattern known to",
-            "From readings alone, one standard deviation.",
+            "Uncertainty of the worst pattern",
+            "Standard deviation of the deformation pattern that is seen worst, in mm, from the readings alone.",
             spread,
         ),
         (
-            "Spread that remains",
-            "Of the deformation's spread before reading, what a reading leaves (root mean square over patterns).",
+            "Remaining spread",
+            "Spread of the deformation after a reading, in percent of its spread before (root mean square over \
+             patterns).",
             format!("{} % of {prior} mm", format_number(share)),
         ),
     ]

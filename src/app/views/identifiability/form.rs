@@ -46,26 +46,31 @@ fn geometry_ui(ui: &mut Ui, question: &mut Question) {
     let lengths = [
         (
             "Height",
-            "Row-wires above column-wires, undeformed.",
+            "Height of the row-wires above the column-wires, undeformed, in mm.",
             &mut geometry.height_mm,
             0.5..=15.0,
         ),
         (
             "Node pitch",
-            "Between nodes on a row-wire.",
+            "Distance between nodes on a row-wire, in mm.",
             &mut geometry.node_pitch_mm,
             0.2..=8.0,
         ),
-        ("Row pitch", "Between row-wires.", &mut geometry.row_pitch_mm, 0.2..=8.0),
+        (
+            "Row pitch",
+            "Distance between row-wires, in mm.",
+            &mut geometry.row_pitch_mm,
+            0.2..=8.0,
+        ),
         (
             "Column pitch",
-            "Between column-wires.",
+            "Distance between column-wires, in mm.",
             &mut geometry.column_pitch_mm,
             0.2..=8.0,
         ),
         (
             "Column node pitch",
-            "Between nodes on a column-wire.",
+            "Distance between nodes on a column-wire, in mm.",
             &mut geometry.column_node_pitch_mm,
             0.5..=15.0,
         ),
@@ -74,7 +79,8 @@ fn geometry_ui(ui: &mut Ui, question: &mut Question) {
         quantity_ui(ui, name, hint, value, 1e-6..=1e6, "mm");
         slider_ui(ui, name, value, range, 0.05);
     }
-    let hint = "x of the first node on each column-wire. Shifting it breaks the symmetry that makes rows read alike.";
+    let hint = "x coordinate of the first node on each column-wire, in mm. Shifting it breaks the symmetry that makes \
+                rows read alike.";
     let name = "First column node at x";
     let value = &mut geometry.column_node_x0_mm;
     quantity_ui(ui, name, hint, value, -1e6..=1e6, "mm");
@@ -83,10 +89,10 @@ fn geometry_ui(ui: &mut Ui, question: &mut Question) {
 
 fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
     let (mut columns, mut nodes) = (scale.columns(), scale.nodes_per_column());
-    let hint = "Each gives every row one reading more.";
+    let hint = "Number of column-wires. Each adds one reading to every row.";
     count_ui(ui, "Column-wires", hint, &mut columns, 1..=LARGEST_COUNT);
     slider_ui(ui, "Column-wires", &mut columns, 1..=100, 1.0);
-    let hint = "All nodes of a column-wire are read together.";
+    let hint = "Number of nodes on each column-wire, which are read together.";
     count_ui(ui, "Nodes on each column", hint, &mut nodes, 1..=LARGEST_COUNT);
     slider_ui(ui, "Nodes on each column", &mut nodes, 1..=20, 1.0);
     if let Ok(changed) = ArrayScale::new(scale.rows(), scale.nodes_per_row(), nodes, columns) {
@@ -101,7 +107,7 @@ fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 fn scene_ui(ui: &mut Ui, question: &mut Question) {
     let scene = &mut question.scene;
     let known = [(RowModel::Shared, "Row unknown"), (RowModel::Each, "Row known")];
-    if let Some(model) = segmented_ui(ui, "Whether the row is known", &known, scene.rows.model(), true) {
+    if let Some(model) = segmented_ui(ui, "Row model", &known, scene.rows.model(), true) {
         scene.rows = match model {
             RowModel::Shared => Rows::All,
             RowModel::Each => Rows::Known,
@@ -109,16 +115,17 @@ fn scene_ui(ui: &mut Ui, question: &mut Question) {
     }
     let is_sideways = scene.movement != Movement::Z;
     let movements = [(false, "Nodes move in z"), (true, "In x, y and z")];
-    if let Some(is_sideways) = segmented_ui(ui, "How nodes move", &movements, is_sideways, true) {
+    if let Some(is_sideways) = segmented_ui(ui, "Node movement", &movements, is_sideways, true) {
         scene.movement = if is_sideways { Movement::SIDEWAYS } else { Movement::Z };
     }
-    let hint = "Standard deviation of a reading in proportion to it.";
+    let hint = "Standard deviation of a reading, relative to the reading.";
     let noise = &mut scene.noise.relative;
     quantity_ui(ui, "Relative noise", hint, noise, 0.0..=1.0, "");
     let present = *noise;
     let slider = Slider::new(noise, 0.0..=1.0).logarithmic(true).smallest_positive(1e-6);
     add_slider(ui, "Relative noise", present, slider);
-    let hint = "How far all nodes are pressed where the sensor is looked at, up to what the scene presses.";
+    let hint = "Compression of all nodes at which the sensor is analysed, in percent of the height, up to the largest \
+                of the scene.";
     let mut percent = 100.0 * question.compression;
     let most = 100.0 * scene.largest_compression;
     quantity_ui(ui, "Compression", hint, &mut percent, 0.0..=most, "%");
@@ -150,24 +157,26 @@ fn buttons_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effe
     let mut is_taken = false;
     let can_use = !shared.phase.is_busy() && question.sensor != shared.draft.source.sensor;
     let why_not = if shared.phase.is_busy() {
-        "A training is under way there: its settings cannot change now"
+        "A training is running in the Train view: its settings cannot be changed now"
     } else {
-        "It is the sensor of the Train view"
+        "This is already the sensor of the Train view"
     };
     let can_reset = question != Question::of(&shared.draft);
     ui.vertical_centered_justified(|ui| {
         let button = primary_button("Use this sensor in the Train view");
         let button = ui.add_enabled(can_use, button);
         if button
-            .on_hover_text("Takes the array and its geometry over into the Train view; the scene there stays")
+            .on_hover_text("Copies the array and its geometry to the Train view; the scene there stays as it is.")
             .on_disabled_hover_text(why_not)
             .clicked()
         {
             let settings = view.hand_over(&shared.draft);
             effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
         }
-        let reset = ui.add_enabled(can_reset, Button::new("Back to the Train view's"));
-        is_taken = reset.on_hover_text("Its sensor and its scene again").clicked();
+        let reset = ui.add_enabled(can_reset, Button::new("Reset to the Train view's sensor"));
+        is_taken = reset
+            .on_hover_text("Restores the sensor and the scene of the Train view.")
+            .clicked();
     });
     is_taken
 }

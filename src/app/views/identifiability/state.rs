@@ -11,13 +11,13 @@ use crate::{
 /// The Identifiability view.
 #[derive(Debug)]
 pub struct IdentifiabilityView {
-    /// What is asked.
+    /// Question that is asked.
     pub question: Question,
     /// The newest answer; it stays in view while the next is computed.
     pub analysis: Option<Arc<Analysis>>,
-    /// Why the question has no answer.
+    /// Reason for which the question has no answer.
     pub problem: Option<String>,
-    /// Whether the answer to the question is still to come.
+    /// True while the answer to the question is still to come.
     pub is_pending: bool,
     /// Along which axis pattern and sensitivity are drawn: 0 for x, 1 for y, 2 for z.
     pub axis: usize,

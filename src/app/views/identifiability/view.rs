@@ -163,7 +163,7 @@ fn surface_ui(
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| match surface.quantity {
             Quantity::Pattern => {
                 let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
                 effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
             }
             _ => axes_ui(ui, axis, analysis),
@@ -216,20 +216,20 @@ fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
         return;
     }
     let options = [(0, "x"), (1, "y"), (2, "z")];
-    *axis = segmented_ui(ui, "Axis on show", &options, *axis, false).unwrap_or(*axis);
+    *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
 }
 
-/// What is looked at, in the line at the bottom.
+/// Shows the state of the analysis in the line at the bottom.
 fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&shown.problem, &shown.analysis) {
         _ if shown.is_pending => (palette.accent, "Computing".to_owned()),
         (Some(_), _) => (
             palette.bad,
-            "This sensor or scene is impossible: the note says why".to_owned(),
+            "This sensor or scene is not possible: the note says why".to_owned(),
         ),
         (None, Some(analysis)) => match analysis.warnings.len() {
-            0 => (palette.good, "Nothing stands in the way of decoupling".to_owned()),
+            0 => (palette.good, "No warnings: nothing prevents decoupling".to_owned()),
             1 => (palette.warning, "1 warning".to_owned()),
             count => (palette.warning, format!("{count} warnings")),
         },

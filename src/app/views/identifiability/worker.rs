@@ -12,15 +12,15 @@ use crate::app::job::{Job, Wake};
 /// An answer that takes less is finished though another question is asked, so that the picture follows a slider.
 const SHORT: Duration = Duration::from_millis(250);
 
-/// What the readings can tell; `None` if that was not computed to the end.
+/// Result of an analysis; `None` if it was not computed to the end.
 type Answered = Result<Option<Arc<Analysis>>, String>;
 
-/// What the thread tells the window.
+/// Message of the thread to the window.
 #[derive(Debug)]
 pub struct Answer {
-    /// Whether no other question has been asked since.
+    /// True if no other question has been asked since.
     pub is_newest: bool,
-    /// What the readings can tell, or why that is not known.
+    /// Analysis, or the reason for which there is none.
     pub analysis: Result<Arc<Analysis>, String>,
 }
 

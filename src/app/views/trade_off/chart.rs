@@ -1,4 +1,4 @@
-//! What the points of the charts answer to the pointer.
+//! Response of the points of the charts to the pointer.
 
 use eframe::egui::{CursorIcon, Id, Pos2, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role};
 
@@ -8,7 +8,7 @@ use crate::{
         theme::{Theme, semibold, type_size},
         widgets::dim_ui,
     },
-    evaluation::{TradeCost, TradeLevel, TradePoint},
+    evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
     figure::{
         PlotFigure,
         trade_words::{point_facts, point_name},
@@ -22,13 +22,13 @@ const REACH: f32 = 7.0;
 /// says so.
 pub fn charts_ui(
     ui: &mut Ui,
-    (level, figure): (&TradeLevel, &PlotFigure),
+    (level, figure): (&TradeOffLevel, &PlotFigure),
     marked: Option<usize>,
     can_load: bool,
 ) -> Option<usize> {
     let drawn = plots_ui(ui, "trade-off", figure, Pointer::Picks);
     let mut clicked = None;
-    for (cost, drawn) in TradeCost::ALL.into_iter().zip(drawn) {
+    for (cost, drawn) in TradeOffCost::ALL.into_iter().zip(drawn) {
         for (number, point) in level.points.iter().enumerate() {
             let (x, y) = cost.of(point);
             let Some(at) = drawn.position(x, y) else { continue };
@@ -49,8 +49,8 @@ pub fn charts_ui(
 /// Answers the pointer at a point with its name and figures; returns whether it is clicked.
 fn point_ui(
     ui: &mut Ui,
-    (point, is_marked, can_load): (&TradePoint, bool, bool),
-    cost: TradeCost,
+    (point, is_marked, can_load): (&TradeOffPoint, bool, bool),
+    cost: TradeOffCost,
     at: Pos2,
     id: Id,
 ) -> bool {
@@ -59,8 +59,8 @@ fn point_ui(
     let name = point_name(point);
     response.widget_info(|| {
         let what = match cost {
-            TradeCost::Decoding => "Decoding",
-            TradeCost::Training => "Training",
+            TradeOffCost::Decoding => "Decoding",
+            TradeOffCost::Training => "Training",
         };
         WidgetInfo::selected(Role::Button, true, is_marked, format!("{what}: {name}"))
     });
@@ -79,7 +79,7 @@ fn point_ui(
             if can_load {
                 "Click to load it into the Train view"
             } else {
-                "A training is under way: it cannot be loaded now"
+                "A training is running: the point cannot be loaded now"
             },
         );
     });

@@ -2,28 +2,29 @@
 
 use eframe::egui::{Align, Label, Layout, RichText, Ui};
 
-use super::TradeLook;
+use super::TradeOffLook;
 use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
     },
-    evaluation::{TradeLevel, TradePoint},
+    evaluation::{TradeOffLevel, TradeOffPoint},
     export::format_percent,
     figure::trade_words::{frame_time, point_facts, point_name},
 };
 
 /// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
 /// so.
-pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_load: bool) -> Option<usize> {
+pub fn choices_ui(ui: &mut Ui, level: &TradeOffLevel, look: &mut TradeOffLook, can_load: bool) -> Option<usize> {
     let [fastest, most_accurate] = level.answers(&look.limits);
-    section_heading_ui(ui, "Which one to take");
-    let hint = "The least time for a frame with at most this error of z.";
+    section_heading_ui(ui, "Recommended decoders");
+    let hint = "Finds the decoder with the shortest time for a frame among those whose Z error is at most this, in \
+                percent.";
     quantity_ui(ui, "Fastest under", hint, &mut look.limits.percent, 1e-15..=1e6, "%");
-    let none = "Nothing measured here is as accurate.";
+    let none = "No measured decoder is this accurate.";
     answer_ui(ui, &mut look.marked, level, "Fastest", fastest, none);
     ui.add_space(space(1));
-    let hint = "The least error of z among those that decode a frame within this time.";
+    let hint = "Finds the decoder with the smallest Z error among those that decode a frame within this time, in µs.";
     quantity_ui(
         ui,
         "Most accurate under",
@@ -32,7 +33,7 @@ pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_loa
         1e-6..=1e12,
         "µs",
     );
-    let none = "Nothing measured here is as fast.";
+    let none = "No measured decoder is this fast.";
     answer_ui(ui, &mut look.marked, level, "Most accurate", most_accurate, none);
     section_heading_ui(ui, "Marked point");
     match look.marked.and_then(|marked| Some((marked, level.points.get(marked)?))) {
@@ -51,7 +52,7 @@ pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_loa
 fn answer_ui(
     ui: &mut Ui,
     marked: &mut Option<usize>,
-    level: &TradeLevel,
+    level: &TradeOffLevel,
     question: &str,
     chosen: Option<usize>,
     none: &str,
@@ -71,7 +72,7 @@ fn answer_ui(
         *marked == Some(number),
         RichText::new(&text).size(type_size().note).color(accent),
     );
-    let response = response.on_hover_text("Click to mark it in the charts and the table");
+    let response = response.on_hover_text("Click to mark it in the charts and the table.");
     response.widget_info(|| {
         let label = format!("{question}: {text}");
         eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::Button, true, label)
@@ -82,14 +83,14 @@ fn answer_ui(
 }
 
 /// Returns whether the point is to be loaded.
-fn marked_ui(ui: &mut Ui, point: &TradePoint, can_load: bool) -> bool {
+fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
     let mut is_loaded = false;
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
             is_loaded = load
-                .on_hover_text("Take its sensor, scene and network settings for the next training")
-                .on_disabled_hover_text("A training is under way there: its settings cannot change now")
+                .on_hover_text("Uses its sensor, scene and network settings for the next training.")
+                .on_disabled_hover_text("A training is running in the Train view: its settings cannot be changed now")
                 .clicked();
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 let name = RichText::new(point_name(point)).font(semibold(type_size().note));
@@ -101,7 +102,7 @@ fn marked_ui(ui: &mut Ui, point: &TradePoint, can_load: bool) -> bool {
     dim_ui(
         ui,
         &format!(
-            "{} training samples, {} epochs at most.",
+            "{} training samples, at most {} epochs.",
             point.settings.source.samples, point.settings.training.stopping.epochs
         ),
     );

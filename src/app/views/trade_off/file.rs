@@ -1,27 +1,27 @@
 use std::path::Path;
 
-use super::TradeLook;
+use super::TradeOffLook;
 use crate::{
     app::shared::{FileTask, FileWords},
-    evaluation::TradeLevel,
+    evaluation::TradeOffLevel,
     export::{
         atomic_write,
         figures::{PictureError, PictureFormat},
-        write_trade,
+        write_trade_off,
     },
     figure::trade_off_figure,
 };
 
-/// What can be written about a measurement.
+/// File that can be written about a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TradeFile {
+pub enum TradeOffFile {
     /// Every point of every level of noise, as CSV.
     Points,
     /// Both charts of the level on show.
     Charts(PictureFormat),
 }
 
-impl TradeFile {
+impl TradeOffFile {
     /// In the order offered.
     pub const ALL: [Self; 3] = [
         Self::Points,
@@ -29,14 +29,14 @@ impl TradeFile {
         Self::Charts(PictureFormat::Png),
     ];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
-        let charts = "Both charts of the level of noise on show, on a light ground, at publication size.";
+        let charts = "Both charts at the displayed noise level, on a light background, at publication size.";
         let (name, kind, description, extensions): (_, _, _, &[&str]) = match self {
             Self::Points => (
                 "All points as CSV…",
                 "points",
-                "Every point at every level of noise with all its digits, as CSV.",
+                "Every point at every noise level, in full precision, as CSV.",
                 &["csv"],
             ),
             Self::Charts(PictureFormat::Svg) => ("Charts as SVG…", "charts", charts, &["svg"]),
@@ -51,7 +51,7 @@ impl TradeFile {
     }
 
     /// The file about `levels`, looked at so.
-    pub fn task(self, levels: Vec<TradeLevel>, look: &TradeLook) -> FileTask {
+    pub fn task(self, levels: Vec<TradeOffLevel>, look: &TradeOffLook) -> FileTask {
         let words = self.words();
         let suggestion = format!("trade_off.{}", words.extensions[0]);
         let charts = levels
@@ -60,7 +60,7 @@ impl TradeFile {
         let write = move |path: &Path| -> Result<(), PictureError> {
             match (self, &charts) {
                 (Self::Charts(format), Some(charts)) => charts.draw().save(format, path)?,
-                _ => atomic_write(path, |writer| write_trade(&levels, writer))?,
+                _ => atomic_write(path, |writer| write_trade_off(&levels, writer))?,
             }
             Ok(())
         };

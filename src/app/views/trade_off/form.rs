@@ -2,7 +2,7 @@ use std::{ops::RangeInclusive, str::FromStr};
 
 use thiserror::Error;
 
-use super::TradePlan;
+use super::TradeOffPlan;
 use crate::{
     dataset::LARGEST_SAMPLES,
     decoupling::DecoderKind,
@@ -13,22 +13,22 @@ use crate::{
 
 /// A measurement as the user sets it up.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TradeForm {
+pub struct TradeOffForm {
     /// Relative errors of a reading, as typed.
     pub noises: String,
     /// Hidden nodes, as typed.
     pub hidden: String,
-    /// Where the settings of the networks begin.
+    /// Presets on which the settings of the networks are based.
     pub presets: WhichPresets,
     /// Ways of decoding, in the order of [`DecoderKind::ALL`].
     pub decoders: [bool; DecoderKind::ALL.len()],
-    /// How long networks are trained.
+    /// Length of the trainings.
     pub thoroughness: Thoroughness,
     /// The most training samples of a quick look.
     pub samples: usize,
     /// The most epochs of a quick look.
     pub epochs: usize,
-    /// Samples that errors are measured on.
+    /// Number of samples on which the errors are measured.
     pub test_samples: usize,
 }
 
@@ -41,7 +41,7 @@ pub enum WhichPresets {
     Only(Preset),
 }
 
-/// How long networks are trained.
+/// Length of the trainings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thoroughness {
     /// With few samples and epochs: a first look within a minute.
@@ -50,16 +50,16 @@ pub enum Thoroughness {
     Full,
 }
 
-/// Why a form is no measurement yet.
+/// Reasons for which a form is not yet a measurement.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
-pub enum TradeFormError {
+pub enum TradeOffFormError {
     /// Something that is no number.
     #[error("{what}: '{text}' is not a number; write a list such as {example}")]
     NotANumber {
         /// The list.
         what: &'static str,
-        /// What was typed.
+        /// Text that was typed.
         text: String,
         /// A list that can be understood.
         example: &'static str,
@@ -69,7 +69,7 @@ pub enum TradeFormError {
     Range {
         /// The list.
         what: &'static str,
-        /// What was typed.
+        /// Text that was typed.
         value: String,
         /// The smallest.
         least: String,
@@ -98,7 +98,7 @@ const MOST_POINTS: usize = 1000;
 const NOISES: &str = "0, 1e-4, 1e-3, 1e-2";
 const HIDDEN: &str = "6, 12";
 
-impl Default for TradeForm {
+impl Default for TradeOffForm {
     fn default() -> Self {
         Self {
             noises: NOISES.to_owned(),
@@ -113,21 +113,21 @@ impl Default for TradeForm {
     }
 }
 
-impl TradeForm {
+impl TradeOffForm {
     /// The measurement in the sensor and scene of `base`, sound as far as can be known before it is run.
     ///
     /// # Errors
-    /// What is wrong with it.
-    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
+    /// If the form is not a possible measurement.
+    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradeOffPlan, TradeOffFormError> {
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
         let decoders: Vec<_> = chosen
             .filter(|(_, is_chosen)| *is_chosen)
             .map(|(kind, _)| kind)
             .collect();
         if decoders.is_empty() {
-            return Err(TradeFormError::NoDecoder);
+            return Err(TradeOffFormError::NoDecoder);
         }
-        let plan = TradePlan {
+        let plan = TradeOffPlan {
             base: *base,
             noises: list("Noise levels", &self.noises, NOISES, 0.0..=1.0)?,
             hidden: list("Hidden nodes", &self.hidden, HIDDEN, 1..=LARGEST_HIDDEN)?,
@@ -146,7 +146,7 @@ impl TradeForm {
             test_samples: self.test_samples.clamp(1, LARGEST_SAMPLES),
         };
         match plan.points() {
-            points if points > MOST_POINTS => Err(TradeFormError::TooMany(points)),
+            points if points > MOST_POINTS => Err(TradeOffFormError::TooMany(points)),
             _ => Ok(plan),
         }
     }
@@ -158,20 +158,20 @@ fn list<N>(
     text: &str,
     example: &'static str,
     possible: RangeInclusive<N>,
-) -> Result<Vec<N>, TradeFormError>
+) -> Result<Vec<N>, TradeOffFormError>
 where
     N: FromStr + PartialOrd + ToString,
 {
     let mut values: Vec<N> = Vec::new();
     let words = text.split(|letter: char| letter == ',' || letter == ';' || letter.is_whitespace());
     for word in words.filter(|word| !word.is_empty()) {
-        let value: N = word.parse().map_err(|_| TradeFormError::NotANumber {
+        let value: N = word.parse().map_err(|_| TradeOffFormError::NotANumber {
             what,
             text: word.to_owned(),
             example,
         })?;
         if !possible.contains(&value) {
-            return Err(TradeFormError::Range {
+            return Err(TradeOffFormError::Range {
                 what,
                 value: word.to_owned(),
                 least: possible.start().to_string(),
@@ -183,7 +183,7 @@ where
         }
     }
     if values.is_empty() {
-        return Err(TradeFormError::Empty { what, example });
+        return Err(TradeOffFormError::Empty { what, example });
     }
     Ok(values)
 }
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn the_form_begins_with_a_quick_look_at_everything() {
-        let plan = TradeForm::default().plan(&SimulatedSettings::default()).unwrap();
+        let plan = TradeOffForm::default().plan(&SimulatedSettings::default()).unwrap();
         // Five without a network, then two sizes with two precisions and polish.
         assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
         let best = plan.settings(Preset::Best, 1e-3);
@@ -211,10 +211,10 @@ mod tests {
         let mut base = SimulatedSettings::default();
         base.source.scene.largest_compression = 0.1;
         base.source.sensor.geometry.height_mm = 4.0;
-        let form = TradeForm {
+        let form = TradeOffForm {
             thoroughness: Thoroughness::Full,
             presets: WhichPresets::Only(Preset::Best),
-            ..TradeForm::default()
+            ..TradeOffForm::default()
         };
         let plan = form.plan(&base).unwrap();
         let (settings, preset) = (plan.settings(Preset::Best, 0.0), Preset::Best.settings());
@@ -229,24 +229,24 @@ mod tests {
     #[test]
     fn what_cannot_be_measured_says_why() {
         let base = SimulatedSettings::default();
-        let error = |form: TradeForm| form.plan(&base).unwrap_err().to_string();
-        let with_noises = |text: &str| TradeForm {
+        let error = |form: TradeOffForm| form.plan(&base).unwrap_err().to_string();
+        let with_noises = |text: &str| TradeOffForm {
             noises: text.to_owned(),
-            ..TradeForm::default()
+            ..TradeOffForm::default()
         };
         assert!(error(with_noises("0, much")).contains("'much' is not a number"));
         assert!(error(with_noises("2")).contains("give from 0 to 1"));
         assert!(error(with_noises("NaN")).contains("give from 0 to 1"));
         assert!(error(with_noises(" , ")).contains("there are no values"));
-        let none = TradeForm {
+        let none = TradeOffForm {
             decoders: [false; DecoderKind::ALL.len()],
-            ..TradeForm::default()
+            ..TradeOffForm::default()
         };
         assert!(error(none).contains("choose at least one"));
         let many: Vec<String> = (1..=200).map(|hidden| hidden.to_string()).collect();
-        let many = TradeForm {
+        let many = TradeOffForm {
             hidden: many.join(" "),
-            ..TradeForm::default()
+            ..TradeOffForm::default()
         };
         assert!(error(many).contains("give fewer values"));
     }

@@ -13,6 +13,6 @@ mod table;
 mod view;
 mod worker;
 
-pub use form::{Thoroughness, TradeForm, TradeFormError, WhichPresets};
-pub use plan::TradePlan;
-pub use state::{TradeEnding, TradeLook, TradeOffView, TradeOutcome};
+pub use form::{Thoroughness, TradeOffForm, TradeOffFormError, WhichPresets};
+pub use plan::TradeOffPlan;
+pub use state::{TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView};

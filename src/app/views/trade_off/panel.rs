@@ -1,6 +1,6 @@
 use eframe::egui::{TextEdit, Ui, vec2};
 
-use super::{Thoroughness, TradeForm, TradeOffView, WhichPresets, names::noise_name};
+use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, names::noise_name};
 use crate::{
     app::{
         shared::{Effect, Shared},
@@ -16,10 +16,10 @@ use crate::{
     training::StoppingRules,
 };
 
-/// What is measured: lists, presets, decoders, Measure and Cancel.
+/// Shows the form: lists, presets, decoders, Measure and Cancel.
 pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "trade form", |ui| {
-        section_heading_ui(ui, "What is measured");
+        section_heading_ui(ui, "Measurement");
         let draft = &shared.draft;
         let text = format!(
             "{} in the scene of the Train view, seed {}.",
@@ -42,10 +42,11 @@ pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: 
     });
 }
 
-fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
-    let hint = "Relative errors of a reading (standard deviation), separated by commas.";
+fn fields_ui(ui: &mut Ui, form: &mut TradeOffForm) {
+    let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels with \
+                commas.";
     list_ui(ui, "Noise levels", hint, &mut form.noises);
-    let hint = "Sizes of the networks, separated by commas.";
+    let hint = "Numbers of hidden nodes of the networks, separated by commas.";
     list_ui(ui, "Hidden nodes", hint, &mut form.hidden);
     section_heading_ui(ui, "Presets");
     let presets = [
@@ -64,16 +65,16 @@ fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
         (Thoroughness::Quick, "Quick look"),
         (Thoroughness::Full, "Full presets"),
     ];
-    let picked = segmented_ui(ui, "How long networks are trained", &options, form.thoroughness, true);
+    let picked = segmented_ui(ui, "Training length", &options, form.thoroughness, true);
     form.thoroughness = picked.unwrap_or(form.thoroughness);
     match form.thoroughness {
         Thoroughness::Quick => {
-            let hint = "The most training samples of a network; a preset with fewer keeps its own.";
-            count_ui(ui, "Samples at most", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
-            let hint = "The most epochs of a training.";
+            let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
+            count_ui(ui, "Maximum samples", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
+            let hint = "Largest number of epochs per training.";
             count_ui(
                 ui,
-                "Epochs at most",
+                "Maximum epochs",
                 hint,
                 &mut form.epochs,
                 1..=StoppingRules::MOST_EPOCHS,
@@ -82,11 +83,11 @@ fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
         Thoroughness::Full => {
             dim_ui(
                 ui,
-                "As many samples and epochs as the presets say: best networks, some minutes for each.",
+                "Samples and epochs as in the presets: the best networks, at some minutes each.",
             );
         }
     }
-    let hint = "Samples that errors are measured on.";
+    let hint = "Number of samples on which the errors are measured.";
     count_ui(ui, "Test samples", hint, &mut form.test_samples, 1..=LARGEST_SAMPLES);
 }
 
@@ -105,14 +106,14 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
         let measure = primary_button("▶ Measure").min_size(size);
         let measure = ui.add_enabled(trade.can_measure(shared), measure);
         let why_not = if !trade.is_quiet(shared) {
-            "A training or an experiment is under way: it would disturb the times"
+            "A training or an experiment is running and would distort the times"
         } else if trade.running.is_some() {
-            "One measurement at a time"
+            "A measurement is already running"
         } else {
-            "The note above says what to change"
+            "The settings are not valid: the note above says what to change"
         };
         if measure
-            .on_hover_text("Train, fit and time every decoder in the background (Ctrl+Enter)")
+            .on_hover_text("Trains, fits and times every decoder in the background (Ctrl+Enter).")
             .on_disabled_hover_text(why_not)
             .clicked()
         {
@@ -121,7 +122,7 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
         let cancel = ghost_button("■ Cancel").min_size(size);
         let cancel = ui.add_enabled(trade.running.is_some(), cancel);
         if cancel
-            .on_hover_text("End it; what is measured stays (Ctrl+.)")
+            .on_hover_text("Ends the measurement; the points measured so far are kept (Ctrl+.).")
             .clicked()
         {
             trade.cancel();
@@ -142,7 +143,7 @@ fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
     if !trade.is_quiet(shared) {
         note_ui(
             ui,
-            "A training or an experiment is under way: it makes these times longer.",
+            "A training or an experiment is running and makes these times longer.",
         );
     }
 }

@@ -6,12 +6,12 @@ use crate::{
 
 /// A measurement as it is run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TradePlan {
+pub struct TradeOffPlan {
     /// Sensor, scene and seed.
     pub base: SimulatedSettings,
     /// Relative errors of a reading.
     pub noises: Vec<f64>,
-    /// Where the settings of the networks begin.
+    /// Presets on which the settings of the networks are based.
     pub presets: Vec<Preset>,
     /// Hidden nodes.
     pub hidden: Vec<usize>,
@@ -19,11 +19,11 @@ pub struct TradePlan {
     pub decoders: Vec<DecoderKind>,
     /// The most training samples and epochs, if not those of the presets.
     pub at_most: Option<(usize, usize)>,
-    /// Samples that errors are measured on.
+    /// Number of samples on which the errors are measured.
     pub test_samples: usize,
 }
 
-impl TradePlan {
+impl TradeOffPlan {
     /// The settings of a preset at a level of noise, in the sensor and the scene of [`Self::base`]. Which rows are read,
     /// and what networks are given of the readings, is the preset's.
     pub fn settings(&self, preset: Preset, noise: f64) -> SimulatedSettings {
@@ -51,7 +51,7 @@ impl TradePlan {
         settings
     }
 
-    /// How many points it has.
+    /// Returns the number of points.
     pub fn points(&self) -> usize {
         let of_decoder = |kind: &DecoderKind| {
             let networks = if kind.needs_network() { self.hidden.len() } else { 1 };

@@ -1,72 +1,72 @@
 use std::time::{Duration, Instant};
 
 use super::{
-    TradeForm, TradeFormError, TradePlan,
-    worker::{self, TradeEvent},
+    TradeOffForm, TradeOffFormError, TradeOffPlan,
+    worker::{self, TradeOffEvent},
 };
 use crate::{
     app::{
         job::{Job, Wake},
         shared::{Effect, Shared, View as _},
     },
-    evaluation::{SimulatedSettings, TradeLevel, TradeLimits, TradePoint},
+    evaluation::{SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
 };
 
 /// The Trade-off view.
 #[derive(Debug)]
 pub struct TradeOffView {
-    /// What is to be measured.
-    pub form: TradeForm,
-    /// What runs.
-    pub running: Option<TradeRunning>,
-    /// What is measured.
-    pub outcome: Option<TradeOutcome>,
-    /// How it is looked at.
-    pub look: TradeLook,
-    pub(super) job: Job<TradeEvent>,
+    /// Form of the next measurement.
+    pub form: TradeOffForm,
+    /// Measurement that is running.
+    pub running: Option<TradeOffRunning>,
+    /// Results measured so far.
+    pub outcome: Option<TradeOffOutcome>,
+    /// Level, limits and marked point of the display.
+    pub look: TradeOffLook,
+    pub(super) job: Job<TradeOffEvent>,
 }
 
-/// How a measurement is looked at.
+/// State of the display of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TradeLook {
+pub struct TradeOffLook {
     /// The level of noise on show.
     pub level: usize,
     /// The point marked in charts and table, by its place in the level on show.
     pub marked: Option<usize>,
     /// The limits of the two questions.
-    pub limits: TradeLimits,
+    pub limits: TradeOffLimits,
 }
 
 /// A measurement under way.
 #[derive(Clone, Copy, Debug)]
-pub struct TradeRunning {
+pub struct TradeOffRunning {
     /// When it began.
     pub begun: Instant,
 }
 
-/// How a measurement ended.
+/// Ending of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TradeEnding {
+pub enum TradeOffEnding {
     /// Every point is there.
     Complete,
     /// By the user, or by an accident that was told.
     Cut,
 }
 
-/// What is measured.
+/// Results of a measurement so far.
 #[derive(Clone, Debug)]
-pub struct TradeOutcome {
-    /// What was asked for.
-    pub plan: TradePlan,
+pub struct TradeOffOutcome {
+    /// Plan that is measured.
+    pub plan: TradeOffPlan,
     /// One for each level of noise.
-    pub levels: Vec<TradeLevel>,
-    /// How it ended, once it has.
-    pub ending: Option<TradeEnding>,
-    /// How long it took, once it has ended.
+    pub levels: Vec<TradeOffLevel>,
+    /// Ending of the measurement, once it has ended.
+    pub ending: Option<TradeOffEnding>,
+    /// Time it took, once it has ended.
     pub took: Option<Duration>,
 }
 
-impl TradeOutcome {
+impl TradeOffOutcome {
     /// Points measured and points asked for.
     pub fn points(&self) -> (usize, usize) {
         let done = self.levels.iter().map(|level| level.points.len()).sum();
@@ -78,20 +78,20 @@ impl TradeOffView {
     /// Nothing measured yet. `wake` is called when there is news.
     pub fn new(wake: Wake) -> Self {
         Self {
-            form: TradeForm::default(),
+            form: TradeOffForm::default(),
             running: None,
             outcome: None,
-            look: TradeLook::default(),
+            look: TradeOffLook::default(),
             job: Job::new("trade-off", wake),
         }
     }
 
-    /// Whether nothing else of this program computes, which would disturb the times.
+    /// Returns true if nothing else of this program computes, which would distort the times.
     pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
         !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
     }
 
-    /// Whether the form can be measured now.
+    /// Returns true if the form can be measured now.
     pub(super) fn can_measure(&self, shared: &Shared) -> bool {
         self.running.is_none() && self.is_quiet(shared) && self.plan(&shared.draft).is_ok()
     }
@@ -110,24 +110,24 @@ impl TradeOffView {
         self.end(Instant::now());
     }
 
-    /// What would be measured in the scene of these settings, or why nothing can be.
+    /// Returns the plan to be measured in the scene of these settings.
     ///
     /// # Errors
-    /// What is wrong with the form.
-    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradePlan, TradeFormError> {
+    /// If the form is not a possible measurement.
+    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradeOffPlan, TradeOffFormError> {
         self.form.plan(base)
     }
 
     /// Makes room for the points of `plan`.
-    fn begin(&mut self, plan: TradePlan) {
-        let level = |&noise: &f64| TradeLevel {
+    fn begin(&mut self, plan: TradeOffPlan) {
+        let level = |&noise: &f64| TradeOffLevel {
             noise,
             points: Vec::new(),
         };
         self.look.level = self.look.level.min(plan.noises.len() - 1);
         self.look.marked = None;
-        self.running = Some(TradeRunning { begun: Instant::now() });
-        self.outcome = Some(TradeOutcome {
+        self.running = Some(TradeOffRunning { begun: Instant::now() });
+        self.outcome = Some(TradeOffOutcome {
             levels: plan.noises.iter().map(level).collect(),
             plan,
             ending: None,
@@ -136,7 +136,7 @@ impl TradeOffView {
     }
 
     /// Adds a point to a level.
-    pub fn record(&mut self, level: usize, point: TradePoint) {
+    pub fn record(&mut self, level: usize, point: TradeOffPoint) {
         let level = self.outcome.as_mut().and_then(|outcome| outcome.levels.get_mut(level));
         if let Some(level) = level {
             level.points.push(point);
@@ -150,15 +150,15 @@ impl TradeOffView {
             let (done, all) = outcome.points();
             outcome.took = Some(at - running.begun);
             outcome.ending = Some(if done == all {
-                TradeEnding::Complete
+                TradeOffEnding::Complete
             } else {
-                TradeEnding::Cut
+                TradeOffEnding::Cut
             });
         }
     }
 
     /// The level on show.
-    pub fn shown(&self) -> Option<&TradeLevel> {
+    pub fn shown(&self) -> Option<&TradeOffLevel> {
         self.outcome
             .as_ref()
             .and_then(|outcome| outcome.levels.get(self.look.level))

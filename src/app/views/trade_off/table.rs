@@ -10,7 +10,7 @@ use crate::{
         plotting::hue_colour,
         theme::{Theme, semibold, space, type_size},
     },
-    evaluation::{TradeCost, TradeLevel, TradePoint},
+    evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
     export::format_number,
     figure::trade_words::{frame_time, point_name, training_time},
 };
@@ -37,7 +37,7 @@ impl Column {
         }
     }
 
-    fn text(self, point: &TradePoint) -> String {
+    fn text(self, point: &TradeOffPoint) -> String {
         match self {
             Self::Error => format_number(point.report.errors.z_percent),
             Self::ToLimit => format_number(point.to_reference()),
@@ -46,7 +46,7 @@ impl Column {
         }
     }
 
-    /// The cost it shows, by its place in [`TradeCost::ALL`].
+    /// The cost it shows, by its place in [`TradeOffCost::ALL`].
     fn cost(self) -> Option<usize> {
         match self {
             Self::Error | Self::ToLimit => None,
@@ -57,9 +57,9 @@ impl Column {
 }
 
 /// Lays out the table over the available space; a click marks a point.
-pub fn table_ui(ui: &mut Ui, level: &TradeLevel, marked: &mut Option<usize>) {
+pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) {
     let palette = Theme::of(ui).palette;
-    let fronts = TradeCost::ALL.map(|cost| level.front(cost));
+    let fronts = TradeOffCost::ALL.map(|cost| level.front(cost));
     // Without noise there is no limit to compare with.
     let columns = Column::ALL.into_iter();
     let has_limit = level.points.iter().any(|point| point.to_reference().is_some());
@@ -106,10 +106,10 @@ fn right_end(line: Rect, from_right: usize) -> Pos2 {
     pos2(line.right() - left_of_it, line.center().y)
 }
 
-/// Whether the row was clicked.
+/// Shows a row. Returns true if it was clicked.
 fn row_ui(
     ui: &mut Ui,
-    (point, is_marked): (&TradePoint, bool),
+    (point, is_marked): (&TradeOffPoint, bool),
     on_fronts: [bool; 2],
     (columns, width): (&[Column], f32),
 ) -> bool {
@@ -155,7 +155,8 @@ fn row_ui(
         .hline(line.x_range(), line.bottom(), Stroke::new(0.5, palette.line));
     let response = response.on_hover_cursor(CursorIcon::PointingHand);
     let response = response.on_hover_text(
-        "Click to mark it in the charts. Where a time is blue, no other point has as small an error in as little time.",
+        "Click to mark it in the charts. A blue time is on the Pareto front: no other point has as small an error in \
+         as little time.",
     );
     response.clicked()
 }

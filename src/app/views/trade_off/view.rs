@@ -5,8 +5,8 @@ use eframe::egui::{
 };
 
 use super::{
-    TradeEnding, TradeLook, TradeOffView, TradeOutcome, chart::charts_ui, choices::choices_ui, file::TradeFile,
-    names::noise_name, panel, table::table_ui, worker::TradeEvent,
+    TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
+    file::TradeOffFile, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
 };
 use crate::{
     app::{
@@ -27,8 +27,8 @@ impl View for TradeOffView {
     fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
-                TradeEvent::Measured(level, point) => self.record(level, *point),
-                TradeEvent::Ended(result) => {
+                TradeOffEvent::Measured(level, point) => self.record(level, *point),
+                TradeOffEvent::Ended(result) => {
                     self.end(Instant::now());
                     effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
                 }
@@ -69,8 +69,8 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
         card_ui(ui, whole, |ui| {
             placeholder_ui(
                 ui,
-                "Press Measure: every decoder appears here with its error, its time for a frame and its training time, \
-                 at several levels of noise.",
+                "Press Measure to see the error, the time for a frame and the training time of every decoder at \
+                 several noise levels.",
             );
         });
         return;
@@ -111,7 +111,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
     }
 }
 
-fn head_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook, effects: &mut Vec<Effect>) {
+fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook, effects: &mut Vec<Effect>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
@@ -123,7 +123,7 @@ fn head_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook, effects: &
 }
 
 /// Few levels stand side by side, many in a list.
-fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
+fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
     let names: Vec<String> = outcome.plan.noises.iter().map(|&noise| noise_name(noise)).collect();
     let picked = if names.len() <= 5 {
         let options: Vec<_> = names
@@ -131,7 +131,7 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
             .enumerate()
             .map(|(level, name)| (level, name.as_str()))
             .collect();
-        segmented_ui(ui, "Noise on show", &options, look.level, false)
+        segmented_ui(ui, "Displayed noise level", &options, look.level, false)
     } else {
         let mut picked = None;
         let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
@@ -150,32 +150,32 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
     dim_ui(ui, "Noise");
 }
 
-fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &TradeLook, effects: &mut Vec<Effect>) {
+fn export_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &TradeOffLook, effects: &mut Vec<Effect>) {
     ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
         let button = MenuButton::from_button(ghost_button("Export"));
         let (button, _) = button.ui(ui, |ui| {
             ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
-            for file in TradeFile::ALL {
+            for file in TradeOffFile::ALL {
                 let words = file.words();
                 if ui.button(words.name).on_hover_text(words.description).clicked() {
                     effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), look)));
                 }
             }
         });
-        button.on_disabled_hover_text("There is nothing to export before the first point is measured");
+        button.on_disabled_hover_text("Nothing to export yet: no point has been measured");
     });
 }
 
-/// Why a level of noise has no points.
+/// Returns the hint shown while a noise level has no points.
 fn waiting(is_running: bool) -> &'static str {
     if is_running {
-        "The points of this noise appear as they are measured."
+        "Points at this noise level appear here as they are measured."
     } else {
-        "The measurement ended before this noise."
+        "The measurement ended before this noise level."
     }
 }
 
-/// What is going on, in the line at the bottom.
+/// Shows the state of the measurement in the line at the bottom.
 fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
     let palette = Theme::of(ui).palette;
     let (colour, text) = match (&trade.running, &trade.outcome) {
@@ -189,7 +189,7 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
                 .took
                 .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
             match outcome.ending {
-                Some(TradeEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
+                Some(TradeOffEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
                 _ => (palette.warning, format!("Ended early: {done} of {all} points{took}")),
             }
         }

@@ -12,7 +12,7 @@ pub enum BottomTab {
     Loss,
     /// Gradient, damping or rate, and validation failures against epoch.
     TrainingState,
-    /// How the errors of z are distributed.
+    /// Distribution of the errors of z.
     ErrorHistogram,
     /// Decoupled against actual z.
     Regression,

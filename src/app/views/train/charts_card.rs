@@ -38,28 +38,28 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
             // Each tab is zoomed by itself.
             plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
         }
-        None => placeholder_ui(ui, what_comes(view.tab)),
+        None => placeholder_ui(ui, hint_of_empty_chart(view.tab)),
     }
     if (view.tab, view.has_error_bars) != before {
         ui.request_repaint();
     }
 }
 
-/// Whether the nodes have error bars.
+/// Shows the choice of error bars on the nodes.
 fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
     ui.add_space(space(3));
-    let hint = "± the root mean square error of each node over all snapshots of the test set";
+    let hint = "± the root mean square error of each node over all snapshots of the test set, in mm.";
     ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
 }
 
-/// What an empty chart is there for.
-fn what_comes(tab: BottomTab) -> &'static str {
+/// Returns the hint shown in an empty chart.
+fn hint_of_empty_chart(tab: BottomTab) -> &'static str {
     match tab {
         BottomTab::Loss => "The error of each epoch appears here while the network trains.",
         BottomTab::TrainingState => {
             "The gradient and the method's own quantities appear here while the network trains."
         }
-        BottomTab::ErrorHistogram => "How often each error of z occurs in the test set appears here.",
+        BottomTab::ErrorHistogram => "The distribution of the z errors in the test set appears here.",
         BottomTab::Regression => "Decoupled against actual z of every node in the test set appears here.",
         BottomTab::Nodes => "",
     }

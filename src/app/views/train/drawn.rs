@@ -12,7 +12,7 @@ use crate::{
     figure::z_pairs_mm,
 };
 
-/// What is drawn of the test set on show. It is made anew only when that, the result or the snapshot changes.
+/// Drawings of the test set on show. They are made anew only when that, the result or the snapshot changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
     /// The snapshot on show.
@@ -86,7 +86,7 @@ impl Drawn {
         Some((&of.test, of.decoupled_mm.as_ref()?))
     }
 
-    /// How far each node is off in general, once there is a result: [`node_rms_mm`].
+    /// Returns the root mean square error of each node, once there is a result: [`node_rms_mm`].
     pub(super) fn spread_mm(&self) -> Option<&[f64]> {
         let (test, decoupled_mm) = self.result()?;
         Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoupled_mm)))

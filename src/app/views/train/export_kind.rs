@@ -9,7 +9,7 @@ use crate::{
     export::{CheckpointFile, NetworkFile, atomic_write, write_errors, write_loss_curves},
 };
 
-/// What can be written about a training.
+/// File that can be written about a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportKind {
     /// The network with everything needed to use and reproduce it, as JSON.
@@ -26,8 +26,8 @@ pub enum ExportKind {
 pub const OPEN_CHECKPOINT: FileWords = FileWords {
     name: "Open checkpoint…",
     kind: "checkpoint",
-    description: "Takes up a training saved here or by train --checkpoint in a terminal, with its settings and its whole \
-                  history, and holds it there; Resume goes on with the same bits.",
+    description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
+                  history, and pauses it. A resumed training gives bit-identical results.",
     extensions: &["checkpoint"],
 };
 
@@ -35,14 +35,14 @@ impl ExportKind {
     /// In the order offered.
     pub const ALL: [Self; 4] = [Self::Network, Self::Errors, Self::LossCurves, Self::Checkpoint];
 
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         match self {
             Self::Network => FileWords {
                 name: "Network…",
                 kind: "network",
-                description: "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal command \
-                              decode reads it.",
+                description: "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal \
+                              command decode reads it.",
                 extensions: &["json"],
             },
             Self::Errors => FileWords {
@@ -60,8 +60,8 @@ impl ExportKind {
             Self::Checkpoint => FileWords {
                 name: "Save checkpoint…",
                 kind: "checkpoint",
-                description: "The training as it stands, while paused or at its end: opened here or in a terminal (train \
-                              --checkpoint FILE --resume) it goes on with the same bits.",
+                description: "The training as it stands, paused or ended. Resumed here or in a terminal (train \
+                              --checkpoint FILE --resume), it gives bit-identical results.",
                 extensions: &["checkpoint"],
             },
         }

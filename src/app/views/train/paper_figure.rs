@@ -28,7 +28,7 @@ impl PaperFigure {
         }
     }
 
-    /// What it shows, in a sentence.
+    /// Returns a description of the figure in a sentence.
     pub fn description(self) -> &'static str {
         match self {
             Self::Four => {
@@ -36,7 +36,7 @@ impl PaperFigure {
                  paper's spline, ours includes a plane: level nodes give a level surface."
             }
             Self::Six => {
-                "Trains 10×6_3×18 with 12 hidden nodes and shows every node: true as squares, decoupled as discs."
+                "Trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as discs."
             }
             Self::Seven => {
                 "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
@@ -49,7 +49,7 @@ impl PaperFigure {
         }
     }
 
-    /// What is trained for it.
+    /// Returns the settings of the training for the figure.
     pub fn settings(self) -> SimulatedSettings {
         let scale = match self {
             Self::Four => "10×10_5×30",

@@ -10,7 +10,7 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_busy = shared.phase.is_busy();
     let stop = ui.add_enabled(is_busy, ghost_button("■ Stop"));
     if stop
-        .on_hover_text("End the training; the best network so far stays (Ctrl+.)")
+        .on_hover_text("Ends the training; the best network so far is kept (Ctrl+.).")
         .clicked()
     {
         effects.push(Effect::Stop);
@@ -24,7 +24,7 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let can_pause = matches!(shared.phase, Phase::Training | Phase::Paused);
     if ui
         .add_enabled(can_pause, ghost_button(text))
-        .on_hover_text("Hold the training, or go on (Ctrl+P)")
+        .on_hover_text("Pauses or resumes the training (Ctrl+P).")
         .clicked()
     {
         effects.push(effect);
@@ -33,16 +33,16 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let train = ui.add_enabled(can_train, primary_button("▶ Train"));
     let can_continue = shared.can_continue();
     let hint = if can_continue {
-        "Begin anew: draw the sets and train the network (Ctrl+Enter)"
+        "Starts again: draws the sets and trains the network (Ctrl+Enter)."
     } else {
-        "Draw the sets and train the network (Ctrl+Enter)"
+        "Draws the sets and trains the network (Ctrl+Enter)."
     };
     if train.on_hover_text(hint).clicked() {
         effects.push(Effect::Train);
     }
     if can_continue {
-        let hint = "Go on from the present weights with the method and the epochs on the left, counted from here; Train \
-                    begins anew";
+        let hint = "Continues from the present weights with the method and the epochs on the left, counted from here. \
+                    Train starts again from random weights.";
         let go_on = ui.add(ghost_button("Continue"));
         if go_on.on_hover_text(hint).clicked() {
             effects.push(Effect::Continue);

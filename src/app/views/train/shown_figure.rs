@@ -16,7 +16,7 @@ pub enum ShownPicture {
 }
 
 impl ShownPicture {
-    /// What the file is called.
+    /// Returns the words that describe the file.
     pub fn words(self) -> FileWords {
         match self {
             Self::Surfaces => SURFACES,

@@ -18,17 +18,17 @@ use crate::{
 pub struct TrainView {
     /// Snapshot of the test set.
     pub snapshot: usize,
-    /// What the right-hand card shows.
+    /// Surface shown on the right-hand card.
     pub right: RightCard,
     /// The chart below.
     pub tab: BottomTab,
     /// The node under the pointer, marked on every picture.
     pub node: Option<usize>,
-    /// Whether each decoupled node has a bar that tells how far it is off in general.
+    /// True if each decoupled node has a bar of its root mean square error.
     pub has_error_bars: bool,
-    /// What is drawn.
+    /// Drawings of the test set.
     pub drawn: Drawn,
-    /// What other decoders make of the test set.
+    /// Results of other decoders on the test set.
     pub decoders: DecodersState,
     pub(super) measuring: DecoderMeasuring,
 }
@@ -54,7 +54,7 @@ impl TrainView {
         self.node = self.node.filter(|&node| node < self.drawn.frames.actual.nodes_mm.len());
     }
 
-    /// How far each node is off in general, where that is asked for and there is a result.
+    /// Returns the root mean square error of each node, where error bars are on and there is a result.
     pub fn error_bars_mm(&self) -> Option<&[f64]> {
         self.has_error_bars.then(|| self.drawn.spread_mm()).flatten()
     }

@@ -69,7 +69,7 @@ fn actual_card_ui(
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
             let look = shared.look;
-            let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+            let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
             effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
         });
     });
@@ -90,7 +90,7 @@ fn right_card_ui(
         title_ui(ui, "Network", space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
-            let picked = segmented_ui(ui, "What the network's card shows", &options, view.right, false);
+            let picked = segmented_ui(ui, "Network card", &options, view.right, false);
             view.right = picked.unwrap_or(view.right);
         });
     });
@@ -98,7 +98,7 @@ fn right_card_ui(
         Some(surface) => surface_ui(ui, surface, view, shared, effects),
         None => placeholder_ui(
             ui,
-            "Press Train: the surface that the network decouples takes shape here while it learns.",
+            "Press Train: the decoupled surface takes shape here while the network learns.",
         ),
     }
 }

@@ -7,7 +7,7 @@ use crate::app::{
     widgets::card_ui,
 };
 
-/// Where the report stands.
+/// Position of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkbenchLayout {
     /// In a column of its own, right of the workbench.

@@ -50,7 +50,7 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
         ui.add_enabled_ui(!is_busy, |ui| {
             ui.add_space(space(4));
             let is_default = draft == SimulatedSettings::default();
-            let reset = ui.add_enabled(!is_default, eframe::egui::Button::new("Back to the paper's settings"));
+            let reset = ui.add_enabled(!is_default, eframe::egui::Button::new("Reset to the paper's settings"));
             if reset
                 .on_hover_text("10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples")
                 .clicked()
@@ -66,7 +66,7 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
     picked
 }
 
-/// What can be hoped for in the scene of the draft, where that is known.
+/// Returns the outlook of the scene of the draft, where it is known.
 fn outlook(shared: &Shared) -> Option<&Outlook> {
     let (settings, test) = match (&shared.preview, &shared.run) {
         (Some(preview), _) => (&preview.settings, &preview.test),
@@ -100,14 +100,14 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
 
 fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
     section_heading_ui(ui, "Training");
-    let hint = "Trainings from different random weights, side by side; the best by validation error is kept. One run of \
-                a random start proves little: several show how the results spread. Seeds are derived. Default 1.";
+    let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
+                error is kept. Several starts show how much the results vary. Default 1.";
     ui.add_enabled_ui(is_new, |ui| {
         count_ui(ui, "Starts", hint, &mut draft.starts, 1..=MOST_STARTS)
     });
     let method = &mut draft.training.method;
     // The longest names fill a line.
-    let label = ui.label("Method").on_hover_text("How the weights are improved.");
+    let label = ui.label("Method").on_hover_text("Algorithm that adjusts the weights.");
     let combo = ComboBox::from_id_salt("method")
         .selected_text(method.name())
         .width(ui.available_width())
@@ -131,15 +131,15 @@ fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool)
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
     }
     let stopping = &mut draft.training.stopping;
-    let hint = "The most epochs, passes over the training set: Train counts them from the start, Continue from where the \
-                training stands.";
+    let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
+                from the present one.";
     count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
-    CollapsingHeader::new("When to stop earlier")
+    CollapsingHeader::new("Stopping criteria")
         .id_salt("stopping")
         .show(ui, |ui| {
-            let hint = "Training error (mse of the scaled coordinates) that is good enough. Default 0.";
+            let hint = "Training error (mse of the scaled coordinates) at which training ends. Default 0.";
             quantity_ui(ui, "Goal (mse)", hint, &mut stopping.goal_mse, 0.0..=1e300, "");
-            let hint = "Stop when the gradient is shorter than this. Default 1e-7.";
+            let hint = "Norm of the gradient below which training ends. Default 1e-7.";
             quantity_ui(
                 ui,
                 "Smallest gradient",

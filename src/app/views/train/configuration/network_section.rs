@@ -14,11 +14,11 @@ use crate::{
     scene::{Movement, Rows},
 };
 
-/// What the network is given, and how large it is; changes `draft`.
+/// Shows the inputs and the size of the network; changes `draft`.
 pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Network");
     inputs_ui(ui, draft);
-    let hint = "Nodes of the tanh layer between resistances and coordinates.";
+    let hint = "Number of nodes in the tanh layer between resistances and coordinates.";
     count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
     let scale = draft.source.sensor.scale;
     let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
@@ -29,8 +29,8 @@ pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
     ui.label(RichText::new(text).size(type_size().note).color(dim))
         .on_hover_text(format!(
-            "Of the paper, for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
-             (Eq. 12). A start, not a bound."
+            "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from \
+             1 to 10 (Eq. 12). A starting point, not a limit."
         ));
     weights_ui(ui, draft);
     workload_ui(ui, draft);
@@ -49,11 +49,11 @@ fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
 
 fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let options = [
-        (Quantity::Resistance, "Resistance", "R: the paper."),
+        (Quantity::Resistance, "Resistance", "R, as in the paper."),
         (
             Quantity::Conductance,
             "Conductance",
-            "1/R. By Eq. (2) a plain sum over nodes, hence the most nearly linear in the deformation.",
+            "1/R. By Eq. (2) it is a sum over nodes, and so the closest to linear in the deformation.",
         ),
         (
             Quantity::LogResistance,
@@ -61,7 +61,7 @@ fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
             "ln R: relative errors become additive.",
         ),
     ];
-    let hint = "What the network is given of each resistance.";
+    let hint = "Quantity that the network reads for each resistance.";
     if let Some(picked) = list_ui(ui, "Inputs", hint, &options, draft.inputs.quantity) {
         draft.inputs.quantity = picked;
     }
@@ -69,22 +69,22 @@ fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         (
             ScalingChoice::MinMax,
             "Min-max",
-            "Each channel between −1 and 1: the paper.",
+            "Each channel scaled to −1 to 1, as in the paper.",
         ),
         (
             ScalingChoice::Whitening,
             "Whitening",
-            "Principal components, each divided by √(σ² + noise²): what varies little counts as much as what varies \
-             most, unless noise hides it.",
+            "Principal components, each divided by √(σ² + noise²): components of small variance count as much as \
+             large ones, unless noise hides them.",
         ),
     ];
-    let hint = "How the inputs are scaled.";
+    let hint = "Scaling of the inputs.";
     if let Some(picked) = options_ui(ui, "Scaling", hint, &options, draft.inputs.scaling) {
         draft.inputs.scaling = picked;
     }
 }
 
-/// How large the networks are.
+/// Shows the size of the networks.
 fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
     let scale = draft.source.sensor.scale;
@@ -109,7 +109,7 @@ fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let text = match size.networks {
         1 => format!("{at_most}{inputs} inputs, {outputs} outputs, {weights} weights"),
         networks => format!(
-            "{networks} networks of {at_most}{inputs} inputs, {outputs} outputs and {weights} weights: {} in all",
+            "{networks} networks of {at_most}{inputs} inputs, {outputs} outputs and {weights} weights: {} in total",
             networks * weights
         ),
     };

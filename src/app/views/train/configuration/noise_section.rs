@@ -8,7 +8,7 @@ use crate::{
     scene::{Noise, NoisySets},
 };
 
-/// What disturbs the readings; changes `noise`. A line tells it where the settings are folded away.
+/// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
 pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
     let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
     if shown.body_response.is_none() && !noise.is_none() {
@@ -18,33 +18,34 @@ pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
 }
 
 fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
-    let hint = "Of each resistance by itself, in proportion to it (standard deviation).";
+    let hint = "Noise of each reading (standard deviation), in percent of the reading.";
     percent_ui(ui, "Relative noise", hint, &mut noise.relative, 0.0..=100.0);
-    let hint = "Of each resistance by itself, whatever its size (standard deviation).";
+    let hint = "Noise of each reading (standard deviation), in Ω.";
     quantity_ui(ui, "Additive noise", hint, &mut noise.additive_ohm, 0.0..=1e12, "Ω");
     let mut bits = noise.converter_bits.map_or(0, usize::from);
     let most = usize::from(Noise::MOST_BITS);
-    let hint = "Bits of the converter that digitises resistances, from 0 to twice the largest at rest. 0 for one without \
-                steps.";
+    let hint = "Resolution of the analogue-to-digital converter, in bits; its range is 0 to twice the largest \
+                resistance at rest. 0 for no quantisation.";
     count_ui(ui, "Converter bits", hint, &mut bits, 0..=most);
     noise.converter_bits = u8::try_from(bits).ok().filter(|&bits| bits > 0);
-    let hint = "Of the gain, common to all resistances of a snapshot, as temperature changes it (standard deviation).";
+    let hint = "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, in \
+                percent).";
     percent_ui(ui, "Drift", hint, &mut noise.drift, 0.0..=100.0);
     if !noise.is_none() {
         let options = [
             (
                 NoisySets::Both,
                 "Both",
-                "Training and test alike: the network learns what noise does.",
+                "Training and test samples: the network learns to handle the noise.",
             ),
             (NoisySets::Training, "Training", "Training samples only."),
             (
                 NoisySets::Test,
                 "Test",
-                "Test samples only: a network trained on clean readings meets noise.",
+                "Test samples only: the network is trained on clean readings.",
             ),
         ];
-        let hint = "Which samples are disturbed. Validation samples are drawn with the training samples.";
+        let hint = "Samples to which noise is added. Validation samples are treated like training samples.";
         if let Some(picked) = options_ui(ui, "Noise in", hint, &options, noise.sets) {
             noise.sets = picked;
         }

@@ -6,23 +6,23 @@ use crate::{
     scene::Scene,
 };
 
-/// Where the settings of a network begin; changes `draft`.
+/// Shows the presets on which the settings are based; changes `draft`.
 pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Preset");
     let options = [
         (
             Some(Preset::Paper),
             "Paper",
-            "One network for all rows, resistances between −1 and 1, 1000 training samples.\n\nArray, axes, loading, noise, \
-             hidden nodes and seed stay as they are.",
+            "One network for all rows, resistances between −1 and 1, 1000 training samples.\n\nArray, axes, loading, \
+             noise, hidden nodes and seed stay as they are.",
         ),
         (
             Some(Preset::Best),
             "Best",
-            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 where readings \
-             bear noise.\n\nChosen by measurement: of all and known rows, resistance, conductance and its logarithm, min-max \
-             and whitening, this has the lowest test error for the same hidden nodes.\n\nArray, axes, loading, noise, hidden \
-             nodes and seed stay as they are.",
+            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the \
+             readings are noisy.\n\nChosen by measurement: of all and known rows, resistance, conductance and its \
+             logarithm, min-max and whitening, this has the lowest test error for the same hidden nodes.\n\nArray, \
+             axes, loading, noise, hidden nodes and seed stay as they are.",
         ),
     ];
     if let Some(Some(picked)) = explained_options_ui(ui, "Preset", &options, present(draft), true) {

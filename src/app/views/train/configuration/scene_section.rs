@@ -16,14 +16,14 @@ use crate::{
     scene::{Indenter, IndenterShape, Loading, Movement, Rows},
 };
 
-/// What is read, what moves, how it is loaded and what disturbs it; changes `draft`. `outlook` is that of the scene, once
+/// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
 /// it is known.
 pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Option<&Outlook>) {
     section_heading_ui(ui, "Scene");
     rows_ui(ui, draft);
     movement_ui(ui, &mut draft.source.scene.movement);
     loading_ui(ui, &mut draft.source.scene.loading);
-    let hint = "The most a node is pressed down, in percent of the height.";
+    let hint = "Largest displacement of a node downwards, in percent of the height.";
     percent_ui(
         ui,
         "Largest compression",
@@ -36,13 +36,16 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
     outlook_ui(ui, draft, outlook);
 }
 
-/// How many of what the scene describes; changes `draft`.
+/// Shows the numbers of samples and the seed; changes `draft`.
 pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     section_heading_ui(ui, "Samples");
     let rows = draft.source.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
-        1 => "What the method fits.".to_owned(),
-        _ => format!("What the method fits, of all rows together; whole snapshots of {rows} rows are drawn."),
+        1 => "Number of samples to which the network is fitted.".to_owned(),
+        _ => format!(
+            "Number of samples to which the networks are fitted, over all rows; drawn as whole snapshots of \
+                      {rows} rows."
+        ),
     };
     count_ui(
         ui,
@@ -51,7 +54,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.samples,
         1..=LARGEST_SAMPLES,
     );
-    let hint = "Drawn beside the training samples; they choose the best weights and stop the training. 0 for none.";
+    let hint = "Number of samples that select the best weights and end the training. 0 for none.";
     count_ui(
         ui,
         "Validation samples",
@@ -59,7 +62,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.validation_samples,
         0..=LARGEST_SAMPLES,
     );
-    let hint = "Never trained on: all errors are measured here, and the snapshots shown are these.";
+    let hint = "Number of held-out samples, on which all errors are measured and whose snapshots are shown.";
     count_ui(
         ui,
         "Test samples",
@@ -67,7 +70,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.test_samples,
         1..=LARGEST_SAMPLES,
     );
-    let hint = "Everything random follows from it: the same seed gives the same network.";
+    let hint = "Seed of all random numbers: the same seed gives the same network.";
     field_ui(ui, "Seed", hint, |ui| {
         ui.add_sized([space(16), space(6)], DragValue::new(&mut draft.seed.0).speed(0.1))
     });
@@ -88,22 +91,22 @@ fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         (
             Rows::All,
             "All",
-            "One network for all rows, which is not told which row it reads: the paper.",
+            "One network for every row, without the row number as an input, as in the paper.",
         ),
         (
             Rows::Known,
             "Known",
-            "A small network for each row, trained side by side: the electronics know which row they address.",
+            "One small network per row, for electronics that know which row they address.",
         ),
         (one, "One", "One row-wire only; nothing else is modelled."),
     ];
-    let hint = "Which row-wires are read, and whether a network knows which.";
+    let hint = "Row-wires that are read, by one network or by one network per row.";
     if let Some(picked) = options_ui(ui, "Rows", hint, &options, *rows) {
         *rows = picked;
     }
     if let Rows::One(row) = rows {
         let mut number = *row + 1;
-        let hint = "Which row-wire is read, counted from 1.";
+        let hint = "Number of the row-wire that is read, from 1.";
         count_ui(ui, "Row", hint, &mut number, 1..=last + 1);
         *row = number - 1;
     }
@@ -115,19 +118,19 @@ fn movement_ui(ui: &mut Ui, movement: &mut Movement) {
         Movement::Z => Movement::SIDEWAYS,
     };
     let options = [
-        (Movement::Z, "z", "Nodes move up and down only: the paper."),
+        (Movement::Z, "z", "Nodes move up and down only, as in the paper."),
         (
             sideways,
             "x, y, z",
             "Nodes also shift sideways: three times as many unknowns from the same readings.",
         ),
     ];
-    let hint = "Along which axes nodes move. What does not move is not modelled.";
+    let hint = "Axes along which nodes move. The other coordinates are not modelled.";
     if let Some(picked) = options_ui(ui, "Axes", hint, &options, *movement) {
         *movement = picked;
     }
     if let Movement::Xyz { largest_shift_mm } = movement {
-        let hint = "The most a node shifts along x, and along y, either way.";
+        let hint = "Largest displacement of a node along x and along y, in either direction, in mm.";
         quantity_ui(ui, "Largest shift", hint, largest_shift_mm, 1e-6..=1e3, "mm");
     }
 }
@@ -150,16 +153,16 @@ fn loading_ui(ui: &mut Ui, loading: &mut Loading) {
         (
             Loading::RandomNodes,
             "Random nodes",
-            "Every node is pressed by a random amount of its own: the paper.",
+            "Every node is pressed by an independent random amount, as in the paper.",
         ),
         (
             smooth,
             "Smooth field",
-            "A smooth random surface: neighbours move alike within the correlation length.",
+            "A smooth random surface: nodes within the correlation length move alike.",
         ),
         (indenter, "Indenter", "A body pressed somewhere onto the surface."),
     ];
-    let hint = "How the surface is loaded in the samples.";
+    let hint = "Distribution of the deformations in the samples.";
     if let Some(picked) = list_ui(ui, "Loading", hint, &options, *loading) {
         *loading = picked;
     }
@@ -168,7 +171,7 @@ fn loading_ui(ui: &mut Ui, loading: &mut Loading) {
         Loading::SmoothField {
             correlation_length_mm: length,
         } => {
-            let hint = "Distance over which displacements resemble each other.";
+            let hint = "Distance over which the displacements of nodes stay correlated, in mm.";
             quantity_ui(ui, "Correlation length", hint, length, 1e-3..=1e6, "mm");
         }
         Loading::Indenter(indenter) => indenter_ui(ui, indenter),
@@ -199,7 +202,8 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
         .zip(texts)
         .map(|(shape, (text, meaning))| (shape, text, meaning))
         .collect();
-    let hint = "Its place, depth, size, direction and tilt are drawn anew for each snapshot.";
+    let hint = "Shape of the indenter. Its position, depth, size, direction and tilt are drawn at random for each \
+                snapshot.";
     if let Some(picked) = list_ui(ui, "Shape", hint, &options, indenter.shape) {
         indenter.shape = picked;
     }
@@ -216,36 +220,37 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
         IndenterShape::Edge { largest_tilt_degrees } => (None, Some(largest_tilt_degrees)),
     };
     if let Some(radius) = radius {
-        let hint = "The smallest radius drawn.";
+        let hint = "Smallest radius of the indenter, in mm.";
         let changed = quantity_ui(ui, "Radius from", hint, &mut radius.smallest, 1e-3..=1e6, "mm").changed();
         if changed {
             radius.largest = radius.largest.max(radius.smallest);
         }
-        let hint = "The largest radius drawn.";
+        let hint = "Largest radius of the indenter, in mm.";
         let changed = quantity_ui(ui, "Radius to", hint, &mut radius.largest, 1e-3..=1e6, "mm").changed();
         if changed {
             radius.smallest = radius.smallest.min(radius.largest);
         }
     }
     if let Some(tilt) = tilt {
-        let hint = "The steepest slope of the body against the surface; each is drawn from 0 to it.";
+        let hint = "Largest angle between the indenter and the surface, in degrees; each tilt is drawn between 0 and \
+                    this.";
         quantity_ui(ui, "Largest tilt", hint, tilt, 0.0..=45.0, "°");
     }
     let hint = "Decay length of the surface around the indenter, in mm.";
     quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
-/// What the scene came to.
+/// Shows the numbers of unknowns and equations of the scene.
 fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
     let text = format!("{} unknowns, {} equations a frame", size.unknowns, size.equations);
     dim_ui(ui, &text).on_hover_text(
-        "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance gives \
-         an equation, Eq. (2). What does not vary is not modelled.",
+        "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance \
+         gives an equation, Eq. (2). What does not vary is not modelled.",
     );
 }
 
-/// How badly conditioned the scene is, and what stands in the way.
+/// Shows the condition number of the scene, and its warnings.
 fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
     let condition = outlook.map(|outlook| outlook.worst_row.condition());
     let text = match condition {
@@ -253,8 +258,8 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
         condition => format!("Condition number {}", format_number(condition)),
     };
     dim_ui(ui, &text).on_hover_text(
-        "Worst-case amplification of a relative error in the readings: the largest singular value of the Jacobian of ln R \
-         over the smallest, of the worst row, its nodes half way down.",
+        "Worst-case amplification of a relative error in the readings: the largest singular value of the Jacobian of \
+         ln R over the smallest, for the worst row with its nodes pressed half way.",
     );
     let Some(outlook) = outlook else { return };
     let sideways = draft.source.scene.movement != Movement::Z;
@@ -266,18 +271,18 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
     }
 }
 
-/// What scenes of nodes that shift sideways ask of the readings.
+/// Returns the effect of sideways shifts on the readings, in words.
 fn sideways_in_words(outlook: &Outlook) -> String {
     let (worst, noise) = (&outlook.worst_row, outlook.noise);
     if noise > 0.0 {
         let spread = format_number(worst.worst_spread_mm(noise));
-        format!("With this noise the movement that is seen worst is known to ±{spread} mm only.")
+        format!("With this noise, the worst-seen movement is known only to ±{spread} mm.")
     } else {
         // One millimetre of the movement seen worst against the reading it changes.
         let change = format_number(100.0 * worst.worst_spread_mm(1.0).recip());
         format!(
-            "Sideways shifts are hard to see: a millimetre of the movement seen worst changes the readings by {change} \
-             %. Any noise above that hides it."
+            "Sideways shifts are hard to see: 1 mm of the worst-seen movement changes the readings by {change} %. \
+             Noise above that hides it."
         )
     }
 }

@@ -56,7 +56,10 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
             ui.add(edit).labelled_by(label.id)
         })
         .inner
-        .on_hover_text("M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any sizes.");
+        .on_hover_text(
+            "M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any size is \
+                        possible.",
+        );
     let parsed = text.parse::<ArrayScale>();
     if response.changed() {
         ui.data_mut(|data| data.insert_temp(id, text));
@@ -82,17 +85,29 @@ fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         column_node_pitch_mm,
     } = &mut draft.source.sensor.geometry;
     let lengths = [
-        ("Height", "Row-wires above column-wires, undeformed.", height_mm),
-        ("Row pitch", "Between row-wires (the paper's wire gap).", row_pitch_mm),
-        ("Node pitch", "Between nodes on a row-wire.", node_pitch_mm),
+        (
+            "Height",
+            "Height of the row-wires above the column-wires, undeformed, in mm.",
+            height_mm,
+        ),
+        (
+            "Row pitch",
+            "Distance between row-wires, in mm (the paper's wire gap).",
+            row_pitch_mm,
+        ),
+        (
+            "Node pitch",
+            "Distance between nodes on a row-wire, in mm.",
+            node_pitch_mm,
+        ),
         (
             "Column pitch",
-            "Between column-wires (the paper's wire gap).",
+            "Distance between column-wires, in mm (the paper's wire gap).",
             column_pitch_mm,
         ),
         (
             "Column node pitch",
-            "Between nodes on a column-wire.",
+            "Distance between nodes on a column-wire, in mm.",
             column_node_pitch_mm,
         ),
     ];
@@ -100,18 +115,26 @@ fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         quantity_ui(ui, name, hint, value, 1e-6..=1e6, "mm");
     }
     let offsets = [
-        ("First row at x", "x of the first row-wire.", row_x0_mm),
-        ("First column at y", "y of the first column-wire.", column_y0_mm),
+        (
+            "First row at x",
+            "x coordinate of the first row-wire, in mm.",
+            row_x0_mm,
+        ),
+        (
+            "First column at y",
+            "y coordinate of the first column-wire, in mm.",
+            column_y0_mm,
+        ),
         (
             "First column node at x",
-            "x of the first node on each column-wire.",
+            "x coordinate of the first node on each column-wire, in mm.",
             column_node_x0_mm,
         ),
     ];
     for (name, hint, value) in offsets {
         quantity_ui(ui, name, hint, value, -1e6..=1e6, "mm");
     }
-    let hint = "g, resistance of a millimetre of rubber. It scales all resistances alike.";
+    let hint = "Resistance of the rubber per millimetre (g in the paper), in Ω/mm. It scales all resistances equally.";
     quantity_ui(
         ui,
         "Resistivity",
@@ -122,7 +145,7 @@ fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     );
     let dim = Theme::of(ui).palette.dim;
     ui.label(RichText::new(Geometry::ASSUMPTION).size(type_size().note).color(dim));
-    if draft.source.sensor.geometry != Geometry::default() && ui.button("Back to the assumed geometry").clicked() {
+    if draft.source.sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
         draft.source.sensor.geometry = Geometry::default();
     }
 }

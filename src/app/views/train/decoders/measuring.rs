@@ -14,9 +14,9 @@ use crate::{
     network::Networks,
 };
 
-/// What the thread tells the window.
+/// Message of the thread to the window.
 enum News {
-    /// What the decoder at this place in the list is worth.
+    /// Report of the decoder at this place in the list.
     Measured(usize, Result<DecoderReport, String>),
     /// Nothing more will come.
     Ended(Result<(), JobError>),
@@ -79,7 +79,7 @@ impl DecoderMeasuring {
             match news {
                 News::Measured(place, report) => state.take(place, report),
                 News::Ended(Ok(())) => {}
-                News::Ended(Err(error)) => state.end(&format!("{error}: fold the table and unfold it again")),
+                News::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
             }
         }
     }

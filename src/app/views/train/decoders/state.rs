@@ -6,20 +6,20 @@ use crate::{
 /// The table of decoders.
 #[derive(Debug, Default)]
 pub struct DecodersState {
-    /// Whether it is unfolded.
+    /// True while the table is unfolded.
     pub is_open: bool,
-    /// What was measured of the training on show; none before it stands still.
+    /// Results for the training on show; none while it is running.
     pub measured: Option<Vec<DecoderResult>>,
 }
 
-/// What became of a decoder.
+/// Result of a decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecoderResult {
     /// Which.
     pub kind: DecoderKind,
     /// In what its network computes.
     pub precision: Precision,
-    /// What it is worth, or why it cannot be used; none while it is still to be measured.
+    /// Report of the decoder, or why it cannot be used; none while it is still to be measured.
     pub report: Option<Result<DecoderReport, String>>,
 }
 
@@ -39,7 +39,7 @@ impl DecoderResult {
 }
 
 impl DecodersState {
-    /// Whether something is still to come.
+    /// Returns true while a result is still to come.
     pub fn is_measuring(&self) -> bool {
         let results = self.measured.iter().flatten();
         results.into_iter().any(|result| result.report.is_none())

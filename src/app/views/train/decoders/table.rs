@@ -22,16 +22,18 @@ const COLUMNS: [Column; 4] = [
     },
     Column {
         heading: TIMES_LIMIT,
-        meaning: "Mean |error| of z over that of the Bayesian reference, the limit for decoders that know of the loading only its range, or its mean and covariance",
+        meaning: "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders that know only \
+                  the range of the loading, or its mean and covariance.",
     },
     Column {
         heading: "residual",
-        meaning: "How far the readings are from those of the answer: root mean square of the relative difference. It \
-                  needs no ground truth, so a real sensor has it too: as large as the noise is good, larger is doubtful.",
+        meaning: "Root mean square of the relative difference between the readings and those of the decoded \
+                  deformation. It needs no ground truth, so a real sensor has it too; well above the noise, it casts \
+                  doubt on the answer.",
     },
     Column {
         heading: "µs",
-        meaning: "Time to decode a frame, all rows read at one moment, on one thread: the median of many",
+        meaning: "Time to decode a frame (all rows, read at one moment) on one thread, in µs: the median of many.",
     },
 ];
 
@@ -51,8 +53,8 @@ pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, refe
                 dim_ui(ui, text);
             }
         });
-    let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, time, and \
-                distance from what is possible";
+    let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, \
+                times, and distance from the limit.";
     if header.header_response.on_hover_text(hint).clicked() {
         decoders.is_open = !decoders.is_open;
     }
@@ -106,10 +108,11 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     }
 }
 
-/// What the reference row is.
-pub const REFERENCE: &str = "The Bayesian reference: what remains unknown of the deformation given the scene's noise and \
-                             loading, with Eq. (2) linearised at the truth. On average no decoder does better that knows no more of the loading than its range, or its mean and covariance. \
-                             Without noise only the rounding of the readings is left.";
+/// Meaning of the reference row.
+pub const REFERENCE: &str = "Bayesian reference: the error that remains given the noise and the loading of the scene, \
+                             with Eq. (2) linearised at the actual deformation. On average, no decoder that knows \
+                             only the range of the loading, or its mean and covariance, does better. Without noise, \
+                             only the rounding of the readings is left.";
 
 /// In the order of [`COLUMNS`], without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {

@@ -1,4 +1,4 @@
-//! What the report says of scenes that are badly conditioned.
+//! Note of the report on ill-conditioned scenes.
 
 use eframe::egui::Ui;
 
@@ -12,7 +12,7 @@ fn is_badly_conditioned(outlook: &Outlook) -> bool {
     outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
 }
 
-/// Says that the scene is badly conditioned, lest its errors be taken for the network's fault.
+/// Says that the scene is ill-conditioned, lest its errors be taken for the network's fault.
 pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
     let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
         return;
@@ -23,8 +23,8 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
         _ => "infinite".to_owned(),
     };
     let text = format!(
-        "This scene is badly conditioned (condition number {condition}): whatever the decoder, some deformations cannot be \
-         told apart. The note under Scene says what to change."
+        "This scene is ill-conditioned (condition number {condition}): whatever the decoder, some deformations cannot \
+         be told apart. The note under Scene says what to change."
     );
     note_ui(ui, &text);
 }

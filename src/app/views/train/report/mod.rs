@@ -1,4 +1,4 @@
-//! What a training has come to, in figures.
+//! Report of a training in figures.
 
 mod conditioning;
 mod panel;

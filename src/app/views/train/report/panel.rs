@@ -136,8 +136,8 @@ fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let row = |row: &ErrorRow| Row {
         name: row.name,
         meaning: match row.name {
-            "training mean" => "Always the mean of the training set",
-            "linear map" => "The best affine map on resistance",
+            "training mean" => "Always answers the mean of the training set.",
+            "linear map" => "Best affine map from the resistances to the coordinates.",
             NETWORK => "The network with the lowest validation error so far",
             "reference" => REFERENCE,
             "published" => "What the paper reports for this array, hidden nodes and samples",
@@ -223,7 +223,7 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
     is_wanted.then_some(worst)
 }
 
-/// How many weights the data determine, where the method estimates it.
+/// Shows the number of weights that the data determine, where the method estimates it.
 fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let best = run.history.get(result.best_epoch);
     let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
@@ -235,8 +235,8 @@ fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
         run.weights
     );
     ui.label(RichText::new(text).size(type_size().note)).on_hover_text(
-        "How many weights the data determine, as Bayesian regularisation estimates it. Near the number of weights: more \
-         hidden nodes may help; far below: fewer would do.",
+        "Number of weights that the data determine, as estimated by Bayesian regularisation. Near the number of \
+         weights, more hidden nodes may help; far below it, fewer would do.",
     );
 }
 
@@ -298,7 +298,10 @@ fn file_ui(
             "Type a path for the"
         };
         path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, format!("{verb} {}", words.kind)));
-        if path.on_hover_text("Type the path instead of choosing it").clicked() {
+        if path
+            .on_hover_text("Type the path instead of choosing the file.")
+            .clicked()
+        {
             effects.extend(task().map(Effect::TypePath));
         }
     });

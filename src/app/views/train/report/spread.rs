@@ -13,19 +13,19 @@ use crate::{
 const COLUMNS: [Column; 3] = [
     Column {
         heading: "min",
-        meaning: "Of the best start",
+        meaning: "Best start.",
     },
     Column {
         heading: "median",
-        meaning: "Half of the starts are below: what one start would likely have given",
+        meaning: "Median of all starts: what a single start would typically give.",
     },
     Column {
         heading: "max",
-        meaning: "Of the worst start",
+        meaning: "Worst start.",
     },
 ];
 
-/// How the results of several starts spread: a strip of dots and three figures. Nothing for one start.
+/// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
 pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;

@@ -29,7 +29,7 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// The thread's own state.
-pub(super) struct Labour<'a> {
+pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
     /// The last preparation that is cancelled.
     cancelled: &'a AtomicU64,
@@ -39,7 +39,7 @@ pub(super) struct Labour<'a> {
     /// Which training `run` is.
     id: Option<RunId>,
     is_paused: bool,
-    /// Whether the window was told what is to be kept of the run.
+    /// True once the window was told the result of the run that is to be kept.
     is_kept: bool,
     /// The start last reported, and how many of its epochs.
     reported: (usize, usize),
@@ -47,7 +47,7 @@ pub(super) struct Labour<'a> {
     next_starts: Instant,
 }
 
-impl<'a> Labour<'a> {
+impl<'a> TrainingLoop<'a> {
     pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64) -> Self {
         Self {
             report,
@@ -253,12 +253,12 @@ impl<'a> Labour<'a> {
     }
 }
 
-/// What the window says where the training it shows is not in the worker: only a worker that died lost it.
+/// Message where the training on show is not in the worker: only a worker that died lost it.
 pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
-/// What the window says where a file was asked for before another training began.
-const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
-                        finished trainings are in the run list of the Compare view";
+/// Message where a file was asked for before another training began.
+const REPLACED: &str = "the file was not written, for another training has replaced the one to be saved; finished \
+                        trainings are in the run list of the Compare view";
 
 /// A run, and what the window is to know of it.
 fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
