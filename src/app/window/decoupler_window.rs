@@ -6,7 +6,9 @@ use super::{
     closing::Closing,
     dialogs::{DialogKind, Dialogs},
     files::Files,
+    memory::Memory,
     notice::{self, notice_ui},
+    remembered::Remembered,
     save_form::{self, Saving, save_form_ui},
     top_bar::top_bar_ui,
 };
@@ -24,7 +26,7 @@ pub struct DecouplerWindow {
     pub(super) shared: Shared,
     pub(super) views: Views,
     /// Their places and names.
-    names: Vec<(usize, &'static str)>,
+    pub(super) names: Vec<(usize, &'static str)>,
     /// The place of the view on show among all.
     pub(super) shown: usize,
     /// Something to tell the user.
@@ -39,6 +41,9 @@ pub struct DecouplerWindow {
     pub(super) files: Files,
     pub(super) dialogs: Dialogs,
     pub(super) closing: Option<Closing>,
+    pub(super) remembered: Remembered,
+    /// Where that is kept, if it is.
+    pub(super) memory: Option<Memory>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
 }
@@ -71,6 +76,8 @@ impl DecouplerWindow {
             files: Files::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
             closing: None,
+            remembered: Remembered::default(),
+            memory: None,
             wake,
             ctx: ctx.clone(),
         };
@@ -176,8 +183,10 @@ impl DecouplerWindow {
         }
         if is_other_theme {
             self.set_dark(!self.shared.look.is_dark);
+            self.remembered.is_dark = Some(self.shared.look.is_dark);
         }
         self.ask_for_path(ui);
+        self.remember();
         // What was begun in this frame must be finished too.
         self.take_close_request();
         self.closing_ui(ui);

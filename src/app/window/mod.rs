@@ -6,9 +6,11 @@ mod closing;
 mod decoupler_window;
 mod dialogs;
 mod files;
+mod memory;
 mod news;
 mod notice;
 mod open;
+mod remembered;
 mod save_form;
 mod top_bar;
 

@@ -1,0 +1,69 @@
+//! What the window finds again when it next opens.
+
+use std::{fs, path::PathBuf};
+
+use decoupler::{app::Phase, evaluation::SimulatedSettings};
+
+use crate::driver::{Driver, small};
+
+/// A file that does not exist yet, in a folder that vanishes.
+fn file() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("data").join("window.json");
+    (folder, path)
+}
+
+#[test]
+fn theme_view_and_settings_are_as_they_were_and_nothing_is_trained() {
+    let (_folder, path) = file();
+    let mut driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, SimulatedSettings::default(), "the first start");
+    assert!(driver.state().look.is_dark && driver.shown() == "Train");
+    driver.configure_small();
+    driver.click("Light");
+    driver.click_button("Compare");
+    assert_eq!(driver.shown(), "Compare");
+    drop(driver);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"view\": \"Compare\""), "{text}");
+
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, small());
+    assert_eq!(driver.shown(), "Compare");
+    assert!(!driver.state().look.is_dark);
+    assert_eq!(driver.state().phase, Phase::Idle);
+    assert!(driver.state().run.is_none());
+}
+
+#[test]
+fn a_file_of_another_program_opens_the_usual_window() {
+    let (_folder, path) = file();
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(&path, r#"{"is_dark": "no", "view": "Rocket", "draft": {"hidden": -1}}"#).unwrap();
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert!(driver.state().look.is_dark && driver.shown() == "Train");
+    assert_eq!(driver.notice(), None);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_told_once() {
+    let (folder, path) = file();
+    // A file where the folder should be.
+    fs::write(folder.path().join("data"), "").unwrap();
+    let mut driver = Driver::open_remembering(&path);
+    driver.wait("the reason", |driver| driver.says("will not be found again"));
+    driver.click("Dismiss");
+    driver.click("Light");
+    driver.settle();
+    assert_eq!(driver.notice(), None);
+}
+
+#[test]
+fn a_window_that_remembers_comes_to_rest() {
+    let (_folder, path) = file();
+    drop(Driver::open_remembering(&path));
+    let mut driver = Driver::open_remembering(&path);
+    driver.wait("the last news", |driver| !driver.table().is_empty());
+    assert!(driver.comes_to_rest());
+}
