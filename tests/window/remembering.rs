@@ -4,6 +4,8 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{app::Phase, evaluation::SimulatedSettings};
 
+use eframe::egui::{Vec2, vec2};
+
 use crate::driver::{Driver, small};
 
 /// A file that does not exist yet, in a folder that vanishes.
@@ -66,4 +68,51 @@ fn a_window_that_remembers_comes_to_rest() {
     let mut driver = Driver::open_remembering(&path);
     driver.wait("the last news", |driver| !driver.table().is_empty());
     assert!(driver.comes_to_rest());
+}
+
+/// Drags the edge of a column by so many points.
+fn drag(driver: &mut Driver, edge: &str, points: f32) {
+    let from = driver.get(edge).rect().center();
+    let harness = driver.harness();
+    harness.drag_at(from);
+    harness.step();
+    harness.hover_at(from + vec2(points, 0.0));
+    harness.run_steps(2);
+    harness.drop_at(from + vec2(points, 0.0));
+    harness.run_steps(2);
+    harness.remove_cursor();
+    harness.step();
+}
+
+/// Place and size of the middle of the view that trains.
+fn middle(driver: &Driver) -> (f32, Vec2) {
+    let left = driver.get("Actual surface").rect();
+    (left.left(), left.size())
+}
+
+#[test]
+fn columns_are_drawn_wider_and_narrower_and_stay_so() {
+    const LEFT: &str = "Width of the left column";
+    const RIGHT: &str = "Width of the right column";
+    let (_folder, path) = file();
+    let mut driver = Driver::open_remembering(&path);
+    let edges = |driver: &Driver| [LEFT, RIGHT].map(|edge| driver.get(edge).rect().center().x);
+    let usual = edges(&driver);
+    drag(&mut driver, LEFT, 40.0);
+    drag(&mut driver, RIGHT, 30.0);
+    let drawn = edges(&driver);
+    assert!((drawn[0] - usual[0] - 40.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!((drawn[1] - usual[1] - 30.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!(driver.comes_to_rest());
+    let seen = middle(&driver);
+    drop(driver);
+
+    let mut driver = Driver::open_remembering(&path);
+    assert_eq!((edges(&driver), middle(&driver)), (drawn, seen));
+    // No further than the surfaces allow.
+    drag(&mut driver, LEFT, 900.0);
+    drag(&mut driver, RIGHT, -900.0);
+    assert!(middle(&driver).1.x >= 280.0, "{:?}", middle(&driver));
+    drag(&mut driver, LEFT, -900.0);
+    assert!(edges(&driver)[0] >= 240.0, "{:?}", edges(&driver));
 }

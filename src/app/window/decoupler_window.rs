@@ -1,11 +1,13 @@
 use std::{path::PathBuf, sync::Arc};
 
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui};
+use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     closing::Closing,
+    columns::{edge_ui, widths_points},
     dialogs::{DialogKind, Dialogs},
     files::Files,
+    frames::changes_something,
     memory::Memory,
     notice::{self, notice_ui},
     remembered::Remembered,
@@ -127,7 +129,9 @@ impl DecouplerWindow {
         }
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let columns = view.columns(ui.available_width());
+        let window_width = ui.available_width();
+        let columns = view.columns(window_width);
+        let [form_width, report_width] = widths_points(&columns, &self.remembered, window_width);
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -147,18 +151,18 @@ impl DecouplerWindow {
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| view.status_ui(ui, shared));
-        Panel::left("configuration")
-            .exact_size(columns.form_width)
+        let form = Panel::left("configuration")
+            .exact_size(form_width)
             .resizable(false)
             .frame(panel(side))
             .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        if columns.has_report {
+        let report = columns.has_report.then(|| {
             Panel::right("report")
-                .exact_size(space(96))
+                .exact_size(report_width)
                 .resizable(false)
                 .frame(panel(side))
-                .show(ui, |ui| view.report_ui(ui, shared, &mut effects));
-        }
+                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+        });
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         let reply = egui::CentralPanel::default().frame(background).show(ui, |ui| {
             let reply = self
@@ -168,6 +172,12 @@ impl DecouplerWindow {
             view.body_ui(ui, shared, &mut effects);
             reply
         });
+        let remembered = &mut self.remembered;
+        let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
+        edge_ui(ui, "Width of the left column", form, true, &mut remembered.form_points);
+        if let Some(report) = report {
+            edge_ui(ui, "Width of the right column", report, false, &mut remembered.report_points);
+        }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
@@ -210,29 +220,6 @@ impl DecouplerWindow {
             Some(save_form::Reply::Cancel) => self.saving = None,
             None => {}
         }
-    }
-}
-
-/// Whether the user did something in this frame that parts of the window already drawn may depend on: one frame more
-/// shows it everywhere. A pointer that merely moves changes nothing.
-fn changes_something(ctx: &Context) -> bool {
-    ctx.input(|input| {
-        let is_change = |event: &Event| match event {
-            Event::PointerMoved(_) | Event::MouseMoved(_) => input.pointer.any_down(),
-            Event::PointerGone | Event::WindowFocused(_) => false,
-            _ => true,
-        };
-        input.events.iter().any(is_change)
-    })
-}
-
-impl eframe::App for DecouplerWindow {
-    fn logic(&mut self, _ctx: &Context, _frame: &mut eframe::Frame) {
-        self.take_news();
-    }
-
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        self.show_ui(ui);
     }
 }
 

@@ -3,9 +3,11 @@
 
 mod applying;
 mod closing;
+mod columns;
 mod decoupler_window;
 mod dialogs;
 mod files;
+mod frames;
 mod memory;
 mod news;
 mod notice;

@@ -30,7 +30,13 @@ pub(super) struct Remembered {
     pub(super) draft: Option<SimulatedSettings>,
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
-    size_points: Option<[f32; 2]>,
+    pub(super) size_points: Option<[f32; 2]>,
+    /// Width of the column on the left, if the user has drawn it wider or narrower.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) form_points: Option<f32>,
+    /// As for the column on the right.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) report_points: Option<f32>,
 }
 
 impl Remembered {
