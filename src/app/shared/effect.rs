@@ -1,4 +1,4 @@
-use super::{FileTask, Look, Notice};
+use super::{FileTask, Look, Matter, Notice};
 use crate::{evaluation::SimulatedSettings, training::TrainerState};
 
 /// What a view asks of the window, which does it in one place once everything is drawn.
@@ -33,7 +33,7 @@ pub enum Effect {
     /// Keep the run with this number no longer.
     RemoveRun(u64),
     /// Tell the user.
-    Tell(Notice),
-    /// What the user was told has been dealt with.
-    DismissNotice,
+    Tell(Matter, Notice),
+    /// What the user was told about this has been dealt with.
+    Settle(Matter),
 }

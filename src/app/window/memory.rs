@@ -8,7 +8,7 @@ use super::{DecouplerWindow, remembered::Remembered};
 use crate::{
     app::{
         job::{Job, JobError, Wake},
-        shared::Notice,
+        shared::Matter,
     },
     export::WriteError,
 };
@@ -109,7 +109,7 @@ impl DecouplerWindow {
         // What is being dragged is written when it is let go.
         memory.keep(self.remembered.clone(), !is_held);
         if let Some(reason) = memory.next_failure() {
-            self.notice = Some(Notice::Failed(reason));
+            self.notices.fail(Matter::Memory, reason);
         }
     }
 

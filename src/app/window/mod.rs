@@ -11,6 +11,7 @@ mod frames;
 mod memory;
 mod news;
 mod notice;
+mod notices;
 mod open;
 mod remembered;
 mod save_form;

@@ -80,7 +80,7 @@ fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) 
 }
 
 /// Whether the settings could be trained with on this machine.
-fn is_within_limits(settings: &SimulatedSettings) -> bool {
+pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
     settings.check_counts().is_ok()
         && settings.training.check().is_ok()
         && settings.source.sensor.check().is_ok()
