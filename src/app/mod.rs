@@ -27,6 +27,6 @@ mod window;
 
 use crate::figure::ticks;
 
-pub use shared::{Effect, Notice, Phase, Shared};
+pub use shared::{Effect, Matter, Notice, Phase, Shared};
 pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeOffEnding, TradeOffPlan, Views};
 pub use window::{DecouplerWindow, DialogKind, OpenError, open};

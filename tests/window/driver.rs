@@ -2,7 +2,7 @@
 
 use std::{
     cell::RefCell,
-    path::{Path, PathBuf},
+    path::Path,
     rc::Rc,
     sync::mpsc::{Receiver, channel},
     time::{Duration, Instant},
@@ -40,15 +40,22 @@ impl Driver {
 
     /// The window of `size` points, with the first surface drawn.
     pub(crate) fn open_sized(size: Vec2) -> Self {
-        Self::open_with(size, None)
+        Self::open_as(size, |window| window)
     }
 
     /// The window that keeps its runs in a file.
     pub(crate) fn open_keeping(path: &Path) -> Self {
-        Self::open_with(vec2(1440.0, 900.0), Some(path.to_owned()))
+        let path = path.to_owned();
+        Self::open_as(vec2(1440.0, 900.0), |window| window.keeping_runs(path))
     }
 
-    fn open_with(size: Vec2, runs: Option<PathBuf>) -> Self {
+    /// The window that remembers in a file what it shows.
+    pub(crate) fn open_remembering(path: &Path) -> Self {
+        let path = path.to_owned();
+        Self::open_as(vec2(1440.0, 900.0), move |window| window.remembering(&path))
+    }
+
+    fn open_as(size: Vec2, set_out: impl FnOnce(DecouplerWindow) -> DecouplerWindow + 'static) -> Self {
         let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
         let place = Rc::clone(&made);
         let (asks, asked) = channel();
@@ -59,11 +66,7 @@ impl Driver {
                 let _ = asks.send(info.delay);
             });
             let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
-            let window = match runs {
-                Some(path) => window.keeping_runs(path),
-                None => window,
-            };
-            *place.borrow_mut() = Some(window);
+            *place.borrow_mut() = Some(set_out(window));
         };
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {
             let window = window.get_or_insert_with(|| made.take().unwrap());

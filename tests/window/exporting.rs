@@ -156,3 +156,27 @@ fn enter_saves_and_the_suggested_name_tells_runs_apart() {
     driver.wait("the file", |driver| driver.says("Saved "));
     assert_eq!(names(folder.path()), ["loss.csv"]);
 }
+
+#[test]
+fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    driver.wait_for_hold();
+    let missing = folder.path().join("none").join("network.json");
+    driver.save(NETWORK, &missing);
+    assert!(driver.says("does not exist"));
+    // Fifteen seconds.
+    driver.harness().run_steps(60);
+    assert!(driver.says("does not exist"), "a failure waits for the user");
+    let path = folder.path().join("network.json");
+    driver.open_form(NETWORK);
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Save");
+    driver.wait("the file", |driver| driver.says("Saved "));
+    assert!(!driver.says("does not exist"), "the same has worked now");
+    driver.harness().run_steps(60);
+    assert_eq!(driver.notice(), None);
+    assert!(driver.comes_to_rest());
+}

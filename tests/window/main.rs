@@ -14,6 +14,7 @@ mod extremes;
 mod identifying;
 mod looking;
 mod pictures;
+mod remembering;
 mod scenes;
 mod snapshots;
 mod trading;

@@ -1,4 +1,4 @@
-use super::{FileTask, Look, Notice};
+use super::{FileTask, Look, Matter, Notice};
 use crate::{evaluation::SimulatedSettings, training::TrainerState};
 
 /// Request of a view to the window, which carries all of them out in one place once everything is drawn.
@@ -33,7 +33,7 @@ pub enum Effect {
     /// Keep the run with this number no longer.
     RemoveRun(u64),
     /// Tell the user.
-    Tell(Notice),
-    /// The user has dismissed the notice.
-    DismissNotice,
+    Tell(Matter, Notice),
+    /// What the user was told about this has been dealt with.
+    Settle(Matter),
 }

@@ -16,7 +16,7 @@ pub use super::training_worker::RunResult;
 pub use effect::Effect;
 pub use file_task::{FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
-pub use notice::Notice;
+pub use notice::{Matter, Notice};
 pub use picture_file::{CHART, SURFACES, export_pictures_ui};
 pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;

@@ -6,3 +6,26 @@ pub enum Notice {
     /// It did not, and what to do.
     Failed(String),
 }
+
+/// What a notice is about. What works takes the failures of the same kind along.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Matter {
+    /// The training on show, or one that was to be shown.
+    Training,
+    /// Settings with which no training can begin.
+    Settings,
+    /// The test set of the settings.
+    Preview,
+    /// A file that the user has saved.
+    File,
+    /// The run list.
+    RunList,
+    /// The view with the paper's tables and sweeps.
+    Experiments,
+    /// The view with what each way of decoding costs.
+    TradeOff,
+    /// The view with two trainings side by side.
+    Comparison,
+    /// What the next window finds again.
+    Memory,
+}

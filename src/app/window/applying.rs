@@ -3,11 +3,11 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, closing::Closing, save_form::Saving};
+use super::{DecouplerWindow, closing::Closing, remembered::is_within_limits, save_form::Saving};
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileTask, Phase, Purpose},
+        shared::{Effect, FileTask, Matter, Phase, Purpose},
         theme,
         training_worker::{LOST, Request, Worker},
         views::ExportKind,
@@ -44,7 +44,8 @@ impl DecouplerWindow {
             }
             Effect::Continue if shared.can_continue() => {
                 shared.phase = Phase::Training;
-                self.notice = None;
+                self.notices.settle(Matter::Training);
+                self.notices.settle(Matter::Settings);
                 self.worker.ask(Request::Continue(shared.draft.training));
             }
             Effect::Continue => {}
@@ -65,15 +66,16 @@ impl DecouplerWindow {
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
-            Effect::Tell(notice) => self.notice = Some(notice),
-            Effect::DismissNotice => self.notice = None,
+            Effect::Tell(matter, notice) => self.notices.tell(matter, notice),
+            Effect::Settle(matter) => self.notices.settle(matter),
         }
     }
 
     /// Asks for another training than the one on show.
     fn prepare(&mut self, request: Request) {
         self.shared.phase = Phase::Preparing;
-        self.notice = None;
+        self.notices.settle(Matter::Training);
+        self.notices.settle(Matter::Settings);
         self.worker.ask(request);
     }
 
@@ -124,12 +126,16 @@ impl DecouplerWindow {
     pub(super) fn restart_worker(&mut self) {
         self.worker = Worker::start(Arc::clone(&self.wake));
         self.shared.phase = self.shared.phase_at_rest();
-        self.notice = None;
+        self.notices.settle(Matter::Training);
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
     pub(super) fn configure(&mut self, draft: SimulatedSettings) {
         let before = std::mem::replace(&mut self.shared.draft, draft);
+        self.notices.settle(Matter::Preview);
+        if is_within_limits(&draft) {
+            self.notices.settle(Matter::Settings);
+        }
         let run = self.shared.run.as_ref();
         if run.is_some_and(|run| have_same_test_set(&run.settings, &draft)) {
             self.shared.preview = None;

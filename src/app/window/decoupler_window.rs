@@ -1,19 +1,24 @@
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui};
+use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     closing::Closing,
+    columns::{edge_ui, widths_points},
     dialogs::{DialogKind, Dialogs},
     files::Files,
+    frames::changes_something,
+    memory::Memory,
     notice::{self, notice_ui},
+    notices::Notices,
+    remembered::Remembered,
     save_form::{self, Saving, save_form_ui},
     top_bar::top_bar_ui,
 };
 use crate::app::{
     job::{Job, Wake},
     preview::PreviewEvent,
-    shared::{Effect, Notice, RunsWorker, Shared},
+    shared::{Effect, Matter, Notice, Phase, RunsWorker, Shared},
     theme::{self, Theme, space},
     training_worker::Worker,
     views::Views,
@@ -24,11 +29,10 @@ pub struct DecouplerWindow {
     pub(super) shared: Shared,
     pub(super) views: Views,
     /// Their places and names.
-    names: Vec<(usize, &'static str)>,
+    pub(super) names: Vec<(usize, &'static str)>,
     /// The place of the view on show among all.
     pub(super) shown: usize,
-    /// Something to tell the user.
-    pub(super) notice: Option<Notice>,
+    pub(super) notices: Notices,
     /// A file waiting for its path.
     pub(super) saving: Option<Saving>,
     /// The path last typed, offered again for the same file.
@@ -39,6 +43,9 @@ pub struct DecouplerWindow {
     pub(super) files: Files,
     pub(super) dialogs: Dialogs,
     pub(super) closing: Option<Closing>,
+    pub(super) remembered: Remembered,
+    /// Where that is kept, if it is.
+    pub(super) memory: Option<Memory>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
 }
@@ -62,7 +69,7 @@ impl DecouplerWindow {
             shared: Shared::new(is_dark),
             views,
             shown: 0,
-            notice: None,
+            notices: Notices::default(),
             saving: None,
             typed: None,
             worker: Worker::start(Arc::clone(&wake)),
@@ -71,6 +78,8 @@ impl DecouplerWindow {
             files: Files::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
             closing: None,
+            remembered: Remembered::default(),
+            memory: None,
             wake,
             ctx: ctx.clone(),
         };
@@ -101,9 +110,9 @@ impl DecouplerWindow {
         self.names[self.shown].1
     }
 
-    /// Notice that is shown to the user.
+    /// Newest notice that is shown to the user.
     pub fn notice(&self) -> Option<&Notice> {
-        self.notice.as_ref()
+        self.notices.newest()
     }
 
     /// Lays out the window and does what the user meant.
@@ -120,7 +129,9 @@ impl DecouplerWindow {
         }
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let columns = view.columns(ui.available_width());
+        let window_width = ui.available_width();
+        let columns = view.columns(window_width);
+        let [form_width, report_width] = widths_points(&columns, &self.remembered, window_width);
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -140,44 +151,64 @@ impl DecouplerWindow {
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| view.status_ui(ui, shared));
-        Panel::left("configuration")
-            .exact_size(columns.form_width)
+        let form = Panel::left("configuration")
+            .exact_size(form_width)
             .resizable(false)
             .frame(panel(side))
             .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        if columns.has_report {
+        let report = columns.has_report.then(|| {
             Panel::right("report")
-                .exact_size(space(96))
+                .exact_size(report_width)
                 .resizable(false)
                 .frame(panel(side))
-                .show(ui, |ui| view.report_ui(ui, shared, &mut effects));
+                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+        });
+        if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
         }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
-        let reply = egui::CentralPanel::default().frame(background).show(ui, |ui| {
-            let reply = self
-                .notice
-                .as_ref()
-                .and_then(|notice| notice_ui(ui, notice, shared.phase));
+        let replies = egui::CentralPanel::default().frame(background).show(ui, |ui| {
+            let mut replies = Vec::new();
+            for (place, (matter, notice)) in self.notices.iter().enumerate() {
+                let can_restart = matter == Matter::Training && shared.phase == Phase::Died;
+                replies.extend(notice_ui(ui, notice, can_restart).map(|reply| (place, reply)));
+            }
             view.body_ui(ui, shared, &mut effects);
-            reply
+            replies
         });
+        let remembered = &mut self.remembered;
+        let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
+        edge_ui(ui, "Width of the left column", form, true, &mut remembered.form_points);
+        if let Some(report) = report {
+            edge_ui(
+                ui,
+                "Width of the right column",
+                report,
+                false,
+                &mut remembered.report_points,
+            );
+        }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
-        self.apply_all(effects);
-        match reply.inner {
-            Some(notice::Reply::Dismiss) => self.notice = None,
-            Some(notice::Reply::Restart) => self.restart_worker(),
-            None => {}
+        // Before anything changes the places.
+        for (place, reply) in replies.inner {
+            match reply {
+                notice::Reply::Dismiss => self.notices.dismiss(place),
+                notice::Reply::Restart => self.restart_worker(),
+            }
         }
+        self.apply_all(effects);
         let (picked, is_other_theme) = top_bar.inner;
         if let Some(place) = picked {
             self.show(place);
         }
         if is_other_theme {
             self.set_dark(!self.shared.look.is_dark);
+            self.remembered.is_dark = Some(self.shared.look.is_dark);
         }
         self.ask_for_path(ui);
+        self.remember();
         // What was begun in this frame must be finished too.
         self.take_close_request();
         self.closing_ui(ui);
@@ -204,37 +235,14 @@ impl DecouplerWindow {
     }
 }
 
-/// Returns true if an input of this frame may change parts of the window that are already drawn, so that one more frame
-/// is needed. A pointer that merely moves changes nothing.
-fn changes_something(ctx: &Context) -> bool {
-    ctx.input(|input| {
-        let is_change = |event: &Event| match event {
-            Event::PointerMoved(_) | Event::MouseMoved(_) => input.pointer.any_down(),
-            Event::PointerGone | Event::WindowFocused(_) => false,
-            _ => true,
-        };
-        input.events.iter().any(is_change)
-    })
-}
-
-impl eframe::App for DecouplerWindow {
-    fn logic(&mut self, _ctx: &Context, _frame: &mut eframe::Frame) {
-        self.take_news();
-    }
-
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        self.show_ui(ui);
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::{path::Path, time::Duration};
+    use std::path::Path;
 
     use super::*;
     use crate::{
         app::{
-            shared::{FileTask, FileWords, Phase, Purpose},
+            shared::{FileTask, FileWords, Purpose},
             test_view::TestView,
         },
         evaluation::Run,
@@ -299,17 +307,17 @@ mod tests {
         window.restart_worker();
         std::thread::sleep(Duration::from_millis(300));
         window.take_news();
-        assert_eq!((window.shared.phase, &window.notice), (ended, &None));
+        assert_eq!((window.shared.phase, window.notice()), (ended, None));
         assert!(window.shared.result().is_some());
 
         export(&mut window, "network.json".into());
-        wait(&mut window, |window| window.notice.is_some());
+        wait(&mut window, |window| window.notice().is_some());
         let lost = "the network was lost when the training thread ended: train again";
-        assert_eq!(window.notice, Some(Notice::Failed(lost.to_owned())));
-        window.apply(Effect::DismissNotice);
+        assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
+        window.apply(Effect::Settle(Matter::File));
         window.apply(Effect::Continue);
-        wait(&mut window, |window| window.notice.is_some());
-        assert_eq!(window.notice, Some(Notice::Failed(lost.to_owned())));
+        wait(&mut window, |window| window.notice().is_some());
+        assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
         assert_eq!(window.shared.phase, ended);
         window.apply(Effect::Train);
         wait(&mut window, |window| matches!(window.shared.phase, Phase::Ended(_)));
@@ -349,15 +357,18 @@ mod tests {
         impossible.training.stopping.goal_mse = f64::NAN;
         window.apply(Effect::Configure(Box::new(impossible)));
         window.apply(Effect::Train);
-        wait(&mut window, |window| window.notice.is_some());
-        assert!(matches!(window.notice, Some(Notice::Failed(_))));
+        wait(&mut window, |window| window.notice().is_some());
+        assert!(matches!(window.notice(), Some(Notice::Failed(_))));
         assert_eq!(window.shared.phase, ended, "the training on show has ended so");
         assert!(window.shared.result().is_some());
 
-        window.apply(Effect::DismissNotice);
+        window.apply(Effect::Settle(Matter::Settings));
         export(&mut window, path.clone());
-        wait(&mut window, |window| window.notice.is_some());
-        assert_eq!(window.notice, Some(Notice::Done(format!("Saved {}", path.display()))));
+        wait(&mut window, |window| window.notice().is_some());
+        assert_eq!(
+            window.notice(),
+            Some(&Notice::Done(format!("Saved {}", path.display())))
+        );
         let file = NetworkFile::load(&path).unwrap();
         assert_eq!(file.settings.hidden, shown.hidden);
     }
@@ -377,9 +388,9 @@ mod tests {
             matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings.hidden == 4
         });
         window.answer(task, path.clone());
-        wait(&mut window, |window| window.notice.is_some());
-        let Some(Notice::Failed(reason)) = &window.notice else {
-            panic!("{:?}", window.notice)
+        wait(&mut window, |window| window.notice().is_some());
+        let Some(Notice::Failed(reason)) = window.notice() else {
+            panic!("{:?}", window.notice())
         };
         assert!(reason.contains("another training has replaced"), "{reason}");
         assert!(!path.exists());
@@ -395,7 +406,7 @@ mod tests {
         window.apply(Effect::Configure(Box::new(impossible)));
         // Before the new test set is there.
         window.apply(Effect::Train);
-        wait(&mut window, |window| window.notice.is_some());
+        wait(&mut window, |window| window.notice().is_some());
         wait(&mut window, |window| {
             window
                 .shared

@@ -3,12 +3,17 @@
 
 mod applying;
 mod closing;
+mod columns;
 mod decoupler_window;
 mod dialogs;
 mod files;
+mod frames;
+mod memory;
 mod news;
 mod notice;
+mod notices;
 mod open;
+mod remembered;
 mod save_form;
 mod top_bar;
 

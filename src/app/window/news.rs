@@ -8,7 +8,7 @@ use super::{
 use crate::{
     app::{
         preview::PreviewEvent,
-        shared::{Notice, Phase, Preview, RunView},
+        shared::{Matter, Notice, Phase, Preview, RunView},
         training_worker::Event,
     },
     evaluation::SimulatedSettings,
@@ -24,7 +24,7 @@ impl DecouplerWindow {
             self.take_preview(event);
         }
         if let Some(notice) = self.shared.runs.take_news(&self.runs) {
-            self.notice = Some(notice);
+            self.notices.tell(Matter::RunList, notice);
         }
         while let Some(written) = self.files.next_written() {
             self.tell_written(written);
@@ -48,14 +48,14 @@ impl DecouplerWindow {
     }
 
     /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
-    fn refuse(&mut self, reason: String) {
+    fn refuse(&mut self, matter: Matter, reason: String) {
         self.shared.phase = self.shared.phase_at_rest();
-        self.notice = Some(Notice::Failed(reason));
+        self.notices.fail(matter, reason);
         self.ask_for_what_is_missing();
     }
 
     fn tell_written(&mut self, written: Result<PathBuf, String>) {
-        self.notice = Some(match written {
+        let notice = match written {
             Ok(path) => {
                 self.typed = None;
                 Notice::Done(format!("Saved {}", path.display()))
@@ -65,7 +65,8 @@ impl DecouplerWindow {
                 self.closing = None;
                 Notice::Failed(reason)
             }
-        });
+        };
+        self.notices.tell(Matter::File, notice);
     }
 
     pub(super) fn take_preview(&mut self, event: PreviewEvent) {
@@ -87,7 +88,7 @@ impl DecouplerWindow {
                 });
                 self.ask_for_what_is_missing();
             }
-            PreviewEvent::Drawn(_, Err(error)) => self.notice = Some(Notice::Failed(error.to_string())),
+            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
             PreviewEvent::Compared(settings, baselines) => {
                 if let Some(preview) = &mut shared.preview
                     && have_same_sets(&settings, &shared.draft)
@@ -95,7 +96,7 @@ impl DecouplerWindow {
                     preview.baselines = baselines;
                 }
             }
-            PreviewEvent::Failed(error) => self.notice = Some(Notice::Failed(error.to_string())),
+            PreviewEvent::Failed(error) => self.notices.fail(Matter::Preview, error),
         }
     }
 
@@ -107,7 +108,7 @@ impl DecouplerWindow {
                 shared.run = Some(RunView::new(*began));
                 shared.phase = Phase::Training;
             }
-            Event::Began(Err(error)) => self.refuse(error.to_string()),
+            Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
             Event::Opened(Ok(began)) => {
                 shared.draft = began.settings;
                 shared.preview = None;
@@ -119,7 +120,7 @@ impl DecouplerWindow {
                 // If it has ended, the news of it say so.
                 shared.phase = Phase::Paused;
             }
-            Event::Opened(Err(reason)) => self.refuse(reason),
+            Event::Opened(Err(reason)) => self.refuse(Matter::Training, reason),
             Event::Continued(Ok(settings)) => {
                 if let Some(run) = &mut shared.run {
                     run.asked = SimulatedSettings {
@@ -137,7 +138,7 @@ impl DecouplerWindow {
                     Phase::Idle => Phase::Paused,
                     ended => ended,
                 };
-                self.notice = Some(Notice::Failed(error));
+                self.notices.fail(Matter::Training, error);
             }
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
@@ -148,12 +149,12 @@ impl DecouplerWindow {
                 }
             }
             Event::Finished(Ok(file)) => self.runs.keep(*file),
-            Event::Finished(Err(reason)) => self.notice = Some(Notice::Failed(reason)),
+            Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
                 shared.phase = Phase::Died;
                 let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
-                self.notice = Some(Notice::Failed(text));
+                self.notices.fail(Matter::Training, text);
             }
             // The worker keeps these to itself.
             Event::Abandoned => {}

@@ -1,7 +1,7 @@
 use eframe::egui::{Align, Frame, Layout, Margin, RichText, Stroke, Ui};
 
 use crate::app::{
-    shared::{Notice, Phase},
+    shared::Notice,
     theme::{Theme, radius},
 };
 
@@ -13,8 +13,9 @@ pub enum Reply {
     Restart,
 }
 
-/// A strip above the work: what went wrong and what to do, or that something worked.
-pub fn notice_ui(ui: &mut Ui, notice: &Notice, phase: Phase) -> Option<Reply> {
+/// A strip above the work: what went wrong and what to do, or that something worked. The training thread can be started
+/// again from it if it `can_restart`.
+pub fn notice_ui(ui: &mut Ui, notice: &Notice, can_restart: bool) -> Option<Reply> {
     let mut reply = None;
     let palette = Theme::of(ui).palette;
     let (text, colour) = match notice {
@@ -32,7 +33,7 @@ pub fn notice_ui(ui: &mut Ui, notice: &Notice, phase: Phase) -> Option<Reply> {
                 if ui.button("Dismiss").clicked() {
                     reply = Some(Reply::Dismiss);
                 }
-                if phase == Phase::Died && ui.button("Start again").clicked() {
+                if can_restart && ui.button("Start again").clicked() {
                     reply = Some(Reply::Restart);
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {

@@ -2,7 +2,10 @@ use directories::ProjectDirs;
 use eframe::{NativeOptions, egui};
 use thiserror::Error;
 
-use super::{DecouplerWindow, DialogKind};
+use super::{
+    DecouplerWindow, DialogKind,
+    remembered::{LEAST_SIZE_POINTS, Remembered},
+};
 
 /// Reasons for which the window cannot open.
 #[derive(Debug, Error)]
@@ -32,12 +35,16 @@ pub fn open() -> Result<(), OpenError> {
     if cfg!(target_os = "linux") && displays.iter().all(|name| std::env::var_os(name).is_none()) {
         return Err(OpenError::NoDisplay);
     }
+    // Systems without a home folder keep no runs, which the run list says, and remember nothing.
+    let folders = ProjectDirs::from("", "", "decoupler");
+    let memory = folders.as_ref().map(|folders| folders.data_dir().join("window.json"));
+    let remembered = memory.as_deref().map(Remembered::read).unwrap_or_default();
     let icon = eframe::icon_data::from_png_bytes(include_bytes!("../../../assets/icon.png"));
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("Decoupler")
         .with_app_id("decoupler")
-        .with_inner_size([1440.0, 900.0])
-        .with_min_inner_size([960.0, 640.0]);
+        .with_inner_size(remembered.opening_size_points())
+        .with_min_inner_size(LEAST_SIZE_POINTS);
     if let Ok(icon) = icon {
         viewport = viewport.with_icon(icon);
     }
@@ -49,10 +56,9 @@ pub fn open() -> Result<(), OpenError> {
     };
     let create = |creation: &eframe::CreationContext<'_>| {
         let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native)?;
-        // Systems without a home folder keep no runs, which the run list says.
-        let window = match ProjectDirs::from("", "", "decoupler") {
-            Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
-            None => window,
+        let window = match (&folders, &memory) {
+            (Some(folders), Some(memory)) => window.keeping_runs(folders.data_dir().join("runs")).remembering(memory),
+            _ => window,
         };
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };

@@ -5,7 +5,7 @@ use ndarray::Array2;
 use crate::{
     app::{
         job::{Job, Wake},
-        shared::{Effect, Notice, RightCard, RunList},
+        shared::{Effect, Matter, Notice, RightCard, RunList},
         test_view::{Frame, TestView},
     },
     export::NetworkFile,
@@ -120,7 +120,10 @@ impl CompareView {
                     place.compared = Some(*compared);
                 }
                 Err(reason) => {
-                    effects.extend([Effect::PinRun(number, None), Effect::Tell(Notice::Failed(reason))]);
+                    effects.extend([
+                        Effect::PinRun(number, None),
+                        Effect::Tell(Matter::Comparison, Notice::Failed(reason)),
+                    ]);
                 }
             }
         }

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     app::{
         job::{Job, Wake},
-        shared::Effect,
+        shared::{Effect, Matter},
     },
     evaluation::{
         SimulatedSettings,
@@ -250,7 +250,7 @@ impl ExperimentsView {
         let Ok(experiment) = self.form().experiment() else {
             return;
         };
-        effects.push(Effect::DismissNotice);
+        effects.push(Effect::Settle(Matter::Experiments));
         self.begin(experiment.clone());
         worker::run(&mut self.job, experiment);
     }

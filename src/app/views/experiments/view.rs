@@ -14,7 +14,7 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
-        shared::{Effect, Notice, Shared, View},
+        shared::{Effect, Matter, Notice, Shared, View},
         theme::space,
         widgets::{card_ui, placeholder_ui, pressed, scrolled_ui, section_heading_ui},
     },
@@ -34,7 +34,11 @@ impl View for ExperimentsView {
                 ExperimentEvent::Ended(result) => {
                     self.record(std::mem::take(&mut finished));
                     self.end(Instant::now());
-                    effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
+                    effects.extend(
+                        result
+                            .err()
+                            .map(|reason| Effect::Tell(Matter::Experiments, Notice::Failed(reason))),
+                    );
                 }
             }
         }

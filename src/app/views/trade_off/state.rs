@@ -7,7 +7,7 @@ use super::{
 use crate::{
     app::{
         job::{Job, Wake},
-        shared::{Effect, Shared, View as _},
+        shared::{Effect, Matter, Shared, View as _},
     },
     evaluation::{SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
 };
@@ -99,7 +99,7 @@ impl TradeOffView {
     /// Measures what the form says.
     pub(super) fn measure(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let Ok(plan) = self.plan(&shared.draft) else { return };
-        effects.push(Effect::DismissNotice);
+        effects.push(Effect::Settle(Matter::TradeOff));
         self.begin(plan.clone());
         worker::measure(&mut self.job, plan);
     }

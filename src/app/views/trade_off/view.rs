@@ -11,7 +11,7 @@ use super::{
 use crate::{
     app::{
         plotting::legend_ui,
-        shared::{Effect, Notice, Shared, View},
+        shared::{Effect, Matter, Notice, Shared, View},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui, state_ui},
     },
@@ -30,7 +30,11 @@ impl View for TradeOffView {
                 TradeOffEvent::Measured(level, point) => self.record(level, *point),
                 TradeOffEvent::Ended(result) => {
                     self.end(Instant::now());
-                    effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
+                    effects.extend(
+                        result
+                            .err()
+                            .map(|reason| Effect::Tell(Matter::TradeOff, Notice::Failed(reason))),
+                    );
                 }
             }
         }

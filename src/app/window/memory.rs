@@ -1,0 +1,120 @@
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use super::{DecouplerWindow, remembered::Remembered};
+use crate::{
+    app::{
+        job::{Job, JobError, Wake},
+        shared::Matter,
+    },
+    export::WriteError,
+};
+
+/// Longest time that closing waits for the file.
+const LONGEST_WAIT: Duration = Duration::from_secs(2);
+
+type Written = Result<Result<(), WriteError>, JobError>;
+
+/// The file that keeps what a window remembers, written in the background.
+#[derive(Debug)]
+pub(super) struct Memory {
+    path: PathBuf,
+    /// What is in the file, or is on its way there.
+    written: Remembered,
+    latest: Remembered,
+    job: Job<Written>,
+    has_told: bool,
+}
+
+impl Memory {
+    fn new(path: PathBuf, remembered: Remembered, wake: Wake) -> Self {
+        Self {
+            path,
+            written: remembered.clone(),
+            latest: remembered,
+            job: Job::prompt("memory", wake),
+            has_told: false,
+        }
+    }
+
+    /// Keeps what is to be remembered now; writes it if `may_write`, and else later.
+    fn keep(&mut self, latest: Remembered, may_write: bool) {
+        self.latest = latest;
+        if may_write && self.latest != self.written && !self.job.is_under_way() {
+            self.written = self.latest.clone();
+            let (path, remembered) = (self.path.clone(), self.latest.clone());
+            self.job.start(move |_| remembered.write(&path), |written| written);
+        }
+    }
+
+    /// Why nothing is remembered, told once.
+    fn next_failure(&mut self) -> Option<String> {
+        let reason = match self.job.next_event()? {
+            Ok(Ok(())) => return None,
+            Ok(Err(error)) => error.to_string(),
+            Err(error) => error.to_string(),
+        };
+        let is_first = !std::mem::replace(&mut self.has_told, true);
+        is_first.then(|| format!("View, theme and settings will not be found again at the next start: {reason}"))
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        self.job.wait(LONGEST_WAIT);
+        if self.latest != self.written && !self.has_told {
+            // Nobody is left to be told.
+            let _ = self.latest.write(&self.path);
+        }
+    }
+}
+
+impl DecouplerWindow {
+    /// Opens as the last window did that remembered its theme, view and settings in the file `path`, and remembers them
+    /// there from now on.
+    #[must_use]
+    pub fn remembering(mut self, path: &Path) -> Self {
+        let remembered = Remembered::read(path);
+        if let Some(is_dark) = remembered.is_dark {
+            self.set_dark(is_dark);
+        }
+        if let Some(draft) = remembered.draft {
+            self.configure(draft);
+        }
+        if let Some(place) = self.place_of(remembered.view.as_deref()) {
+            self.show(place);
+        }
+        self.remembered = remembered.clone();
+        self.memory = Some(Memory::new(path.to_owned(), remembered, Arc::clone(&self.wake)));
+        self
+    }
+
+    /// Remembers what the user sees.
+    pub(super) fn remember(&mut self) {
+        let Some(memory) = &mut self.memory else { return };
+        self.remembered.view = Some(self.names[self.shown].1.to_owned());
+        self.remembered.draft = Some(self.shared.draft);
+        let (is_usual_size, is_held) = self.ctx.input(|input| {
+            let viewport = input.viewport();
+            let is_unusual = [viewport.maximized, viewport.fullscreen, viewport.minimized].contains(&Some(true));
+            (!is_unusual, input.pointer.any_down())
+        });
+        if is_usual_size {
+            let size = self.ctx.content_rect().size() * self.ctx.zoom_factor();
+            self.remembered.take_size_points(size.into());
+        }
+        // What is being dragged is written when it is let go.
+        memory.keep(self.remembered.clone(), !is_held);
+        if let Some(reason) = memory.next_failure() {
+            self.notices.fail(Matter::Memory, reason);
+        }
+    }
+
+    fn place_of(&self, view: Option<&str>) -> Option<usize> {
+        let mut names = self.names.iter();
+        names.find_map(|&(place, name)| (Some(name) == view).then_some(place))
+    }
+}

@@ -1,0 +1,118 @@
+//! What the window finds again when it next opens.
+
+use std::{fs, path::PathBuf};
+
+use decoupler::{app::Phase, evaluation::SimulatedSettings};
+
+use eframe::egui::{Vec2, vec2};
+
+use crate::driver::{Driver, small};
+
+/// A file that does not exist yet, in a folder that vanishes.
+fn file() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("data").join("window.json");
+    (folder, path)
+}
+
+#[test]
+fn theme_view_and_settings_are_as_they_were_and_nothing_is_trained() {
+    let (_folder, path) = file();
+    let mut driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, SimulatedSettings::default(), "the first start");
+    assert!(driver.state().look.is_dark && driver.shown() == "Train");
+    driver.configure_small();
+    driver.click("Light");
+    driver.click_button("Compare");
+    assert_eq!(driver.shown(), "Compare");
+    drop(driver);
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"view\": \"Compare\""), "{text}");
+
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, small());
+    assert_eq!(driver.shown(), "Compare");
+    assert!(!driver.state().look.is_dark);
+    assert_eq!(driver.state().phase, Phase::Idle);
+    assert!(driver.state().run.is_none());
+}
+
+#[test]
+fn a_file_of_another_program_opens_the_usual_window() {
+    let (_folder, path) = file();
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(&path, r#"{"is_dark": "no", "view": "Rocket", "draft": {"hidden": -1}}"#).unwrap();
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert!(driver.state().look.is_dark && driver.shown() == "Train");
+    assert_eq!(driver.notice(), None);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_told_once() {
+    let (folder, path) = file();
+    // A file where the folder should be.
+    fs::write(folder.path().join("data"), "").unwrap();
+    let mut driver = Driver::open_remembering(&path);
+    driver.wait("the reason", |driver| driver.says("will not be found again"));
+    driver.click("Dismiss");
+    driver.click("Light");
+    driver.settle();
+    assert_eq!(driver.notice(), None);
+}
+
+#[test]
+fn a_window_that_remembers_comes_to_rest() {
+    let (_folder, path) = file();
+    drop(Driver::open_remembering(&path));
+    let mut driver = Driver::open_remembering(&path);
+    driver.wait("the last news", |driver| !driver.table().is_empty());
+    assert!(driver.comes_to_rest());
+}
+
+/// Drags the edge of a column by so many points.
+fn drag(driver: &mut Driver, edge: &str, points: f32) {
+    let from = driver.get(edge).rect().center();
+    let harness = driver.harness();
+    harness.drag_at(from);
+    harness.step();
+    harness.hover_at(from + vec2(points, 0.0));
+    harness.run_steps(2);
+    harness.drop_at(from + vec2(points, 0.0));
+    harness.run_steps(2);
+    harness.remove_cursor();
+    harness.step();
+}
+
+/// Place and size of the middle of the view that trains.
+fn middle(driver: &Driver) -> (f32, Vec2) {
+    let left = driver.get("Actual surface").rect();
+    (left.left(), left.size())
+}
+
+#[test]
+fn columns_are_drawn_wider_and_narrower_and_stay_so() {
+    const LEFT: &str = "Width of the left column";
+    const RIGHT: &str = "Width of the right column";
+    let (_folder, path) = file();
+    let mut driver = Driver::open_remembering(&path);
+    let edges = |driver: &Driver| [LEFT, RIGHT].map(|edge| driver.get(edge).rect().center().x);
+    let usual = edges(&driver);
+    drag(&mut driver, LEFT, 40.0);
+    drag(&mut driver, RIGHT, 30.0);
+    let drawn = edges(&driver);
+    assert!((drawn[0] - usual[0] - 40.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!((drawn[1] - usual[1] - 30.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!(driver.comes_to_rest());
+    let seen = middle(&driver);
+    drop(driver);
+
+    let mut driver = Driver::open_remembering(&path);
+    assert_eq!((edges(&driver), middle(&driver)), (drawn, seen));
+    // No further than the surfaces allow.
+    drag(&mut driver, LEFT, 900.0);
+    drag(&mut driver, RIGHT, -900.0);
+    assert!(middle(&driver).1.x >= 280.0, "{:?}", middle(&driver));
+    drag(&mut driver, LEFT, -900.0);
+    assert!(edges(&driver)[0] >= 240.0, "{:?}", edges(&driver));
+}
