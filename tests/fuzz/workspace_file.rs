@@ -3,6 +3,7 @@ use std::{fs, sync::Arc};
 use decoupler::export::{KeptRun, NetworkFile, Workspace};
 
 use crate::{
+    corpus::replay,
     mutation::{for_each_seed, mutated},
     trained::trained,
 };
@@ -38,5 +39,24 @@ fn damaged_runs_are_left_out_and_the_file_is_put_aside() {
             assert_eq!(fs::read(&aside).unwrap(), damaged);
             fs::remove_file(&aside).unwrap();
         }
+    });
+}
+
+/// What is read is read again as the same, and what is left out is put aside.
+#[test]
+fn any_input() {
+    replay!(|bytes: &[u8]| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("workspace.json");
+        fs::write(&path, bytes).unwrap();
+        let Ok(found) = Workspace::load(&path) else { return };
+        if found.warning.is_some() {
+            let aside = folder.path().join("workspace.json.damaged-1");
+            assert_eq!(fs::read(aside).unwrap(), bytes);
+        }
+        found.workspace.save(&path).unwrap();
+        let again = Workspace::load(&path).unwrap();
+        assert!(again.warning.is_none());
+        assert_eq!(again.workspace.runs.len(), found.workspace.runs.len());
     });
 }
