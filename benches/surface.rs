@@ -1,7 +1,10 @@
 //! What a frame with two surfaces costs: the interpolation, the window's pass, and the tessellation.
 
-use decoupler::app::surface_view::{Colours, OrbitCamera, SurfaceView, ViewMode};
+use std::sync::Arc;
+
+use decoupler::app::surface_view::SurfaceView;
 use decoupler::app::theme::{self, Theme};
+use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode};
 use decoupler::surface::SurfaceMap;
 use divan::{Bencher, black_box};
 use eframe::egui::{Context, RawInput, Rect, Vec2, pos2, vec2};
@@ -34,10 +37,30 @@ fn interpolate(bencher: Bencher<'_, '_>, side: usize) {
     bencher.bench_local(|| map.evaluate_into(black_box(&values), &mut out));
 }
 
+/// Nothing changes from frame to frame.
 #[divan::bench(args = [ViewMode::ThreeD, ViewMode::Top])]
 fn two_views(bencher: Bencher<'_, '_>, mode: ViewMode) {
+    frames(bencher, mode, |camera| camera);
+}
+
+/// Every frame is drawn anew.
+#[divan::bench(args = [ViewMode::ThreeD, ViewMode::Top])]
+fn two_views_turned(bencher: Bencher<'_, '_>, mode: ViewMode) {
+    frames(bencher, mode, |camera| camera.dragged(1.0, 0.0));
+}
+
+fn frames(bencher: Bencher<'_, '_>, mode: ViewMode, turn: impl Fn(OrbitCamera) -> OrbitCamera) {
     let (map, nodes) = map(10);
-    let surface = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+    let values = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+    let surface = Surface {
+        title: "Actual".to_owned(),
+        values: values.into(),
+        nodes: nodes.into(),
+        map: Arc::new(map),
+        quantity: Quantity::Height,
+        range: 4.0..=5.0,
+        mode,
+    };
     let ctx = Context::default();
     theme::install(&ctx, true);
     let size = vec2(700.0, 540.0);
@@ -45,7 +68,9 @@ fn two_views(bencher: Bencher<'_, '_>, mode: ViewMode) {
         screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
         ..RawInput::default()
     };
+    let mut camera = OrbitCamera::default();
     bencher.bench_local(|| {
+        camera = turn(camera);
         let mut output = ctx.run_ui(input.clone(), |ui| {
             ui.spacing_mut().item_spacing = Vec2::ZERO;
             ui.horizontal_top(|ui| {
@@ -53,16 +78,11 @@ fn two_views(bencher: Bencher<'_, '_>, mode: ViewMode) {
                     ui.allocate_ui(vec2(340.0, 500.0), |ui| {
                         let view = SurfaceView {
                             label,
-                            grid: map.grid(),
-                            values_mm: &surface,
-                            nodes_mm: &nodes,
-                            range_mm: 4.0..=5.0,
-                            colours: Colours::Height,
-                            mode,
-                            highlight: None,
+                            surface: &surface,
+                            marked_node: None,
                             theme: Theme::dark(),
                         };
-                        view.show(ui, OrbitCamera::default());
+                        view.show(ui, camera);
                     });
                 }
             });

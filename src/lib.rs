@@ -14,6 +14,7 @@
 //! | [`decoupling`] | readings to deformation, every way we know, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
+//! | `figure` | what a picture says, for the window and for print (feature `figures`) |
 //! | `export` | files for other programs (feature `files`); `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
@@ -104,6 +105,8 @@ pub mod decoupling;
 pub mod evaluation;
 #[cfg(feature = "files")]
 pub mod export;
+#[cfg(feature = "figures")]
+pub mod figure;
 pub mod network;
 pub mod scene;
 pub mod sensor;

@@ -3,12 +3,12 @@
 #![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{fs, path::PathBuf};
+use std::{fs, path::PathBuf, time::Duration};
 
 use decoupler::{
     dataset::Seed,
     evaluation::{Run, SimulatedSettings, Simulation},
-    export::{CheckpointFile, CheckpointFileError, NetworkFile},
+    export::{CheckpointFile, DocumentError, NetworkFile},
     sensor::SensorModel,
     training::{EpochRecord, Method, StopReason},
 };
@@ -84,6 +84,38 @@ fn a_run_from_a_file_goes_on_with_the_same_bits() {
         let mut files = [&run, &whole].map(|run| NetworkFile::from_run(run).unwrap());
         files.iter_mut().for_each(|file| file.training.seconds = 0.0);
         assert_eq!(files[0], files[1], "{method}");
+    }
+}
+
+/// Starts run side by side, so their times do not add up to the time by the clock.
+#[test]
+fn the_time_by_the_clock_is_that_of_all_sessions_or_unknown() {
+    let (_folder, path) = place();
+    let hour = Some(Duration::from_secs(3600));
+    // A training alone knows its time.
+    let cases = [(3, hour), (3, None), (1, hour), (1, None), (3, Some(Duration::MAX))];
+    for (starts, saved) in cases {
+        let run = stepped(
+            SimulatedSettings {
+                starts,
+                ..settings(Method::default())
+            },
+            4,
+        );
+        let mut file = CheckpointFile::from_run(&run).unwrap();
+        assert!(file.wall_time == run.wall_time() && file.wall_time > Some(Duration::ZERO));
+        file.wall_time = saved;
+        file.save(&path).unwrap();
+        let mut resumed = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        let alone = (starts == 1).then(|| run.leader().elapsed());
+        let before = resumed.wall_time();
+        assert_eq!(before, saved.or(alone));
+        resumed.step();
+        let after = resumed.wall_time();
+        assert!(
+            after.is_some() == before.is_some() && after >= before,
+            "{before:?} {after:?}"
+        );
     }
 }
 
@@ -176,8 +208,8 @@ fn other_files_and_versions_are_named() {
         ("deep nesting", "[".repeat(100_000), "not a checkpoint"),
         (
             "a newer version",
-            text.replacen("\"version\":2", "\"version\":3", 1),
-            "reads versions 1 to 2: install a newer",
+            text.replacen("\"version\":3", "\"version\":4", 1),
+            "reads versions 1 to 3: install a newer",
         ),
         (
             "a newer version with other fields",
@@ -186,7 +218,7 @@ fn other_files_and_versions_are_named() {
         ),
         (
             "no version of ours",
-            text.replacen("\"version\":2", "\"version\":0", 1),
+            text.replacen("\"version\":3", "\"version\":0", 1),
             "no version 0",
         ),
         (
@@ -206,10 +238,7 @@ fn other_files_and_versions_are_named() {
     let message = refusal(&fs::read(&path).unwrap());
     assert!(message.contains("its format is \"decoupler network\""), "{message}");
     fs::remove_file(&path).unwrap();
-    assert!(matches!(
-        CheckpointFile::load(&path),
-        Err(CheckpointFileError::Read { .. })
-    ));
+    assert!(matches!(CheckpointFile::load(&path), Err(DocumentError::Read { .. })));
 }
 
 /// Files that are what their checksum says, but impossible.

@@ -106,3 +106,26 @@ fn what_cannot_be_reproduced_is_refused_in_a_line() {
         assert!(output.stdout.is_empty());
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_cannot_be_written_costs_neither_the_report_nor_the_other_files() {
+    let folder = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("table_1.csv")).unwrap();
+    let arguments = "reproduce --table 1 --seeds 1 --epochs 2 --starts 1 --hidden 6 --out .";
+    for json in ["", " --json"] {
+        let output = decoupler(&format!("{arguments}{json}"), folder.path());
+        let [report, message] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(report.contains("Table 1") || report.contains("\"table\":1"), "{report}");
+        assert!(
+            message.contains("table_1.csv") && message.contains("disk is full"),
+            "{message}"
+        );
+        for name in ["table_1_trials.csv", "table_1.md", "table_1.svg", "table_1.png"] {
+            let path = folder.path().join(name);
+            assert!(fs::metadata(&path).is_ok_and(|file| file.len() > 0), "{name}");
+            fs::remove_file(path).unwrap();
+        }
+    }
+}

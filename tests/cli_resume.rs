@@ -149,7 +149,7 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     assert_eq!(checkpoint.starts[0].history().len(), part.training.history.len());
     assert_eq!(names(folder), ["part.json", "run.checkpoint"]);
     // What it said, but not quite as far.
-    let resume = resume.strip_prefix(" to go on: decoupler ").unwrap();
+    let resume = resume.strip_prefix(" to resume: decoupler ").unwrap();
     let epochs = part.training.history.len() + 30;
     success(&format!("{resume} --epochs {epochs}"), folder);
     success(&format!("train {LONG} {epochs} --out whole.json"), folder);
@@ -177,7 +177,7 @@ fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
     let mut outputs = [1, 5, 20].into_iter().map(interrupted_after);
     let (status, told, printed) = outputs.find(|(_, told, _)| told.contains("after epoch")).unwrap();
     assert_eq!(status, Some(130), "{told}");
-    assert!(told.contains("with --checkpoint FILE it could go on"), "{told}");
+    assert!(told.contains("with --checkpoint FILE it could be resumed"), "{told}");
     assert!(String::from_utf8(printed).unwrap().contains("stopped by you"));
     assert!(NetworkFile::load(&folder.path().join("n.json")).is_ok());
 }
@@ -253,7 +253,7 @@ fn more_epochs_and_another_method_go_on_from_the_present_weights() {
     assert_eq!(network(&folder.join("network.json")), file);
     let refused = failure(&format!("{RESUME} --method scg"), folder, 2);
     assert!(
-        refused.contains("all 25 epochs of the checkpoint are run: give more with --epochs"),
+        refused.contains("the checkpoint has run all of its 25 epochs: give more with --epochs"),
         "{refused}"
     );
     assert_eq!(network(&folder.join("network.json")), file);

@@ -208,7 +208,7 @@ fn what_is_wrong_is_named() {
         ("train --noise 2", "from 0 to 1"),
         ("train --noise 0,1", "one number"),
         ("train --decoder knn", "rbf, fuzzy, newton or polish"),
-        ("simulate --decoder mean,ridge", "one here"),
+        ("simulate --decoder mean,ridge", "only one here"),
         ("trade --hidden 0", "from 1"),
     ];
     for (arguments, expected) in cases {

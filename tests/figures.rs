@@ -4,63 +4,57 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use decoupler::{
-    export::figures::{
-        HeatMap, Hue, Marker, Picture, PictureFormat, Plot, PlotAxis, PlotPoint, Series, SurfaceFigure, SurfaceLook,
-        SurfacePanel, node_plot,
+    decoupling::{DecoderKind, Precision},
+    evaluation::{Preset, TradeLevel, TradeLimits, measure_trade},
+    export::figures::{Picture, PictureFormat},
+    figure::{
+        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, Series, node_figure, trade_off_figure,
     },
-    surface::SurfaceMap,
 };
 use glam::DVec3;
 use image::GenericImageView as _;
 use ndarray::Array2;
+use resvg::usvg::roxmltree::{Document, Node};
 
 fn scatter(marker: Marker, values: &[(f64, f64)]) -> Series {
-    let points = values.iter().map(|&(x, y)| PlotPoint { x, y, bar: None });
-    Series {
-        name: "series".to_owned(),
-        hue: Hue::Blue,
-        has_line: false,
-        is_dashed: false,
-        marker: Some(marker),
-        points: points.collect(),
-    }
+    let points = values.iter().map(|&(x, y)| [x, y]);
+    Series::new("series", Look::marker(Hue::Blue, marker), points)
 }
 
 fn plot(y: PlotAxis, series: Vec<Series>) -> Picture {
-    let plot = Plot {
-        x: PlotAxis::linear("across"),
-        y,
-        series,
-        spans: Vec::new(),
-        width_pt: Plot::WIDTH_PT,
+    let keys = series.iter().map(|series| Key::new(&series.name, series.look));
+    let figure = PlotFigure {
+        keys: keys.collect(),
+        plots: vec![Plot::new(PlotAxis::linear("across"), y, series)],
+        notes: Vec::new(),
     };
-    plot.draw()
+    Figure::from(figure).draw()
 }
 
 fn count(picture: &Picture, what: &str) -> usize {
     picture.svg().matches(what).count()
 }
 
-/// Centres of the discs, in points.
-fn discs(picture: &Picture) -> Vec<[f64; 2]> {
-    let number = |line: &str, name: &str| -> f64 {
-        let rest = line.split(&format!("{name}=\"")).nth(1).unwrap();
-        rest.split('"').next().unwrap().parse().unwrap()
-    };
-    let lines = picture.svg().lines().filter(|line| line.starts_with("<circle"));
-    lines.map(|line| [number(line, "cx"), number(line, "cy")]).collect()
+/// Calls `read` with the elements of a kind.
+fn elements<T>(picture: &Picture, kind: &str, read: impl Fn(Node<'_, '_>) -> T) -> Vec<T> {
+    let document = Document::parse(picture.svg()).unwrap();
+    let elements = document.descendants().filter(|node| node.has_tag_name(kind));
+    elements.map(read).collect()
 }
 
-/// Colours of filled rectangles and how many there are of each, the most frequent first.
-fn colours(picture: &Picture) -> Vec<(String, usize)> {
-    let mut colours = std::collections::BTreeMap::new();
-    for line in picture.svg().lines().filter(|line| line.contains("crispEdges")) {
-        let fill = line.split("fill=\"").nth(1).unwrap();
-        *colours.entry(fill[..7].to_owned()).or_insert(0) += 1;
-    }
-    let mut colours: Vec<_> = colours.into_iter().collect();
-    colours.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    colours
+fn number(element: Node<'_, '_>, name: &str) -> f64 {
+    element.attribute(name).unwrap().parse().unwrap()
+}
+
+/// Centres of the circles, in points.
+fn discs(picture: &Picture) -> Vec<[f64; 2]> {
+    elements(picture, "circle", |circle| {
+        ["cx", "cy"].map(|name| number(circle, name))
+    })
+}
+
+fn texts(picture: &Picture) -> Vec<String> {
+    elements(picture, "text", |text| text.text().unwrap_or_default().to_owned())
 }
 
 #[test]
@@ -69,15 +63,15 @@ fn points_stand_where_their_values_are() {
         PlotAxis::linear("up"),
         vec![scatter(Marker::Disc, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)])],
     );
-    // The last disc is the sample beside the plot.
-    let [a, b, c, _] = discs(&picture).try_into().unwrap();
+    // The first disc is the sample in the legend.
+    let [_, a, b, c] = discs(&picture).try_into().unwrap();
     assert!((b[0] - 0.5 * (a[0] + c[0])).abs() < 0.02, "evenly spaced across");
     assert!(a[1] > b[1] && b[1] > c[1], "larger values are higher");
     assert!(((b[1] - c[1]) / (a[1] - b[1]) - 2.0).abs() < 0.01);
 
     let decades = [(0.0, 1e-4), (1.0, 1e-2), (2.0, 1.0)];
     let picture = plot(PlotAxis::logarithmic("up"), vec![scatter(Marker::Disc, &decades)]);
-    let [a, b, c, _] = discs(&picture).try_into().unwrap();
+    let [_, a, b, c] = discs(&picture).try_into().unwrap();
     assert!(((b[1] - c[1]) - (a[1] - b[1])).abs() < 0.02, "decades are equally high");
 }
 
@@ -112,71 +106,40 @@ fn what_has_no_place_is_left_out() {
 
 #[test]
 fn node_plots_have_a_square_and_a_disc_for_each_node_and_bars_on_demand() {
-    let (actual, decoupled) = ([4.1, 4.5, 4.9], [4.2, 4.4, 4.9]);
-    let plain = node_plot(&actual, &decoupled, None).draw();
+    let nodes = |z_mm: [f64; 3]| z_mm.map(|z| DVec3::new(0.0, 0.0, z));
+    let (actual, decoupled) = (nodes([4.1, 4.5, 4.9]), nodes([4.2, 4.4, 4.9]));
+    let draw = |spread_mm| Figure::from(node_figure(&actual, Some(&decoupled), spread_mm, 3)).draw();
+    let plain = draw(None);
     assert_eq!(discs(&plain).len(), 3 + 1);
-    let with_bars = node_plot(&actual, &decoupled, Some(&[0.1, 0.2, 0.3])).draw();
-    let lines = |picture: &Picture| count(picture, "<polyline");
-    assert!(lines(&with_bars) >= lines(&plain) + 3 * 3, "a line and two ends each");
+    for name in ["actual", "decoupled", "node, row by row", "z (mm)"] {
+        assert!(texts(&plain).iter().any(|text| text == name), "{name}");
+    }
+    // Below the bars the axis reaches further down, so its ticks may be others.
+    let lines = |picture: &Picture| {
+        let is_bar = |line: Node<'_, '_>| line.attribute("stroke-width") == Some("0.8");
+        elements(picture, "polyline", is_bar)
+            .into_iter()
+            .filter(|is_bar| *is_bar)
+            .count()
+    };
+    let with_bars = draw(Some(&[0.1, 0.2, 0.3]));
+    assert_eq!(
+        (lines(&plain), lines(&with_bars)),
+        (0, 3 * 3),
+        "a line and two ends each"
+    );
 }
 
 #[test]
 fn png_has_300_dots_an_inch_and_text_from_the_programs_own_fonts() {
     let picture = plot(PlotAxis::linear("up"), vec![scatter(Marker::Square, &[(0.0, 1.0)])]);
     let png = image::load_from_memory(&picture.png().unwrap()).unwrap();
-    assert_eq!(f64::from(png.width()), Plot::WIDTH_PT / 72.0 * 300.0);
+    assert_eq!(f64::from(png.width()), 510.0 / 72.0 * 300.0);
     assert_eq!(png.get_pixel(0, 0).0, [255; 4], "the ground is white");
     // The name of the x axis: ink in the lowest strip of the picture, where nothing but text is.
     let strip = (png.height() - 80..png.height()).flat_map(|y| (0..png.width()).map(move |x| (x, y)));
     let ink = strip.filter(|&(x, y)| png.get_pixel(x, y).0[0] < 100).count();
     assert!(ink > 200, "{ink} dark pixels");
-}
-
-#[test]
-fn both_surfaces_have_one_scale_of_colours() {
-    let places: Vec<f64> = (0..4).map(f64::from).collect();
-    let map = SurfaceMap::new(&places, &places).unwrap();
-    let level = |title: &str, z_mm: f64| SurfacePanel {
-        title: title.to_owned(),
-        values_mm: vec![z_mm; map.grid().len()],
-        nodes_mm: vec![DVec3::new(0.0, 0.0, z_mm)],
-    };
-    let figure = |panels| SurfaceFigure {
-        grid: map.grid().clone(),
-        interpolation: map.interpolation(),
-        panels,
-        range_mm: 4.0..=5.0,
-        look: SurfaceLook::Top,
-    };
-    let same = figure(vec![level("Actual", 4.5), level("Decoupled", 4.5)]).draw();
-    let other = figure(vec![level("Actual", 4.5), level("Decoupled", 5.0)]).draw();
-    let caption = "Between the nodes: thin-plate spline (the biharmonic spline with a plane).";
-    assert_eq!(count(&same, caption), 1);
-    let [at_4_5, at_5] = [&same, &other].map(colours);
-    let (colour, cells) = &at_4_5[0];
-    assert!(*cells > 100 && cells % 2 == 0, "{at_4_5:?}");
-    let here: Vec<_> = at_5.iter().filter(|(_, count)| 2 * count >= *cells).collect();
-    assert_eq!(here.len(), 2, "each panel has the colour of its own height: {at_5:?}");
-    assert!(
-        here.iter().any(|(other, _)| other == colour),
-        "4.5 mm has one colour in both figures"
-    );
-    for look in [SurfaceLook::Top, SurfaceLook::ThreeD] {
-        let mut panel = level("Actual", 4.5);
-        panel.values_mm[0] = f64::NAN;
-        panel.values_mm[40] = f64::NAN;
-        let picture = SurfaceFigure {
-            look,
-            ..figure(vec![panel, level("Decoupled", 9.0)])
-        };
-        let picture = picture.draw();
-        assert_eq!(count(&picture, "NaN"), 0);
-        assert_eq!(
-            count(&picture, "(mm)"),
-            2 * if look == SurfaceLook::Top { 2 } else { 3 } + 1
-        );
-        picture.png().unwrap();
-    }
 }
 
 #[test]
@@ -188,28 +151,22 @@ fn heat_maps_say_each_value_in_its_cell() {
         columns: vec!["6".to_owned(), "8".to_owned()],
         rows: vec!["a < b & c".to_owned(), "d".to_owned()],
         values,
+        notes: Array2::default((2, 2)),
         value_axis: PlotAxis::linear("Z error (%)"),
     };
-    let picture = map.draw();
-    for text in [
-        "1.00",
-        "2.50",
-        "–",
-        "4.00",
-        "a &lt; b &amp; c",
-        "hidden nodes",
-        "Z error (%)",
-    ] {
-        assert!(picture.svg().contains(&format!(">{text}</text>")), "{text}");
-    }
-    picture.png().unwrap();
     let empty = HeatMap {
         columns: Vec::new(),
         rows: Vec::new(),
         values: Array2::zeros((0, 0)),
-        ..map
+        notes: Array2::default((0, 0)),
+        ..map.clone()
     };
-    empty.draw().png().unwrap();
+    let picture = Figure::from(map).draw();
+    for word in ["1.00", "2.50", "–", "4.00", "a < b & c", "hidden nodes", "Z error (%)"] {
+        assert!(texts(&picture).iter().any(|text| text == word), "{word}");
+    }
+    picture.png().unwrap();
+    Figure::from(empty).draw().png().unwrap();
 }
 
 #[test]
@@ -220,10 +177,11 @@ fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
         columns: vec![String::new(); 3],
         rows: vec![String::new()],
         values: Array2::from_shape_vec((1, 3), values.to_vec()).unwrap(),
+        notes: Array2::default((1, 3)),
         value_axis,
     };
     let cells = |map: HeatMap| -> Vec<String> {
-        let svg = map.draw().svg().to_owned();
+        let svg = Figure::from(map).draw().svg().to_owned();
         let fills = svg.split("<rect").skip(1).filter(|rect| rect.contains("fill=\"#"));
         let fill = |rect: &str| rect.split("fill=\"").nth(1).unwrap()[..7].to_owned();
         fills
@@ -255,4 +213,56 @@ fn the_name_of_the_file_tells_the_format() {
         error.to_string(),
         "cannot write 'c.bmp': give a name that ends in .png or .svg"
     );
+}
+
+#[test]
+fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
+    let mut points = Vec::new();
+    for preset in Preset::ALL {
+        let mut settings = preset.settings();
+        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (settings.source.samples, settings.source.validation_samples) = (100, 20);
+        (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
+        let on_point = |point| points.push(point);
+        let kinds = [DecoderKind::Ridge, DecoderKind::Network];
+        measure_trade(preset, &settings, &[3], &kinds, || false, on_point).unwrap();
+    }
+    let is_single = |single: bool| {
+        let of_bits = points
+            .iter()
+            .filter(|point| (point.report.precision == Precision::Single) == single);
+        of_bits.count()
+    };
+    let (hollow, filled) = (is_single(true), is_single(false));
+    assert_eq!((hollow, filled), (2, 4));
+    // Limits out of reach: no answers, whose rings would be hollow too.
+    let limits = TradeLimits {
+        percent: 0.0,
+        microseconds: 0.0,
+    };
+    let level = TradeLevel { noise: 0.0, points };
+    let picture = Figure::from(trade_off_figure(&level, &limits)).draw();
+    let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
+    let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();
+    let is_closed = |line: Node<'_, '_>| {
+        let points: Vec<&str> = line.attribute("points").unwrap().split(' ').collect();
+        points.first() == points.last()
+    };
+    let closed = elements(&picture, "polyline", is_closed)
+        .into_iter()
+        .filter(|is_closed| *is_closed);
+    let frames = 2;
+    let hollow_diamonds = closed.count() - frames;
+    // Each in both plots and once in the legend.
+    assert_eq!((hollow_discs, hollow_diamonds), (2 + 1, 2 + 1));
+    let filled_marks = (rings.len() - hollow_discs) + elements(&picture, "polygon", |_| ()).len();
+    // In the legend each decoder and each preset has one.
+    assert_eq!(filled_marks, 2 * filled + 2 + 2);
+    for name in ["Ridge", "Network", "paper preset, 32 bits", "best preset, 32 bits"] {
+        assert!(
+            texts(&picture).iter().any(|text| text == name),
+            "{name}: {:?}",
+            texts(&picture)
+        );
+    }
 }

@@ -8,7 +8,7 @@ use std::{fs, path::PathBuf};
 use decoupler::{
     dataset::Seed,
     evaluation::{Run, SimulatedSettings, Simulation},
-    export::{NetworkFile, NetworkFileError},
+    export::{DocumentError, NetworkFile},
     sensor::SensorModel,
 };
 use ndarray::Array2;
@@ -81,7 +81,7 @@ fn infinite_errors_of_an_epoch_are_kept_and_infinite_results_are_refused() {
     let before = fs::read(&path).unwrap();
     file.errors.worst_mm = f64::NAN;
     let error = file.save(&path).unwrap_err();
-    assert!(matches!(error, NetworkFileError::Unsound { .. }));
+    assert!(matches!(error, DocumentError::Unsound { .. }));
     assert!(error.to_string().contains("errors.worst_mm"), "{error}");
     assert_eq!(fs::read(&path).unwrap(), before, "the old file stays");
 }
@@ -284,10 +284,7 @@ fn other_files_and_versions_are_named() {
         );
     }
     fs::write(&path, b"{\"format\": \"\xff\"}").unwrap();
-    assert!(matches!(
-        NetworkFile::load(&path),
-        Err(NetworkFileError::NotJson { .. })
-    ));
+    assert!(matches!(NetworkFile::load(&path), Err(DocumentError::Other { .. })));
     fs::remove_file(&path).unwrap();
-    assert!(matches!(NetworkFile::load(&path), Err(NetworkFileError::Read { .. })));
+    assert!(matches!(NetworkFile::load(&path), Err(DocumentError::Read { .. })));
 }

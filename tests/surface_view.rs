@@ -4,8 +4,13 @@
 
 mod support;
 
-use decoupler::app::surface_view::{ColourBar, Colours, OrbitCamera, SurfaceView, ViewMode};
+use std::sync::Arc;
+
+use decoupler::app::surface_view::{ColourBar, SurfaceView};
 use decoupler::app::theme::{self, Theme};
+use decoupler::export::figures::PictureFormat;
+use decoupler::figure::Figure;
+use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
 use decoupler::surface::SurfaceMap;
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
 use egui_kittest::{
@@ -17,9 +22,9 @@ use support::rasterise::Rasteriser;
 
 /// A pressed skin of `rows × per_row` nodes, in the places of the usual arrays.
 struct Skin {
-    map: SurfaceMap,
-    nodes: Vec<DVec3>,
-    surface: Vec<f64>,
+    map: Arc<SurfaceMap>,
+    nodes: Arc<[DVec3]>,
+    values: Arc<[f64]>,
 }
 
 impl Skin {
@@ -30,13 +35,14 @@ impl Skin {
             .map(|i| middle + 2.0 * (i as f64 - (per_row as f64 - 1.0) / 2.0))
             .collect();
         let part = |at: usize, count: usize| at as f64 / (count - 1).max(1) as f64;
-        let nodes: Vec<DVec3> = (0..rows * per_row)
+        let nodes: Arc<[DVec3]> = (0..rows * per_row)
             .map(|n| (n / per_row, n % per_row, n))
             .map(|(row, i, n)| DVec3::new(x[row], y[i], value(part(row, rows), part(i, per_row), n)))
             .collect();
-        let map = SurfaceMap::new(&x, &y).unwrap();
-        let surface = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
-        Self { map, nodes, surface }
+        let map = Arc::new(SurfaceMap::new(&x, &y).unwrap());
+        let values = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+        let values = values.into();
+        Self { map, nodes, values }
     }
 
     fn pressed(rows: usize, per_row: usize) -> Self {
@@ -54,28 +60,38 @@ impl Skin {
         })
     }
 
-    fn noise(rows: usize, per_row: usize, low: f64, high: f64) -> Self {
-        Self::new(rows, per_row, |_, _, n| {
-            low + (high - low) * ((n as f64 * 12.9898).sin() * 43758.5453).rem_euclid(1.0)
-        })
+    /// Nodes that move sideways as well, some beyond the edge of the axes.
+    fn sideways(rows: usize, per_row: usize) -> Self {
+        let mut skin = Self::pressed(rows, per_row);
+        for (index, node) in Arc::make_mut(&mut skin.nodes).iter_mut().enumerate() {
+            *node += DVec3::new((1.3 * index as f64).sin(), (2.1 * index as f64).cos(), 0.0) * 0.8;
+        }
+        skin
     }
 
-    fn view<'a>(&'a self, theme: &'a Theme, colours: Colours, mode: ViewMode) -> SurfaceView<'a> {
-        let range_mm = match colours {
-            Colours::Height => 4.0..=5.0,
+    fn surface(&self, title: &str, quantity: Quantity, mode: ViewMode) -> Surface {
+        let range = match quantity {
+            Quantity::Height => 4.0..=5.0,
             _ => -0.25..=0.25,
         };
-        SurfaceView {
-            label: "Actual surface",
-            grid: self.map.grid(),
-            values_mm: &self.surface,
-            nodes_mm: &self.nodes,
-            range_mm,
-            colours,
+        Surface {
+            title: title.to_owned(),
+            map: Arc::clone(&self.map),
+            values: Arc::clone(&self.values),
+            nodes: Arc::clone(&self.nodes),
+            quantity,
+            range,
             mode,
-            highlight: None,
-            theme,
         }
+    }
+}
+
+fn view<'a>(surface: &'a Surface, theme: &'a Theme) -> SurfaceView<'a> {
+    SurfaceView {
+        label: "Actual surface",
+        surface,
+        marked_node: None,
+        theme,
     }
 }
 
@@ -93,11 +109,10 @@ fn harness<'a>(size: Vec2, is_dark: bool, app: impl FnMut(&mut egui::Ui) + 'a) -
 
 #[test]
 fn the_surface_is_found_by_its_label_and_turned_by_keys() {
-    let skin = Skin::pressed(10, 10);
+    let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let camera = std::cell::Cell::new(OrbitCamera::default());
     let mut harness = harness(vec2(350.0, 540.0), true, |ui| {
-        let view = skin.view(Theme::dark(), Colours::Height, ViewMode::ThreeD);
-        camera.set(view.show(ui, camera.get()).camera);
+        camera.set(view(&surface, Theme::dark()).show(ui, camera.get()).camera);
     });
     harness.get_by_label("Actual surface").focus();
     harness.run();
@@ -119,12 +134,11 @@ fn the_surface_is_found_by_its_label_and_turned_by_keys() {
 
 #[test]
 fn dragging_turns_and_hovering_finds_a_node() {
-    let skin = Skin::pressed(10, 10);
+    let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let camera = std::cell::Cell::new(OrbitCamera::default());
     let hovered = std::cell::Cell::new(None);
     let mut harness = harness(vec2(480.0, 420.0), true, |ui| {
-        let view = skin.view(Theme::dark(), Colours::Height, ViewMode::ThreeD);
-        let shown = view.show(ui, camera.get());
+        let shown = view(&surface, Theme::dark()).show(ui, camera.get());
         shown.node_tooltip_ui(|ui, node| {
             ui.label(format!("node {node}"));
         });
@@ -149,10 +163,10 @@ fn dragging_turns_and_hovering_finds_a_node() {
 #[test]
 fn odd_inputs_are_drawn() {
     let mut gap = Skin::pressed(10, 10);
-    gap.surface[5000] = f64::NAN;
-    gap.nodes[45].z = f64::NAN;
+    Arc::make_mut(&mut gap.values)[5000] = f64::NAN;
+    Arc::make_mut(&mut gap.nodes)[45].z = f64::NAN;
     let mut empty = Skin::pressed(10, 6);
-    empty.surface.clear();
+    empty.values = Arc::new([]);
     let skins = [
         gap,
         empty,
@@ -162,15 +176,14 @@ fn odd_inputs_are_drawn() {
     ];
     for skin in &skins {
         for mode in [ViewMode::ThreeD, ViewMode::Top] {
-            for range_mm in [4.0..=5.0, 5.0..=5.0, f64::NAN..=f64::NAN, 5.0..=4.0] {
+            for range in [4.0..=5.0, 5.0..=5.0, f64::NAN..=f64::NAN, 5.0..=4.0] {
+                let surface = Surface {
+                    range,
+                    ..skin.surface("Actual", Quantity::Height, mode)
+                };
                 for size in [vec2(350.0, 540.0), vec2(70.0, 70.0), vec2(10.0, 10.0)] {
                     let mut harness = harness(size, false, |ui| {
-                        let view = skin.view(Theme::light(), Colours::Height, mode);
-                        SurfaceView {
-                            range_mm: range_mm.clone(),
-                            ..view
-                        }
-                        .show(ui, OrbitCamera::default());
+                        view(&surface, Theme::light()).show(ui, OrbitCamera::default());
                     });
                     harness.run();
                 }
@@ -181,65 +194,117 @@ fn odd_inputs_are_drawn() {
 
 #[test]
 fn nothing_is_repainted_while_nothing_changes() {
-    let skin = Skin::pressed(10, 10);
+    let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let mut harness = harness(vec2(350.0, 540.0), true, |ui| {
-        skin.view(Theme::dark(), Colours::Height, ViewMode::ThreeD)
-            .show(ui, OrbitCamera::default());
+        view(&surface, Theme::dark()).show(ui, OrbitCamera::default());
     });
     assert!(harness.run() <= 2);
 }
 
-/// Pictures to look at: `cargo test --test surface_view gallery -- --ignored`, then open `target/gallery`.
+/// Pictures to look at, on screen and in print: `cargo test --test surface_view gallery -- --ignored`, then open
+/// `target/gallery`.
 #[test]
 #[ignore = "writes pictures"]
 fn gallery() {
     std::fs::create_dir_all("target/gallery").unwrap();
-    let skins = [
-        ("10x10", Skin::pressed(10, 10), 4.0..=5.0),
-        ("10x10noise", Skin::noise(10, 10, 4.0, 5.0), 4.0..=5.0),
-        ("10x10light", Skin::lightly_pressed(10, 10), 4.0..=5.0),
-        ("10x6", Skin::pressed(10, 6), 4.0..=5.0),
-        ("1x10", Skin::pressed(1, 10), 4.0..=5.0),
-        ("2x2level", Skin::new(2, 2, |_, _, _| 4.7), 4.0..=5.0),
-        ("2x3", Skin::pressed(2, 3), 4.0..=5.0),
-        ("1x1", Skin::pressed(1, 1), 4.0..=5.0),
-        ("40x40", Skin::pressed(40, 40), 4.0..=5.0),
-        ("error", Skin::noise(10, 10, -0.2, 0.25), -0.25..=0.25),
-    ];
-    for is_dark in [true, false] {
-        let theme = theme_of(is_dark);
-        for (name, skin, range) in &skins {
-            let colours = if *name == "error" {
-                Colours::Error
-            } else {
-                Colours::Height
-            };
-            for (mode, mode_name) in [(ViewMode::ThreeD, "3d"), (ViewMode::Top, "top")] {
-                for size in [vec2(350.0, 540.0), vec2(480.0, 420.0)] {
-                    let mut harness = harness(size + vec2(ColourBar::WIDTH, 0.0), is_dark, |ui| {
-                        egui::Frame::new().fill(theme.palette.panel).show(ui, |ui| {
-                            ui.spacing_mut().item_spacing = Vec2::ZERO;
-                            ui.horizontal_top(|ui| {
-                                ui.allocate_ui(size - vec2(20.0, 20.0), |ui| {
-                                    skin.view(theme, colours, mode).show(ui, OrbitCamera::default());
-                                });
-                                let title = colours.title();
-                                ColourBar {
-                                    title,
-                                    range: range.clone(),
-                                    colours,
-                                    theme,
-                                }
-                                .show(ui, 0.6 * size.y);
-                            });
-                        });
-                    });
-                    harness.run();
-                    let theme_name = if is_dark { "dark" } else { "light" };
-                    let path = format!("target/gallery/{name}_{mode_name}_{theme_name}_{}.png", size.x);
-                    harness.render().unwrap().save(path).unwrap();
-                }
+    let turned = OrbitCamera::default().dragged(-120.0, 25.0);
+    let near = turned.zoomed(1.8).panned(0.1, 0.0);
+    for (name, figure) in [
+        (
+            "actual-decoupled",
+            shown(&Skin::pressed(10, 10), None, OrbitCamera::default()),
+        ),
+        ("actual-error-turned", shown(&Skin::pressed(10, 6), Some(23), turned)),
+        ("zoomed", shown(&Skin::pressed(10, 10), Some(45), near)),
+        (
+            "light-load",
+            shown(&Skin::lightly_pressed(10, 10), None, OrbitCamera::default()),
+        ),
+        ("sideways", shown(&Skin::sideways(10, 10), None, OrbitCamera::default())),
+        ("row", shown(&Skin::pressed(1, 10), None, OrbitCamera::default())),
+        (
+            "2x2",
+            shown(&Skin::new(2, 2, |_, _, _| 4.7), None, OrbitCamera::default()),
+        ),
+        ("1x1", shown(&Skin::pressed(1, 1), None, OrbitCamera::default())),
+        ("40x40", shown(&Skin::pressed(40, 40), None, OrbitCamera::default())),
+    ] {
+        for (mode, mode_name) in [(ViewMode::ThreeD, "3d"), (ViewMode::Top, "top")] {
+            let mut figure = figure.clone();
+            figure.surfaces.iter_mut().for_each(|surface| surface.mode = mode);
+            let path = |renderer: &str| format!("target/gallery/{name}-{mode_name}-{renderer}.png");
+            Figure::from(figure.clone())
+                .draw()
+                .save(PictureFormat::Png, path("print").as_ref())
+                .unwrap();
+            for is_dark in [true, false] {
+                let theme = theme_of(is_dark);
+                let mut harness = harness(vec2(860.0, 360.0), is_dark, |ui| {
+                    let filled = egui::Frame::new().fill(theme.palette.panel);
+                    filled.show(ui, |ui| show_figure(ui, &figure, theme));
+                });
+                harness.run();
+                let renderer = if is_dark { "dark" } else { "light" };
+                harness.render().unwrap().save(path(renderer)).unwrap();
             }
         }
     }
+}
+
+/// A skin and what a network might make of it; the error where a node is marked.
+fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> SurfaceFigure {
+    let actual = skin.surface("Actual", Quantity::Height, ViewMode::ThreeD);
+    let numbered = skin.nodes.iter().enumerate();
+    let errors = numbered.map(|(index, node)| node.with_z(0.2 * (0.7 * index as f64).sin() * (6.0 - node.z)));
+    let errors: Arc<[DVec3]> = errors.collect();
+    let values = |nodes: &[DVec3]| {
+        skin.map
+            .evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>())
+            .into()
+    };
+    let beside = if marked_node.is_some() {
+        Surface {
+            title: "Error".to_owned(),
+            values: values(&errors),
+            nodes: errors,
+            quantity: Quantity::Error,
+            range: -0.4..=0.4,
+            ..actual.clone()
+        }
+    } else {
+        let pairs = skin.nodes.iter().zip(&*errors);
+        let nodes: Arc<[DVec3]> = pairs.map(|(node, error)| node.with_z(node.z + error.z)).collect();
+        Surface {
+            title: "Decoupled".to_owned(),
+            values: values(&nodes),
+            nodes,
+            ..actual.clone()
+        }
+    };
+    SurfaceFigure {
+        surfaces: vec![actual, beside],
+        camera,
+        marked_node,
+    }
+}
+
+fn show_figure(ui: &mut egui::Ui, figure: &SurfaceFigure, theme: &Theme) {
+    ui.spacing_mut().item_spacing = Vec2::ZERO;
+    ui.horizontal_top(|ui| {
+        for surface in &figure.surfaces {
+            ui.allocate_ui(vec2(350.0, 350.0), |ui| {
+                let (label, marked_node) = (surface.title.as_str(), figure.marked_node);
+                let view = view(surface, theme);
+                SurfaceView {
+                    label,
+                    marked_node,
+                    ..view
+                }
+                .show(ui, figure.camera);
+            });
+        }
+        for scale in &figure.scales() {
+            ColourBar { scale, theme }.show(ui, 300.0);
+        }
+    });
 }

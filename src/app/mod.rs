@@ -1,53 +1,32 @@
-//! The window: state, actions, a worker thread, panels and theme.
+//! The window. Its rooms stand in this order, and each uses only those before it:
 //!
-//! Panels read [`State`] and return [`Action`]s; [`DecouplerWindow`] applies them. The worker
-//! draws samples, trains and writes files on a thread of its own and wakes the window with events, so the window
-//! never blocks and asks for no repaint while nothing changes.
+//! | room | what it holds |
+//! |---|---|
+//! | [`theme`] | colours, sizes, fonts |
+//! | `widgets` | the few components that egui lacks |
+//! | `plotting` | what all charts have in common |
+//! | [`surface_view`] | the surface plot |
+//! | `job` | background work |
+//! | `test_view`, `preview` | a test set ready to be drawn; what settings show before a training |
+//! | `training_worker` | the thread that trains |
+//! | `shared` | what all views read: settings, training on show, run list, look; and what a view may ask for |
+//! | `views` | one room each, none knows another |
+//! | `window` | lays the views out and applies what they ask for |
 
-mod action;
-mod charts;
-mod continuation;
-mod decoders;
-mod dialogs;
-mod experiments;
-mod export_kind;
-mod file_task;
-mod identifiability;
-mod open;
-mod panels;
-mod paper_figure;
-mod runs;
-mod shortcuts;
-mod shown_figure;
-mod state;
+mod job;
+mod plotting;
+mod preview;
+mod shared;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
-mod threads;
-mod trade;
+mod training_worker;
+mod views;
+mod widgets;
 mod window;
-mod worker;
 
-use crate::export::ticks;
+use crate::figure::ticks;
 
-pub use action::Action;
-pub use decoders::{DecoderResult, DecodersState};
-pub use dialogs::DialogKind;
-pub use experiments::{
-    AxisForm, AxisKind, Ending, ExperimentAction, ExperimentFile, ExperimentsState, Form, FormError, ListError,
-    Outcome, Running, SortBy, Topic,
-};
-pub use export_kind::ExportKind;
-pub use file_task::FileTask;
-pub use identifiability::{Analysis, AnalysisError, IdentifiabilityAction, IdentifiabilityState, Question};
-pub use open::{OpenError, open};
-pub use paper_figure::PaperFigure;
-pub use runs::{Compared, PLACES, RunsAction, RunsState};
-pub use shown_figure::ShownPicture;
-pub use state::{BottomTab, Frames, Look, Notice, Phase, Preview, RightCard, RunResult, RunView, Saving, State, View};
-pub use test_view::{Frame, TestView};
-pub use trade::{
-    Thoroughness, TradeAction, TradeEnding, TradeFile, TradeForm, TradeFormError, TradeLimits, TradeOutcome, TradePlan,
-    TradeRunning, TradeState, WhichPresets,
-};
-pub use window::DecouplerWindow;
+pub use shared::{Effect, Notice, Phase, Shared};
+pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeEnding, TradePlan, Views};
+pub use window::{DecouplerWindow, DialogKind, OpenError, open};

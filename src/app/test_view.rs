@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::DVec3;
 use ndarray::ArrayView2;
@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::{
     dataset::Dataset,
     evaluation::{NodeAddress, Outlook, RunError, SimulatedSettings},
+    figure::surface::{Quantity, Surface, ViewMode},
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
@@ -65,7 +66,7 @@ impl TestView {
     }
 
     /// z from full compression to rest, in millimetres: what the height scale spans.
-    pub fn z_range_mm(&self) -> std::ops::RangeInclusive<f64> {
+    pub fn z_range_mm(&self) -> RangeInclusive<f64> {
         let height_mm = self.sensor.geometry.height_mm;
         height_mm - self.stroke_mm..=height_mm
     }
@@ -86,10 +87,32 @@ impl TestView {
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
         let coordinates = samples.iter().flat_map(|&sample| coordinates_mm.row(sample).to_vec());
         let coordinates: Vec<f64> = coordinates.collect();
-        let nodes_mm: Vec<DVec3> = coordinates.chunks_exact(3).map(DVec3::from_slice).collect();
+        let nodes_mm: Arc<[DVec3]> = coordinates.chunks_exact(3).map(DVec3::from_slice).collect();
         let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
-        let grid_mm = self.surface.evaluate(&z_mm);
+        let grid_mm = self.surface.evaluate(&z_mm).into();
         Frame { nodes_mm, grid_mm }
+    }
+
+    /// The surface of heights.
+    pub fn heights(&self, title: impl Into<String>, frame: &Frame, mode: ViewMode) -> Surface {
+        Surface {
+            quantity: Quantity::Height,
+            range: self.z_range_mm(),
+            ..self.errors(title, frame, mode)
+        }
+    }
+
+    /// The surface of errors of z.
+    pub fn errors(&self, title: impl Into<String>, frame: &Frame, mode: ViewMode) -> Surface {
+        Surface {
+            title: title.into(),
+            map: Arc::clone(&self.surface),
+            values: Arc::clone(&frame.grid_mm),
+            nodes: Arc::clone(&frame.nodes_mm),
+            quantity: Quantity::Error,
+            range: frame.symmetric_range_mm(),
+            mode,
+        }
     }
 }
 
@@ -126,7 +149,30 @@ pub enum TestViewError {
 #[derive(Clone, Debug, Default)]
 pub struct Frame {
     /// Position of each node, row by row.
-    pub nodes_mm: Vec<DVec3>,
+    pub nodes_mm: Arc<[DVec3]>,
     /// Value at each grid point of the surface.
-    pub grid_mm: Vec<f64>,
+    pub grid_mm: Arc<[f64]>,
+}
+
+impl Frame {
+    /// `decoupled` − this one: z of the nodes and of the grid.
+    pub fn error_of(&self, decoupled: &Self) -> Self {
+        let nodes = self.nodes_mm.iter().zip(decoupled.nodes_mm.iter());
+        let grid = self.grid_mm.iter().zip(decoupled.grid_mm.iter());
+        Self {
+            nodes_mm: nodes
+                .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
+                .collect(),
+            grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
+        }
+    }
+
+    /// ± the largest z of a node, so that zero keeps its colour.
+    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
+        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
+        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
+        // Nothing finer than a nanometre is told apart.
+        let largest = largest.max(1e-6);
+        -largest..=largest
+    }
 }

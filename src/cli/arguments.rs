@@ -11,6 +11,7 @@ use super::{
     decode::Decode, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate, trade::Trade,
     train::Train,
 };
+use crate::export::exit_leaving_nothing;
 
 /// Opens the window and returns when it is closed.
 pub type Window = fn() -> Result<(), Box<dyn Error>>;
@@ -71,7 +72,11 @@ impl Arguments {
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),
-            None => window.ok_or(Failure::NoWindow)?().map_err(Failure::Window),
+            None => {
+                window.ok_or(Failure::NoWindow)?().map_err(Failure::Window)?;
+                // A file that took too long to be written is not left half-written.
+                exit_leaving_nothing(0)
+            }
         }
     }
 }

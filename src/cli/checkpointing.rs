@@ -9,7 +9,7 @@ use clap::Args;
 use super::failure::Failure;
 use crate::{
     evaluation::Run,
-    export::{CheckpointFile, CheckpointFileError},
+    export::{CheckpointFile, DocumentError},
 };
 
 /// Saving takes at most one part in this many of the time.
@@ -23,7 +23,7 @@ pub(super) struct CheckpointArguments {
     /// Resume the training saved in --checkpoint, with bit-identical results
     ///
     /// All settings come from the file. --epochs, --goal, --max-fail and --min-gradient change when to stop; another
-    /// --method (or --set) goes on from the present weights with that method. All other arguments must be as in
+    /// --method (or --set) continues from the present weights with that method. All other arguments must be as in
     /// the file.
     #[arg(long, requires = "checkpoint")]
     pub(super) resume: bool,
@@ -54,7 +54,7 @@ impl CheckpointArguments {
         if !self.resume && path.symlink_metadata().is_ok() {
             let path = path.display();
             return Err(Failure::Arguments(format!(
-                "--checkpoint '{path}' exists: add --resume to go on from it, or give another name"
+                "--checkpoint '{path}' exists: add --resume to resume it, or give another name"
             )));
         }
         Ok(Some(Checkpointing {
@@ -78,12 +78,12 @@ impl Checkpointing {
         {
             self.has_warned = true;
             // Nobody is left to tell if this fails.
-            let _ = writeln!(stderr(), "warning: {error}; the training goes on");
+            let _ = writeln!(stderr(), "warning: {error}; training continues");
         }
         self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());
     }
 
-    pub(super) fn save(&self, run: &Run) -> Result<(), CheckpointFileError> {
+    pub(super) fn save(&self, run: &Run) -> Result<(), DocumentError> {
         CheckpointFile::from_run(run)?.save(&self.path)
     }
 }

@@ -20,12 +20,12 @@ const BLOCK: usize = 1024;
 
 /// Decouple the resistances of a CSV file with a saved network
 ///
-/// The input has columns named r_1, r_2, … (one for each column-wire, in ohm), in any order and among others, or just
-/// as many columns without names. Each line is one row-wire. For networks of known rows a column named row has its
+/// The input has columns named r_1, r_2, … (one for each column-wire, in ohm), in any order and among others, or exactly
+/// as many unnamed columns. Each line is one row-wire. For networks of known rows a column named row has its
 /// number from 1; without one, lines are whole snapshots from the first row to the last. The output has a line x_1, y_1, z_1, x_2, … in mm for
 /// each line of the input, then readings_outside, the number of its readings that are outside the range seen in training
 /// by more than a tenth of that, and coordinates_outside, the number of coordinates that are outside by more than all of
-/// it; such lines are warned of.
+/// it; a warning names such lines.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window

@@ -10,8 +10,8 @@ use thiserror::Error;
 use super::interruption;
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
-    evaluation::{RunError, experiments::ExperimentError},
-    export::{CheckpointFileError, NetworkFileError, WriteError, figures::PictureError},
+    evaluation::{Preset, RunError, experiments::ExperimentError},
+    export::{DocumentError, WriteError, figures::PictureError},
     scene::Rows,
     training::SettingError,
 };
@@ -30,9 +30,7 @@ pub(super) enum Failure {
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     #[error(transparent)]
-    Network(#[from] NetworkFileError),
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointFileError),
+    Document(#[from] DocumentError),
     #[error("'{}': {source}", .path.display())]
     Resume { path: PathBuf, source: RunError },
     #[error("{0}")]
@@ -41,21 +39,27 @@ pub(super) enum Failure {
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
+    #[error("noise {noise}, preset {preset}: {cause}; only what was measured before is printed")]
+    TradeLevel {
+        noise: f64,
+        preset: Preset,
+        cause: Box<Failure>,
+    },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
-    #[error(transparent)]
-    Picture(#[from] PictureError),
+    #[error("{}", joined(.0))]
+    Files(Vec<PictureError>),
     #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: it is of row {row}, but the network reads row {rows} only", .path.display())]
+    #[error("'{}': line {line}: it belongs to row {row}, but the network reads only row {rows}", .path.display())]
     OtherRow {
         path: PathBuf,
         line: u64,
@@ -64,7 +68,7 @@ pub(super) enum Failure {
     },
     #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
     PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
-    #[error("'{}': line {line}: resistances so far from the training range that the network has no answer", .path.display())]
+    #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
 }
 
@@ -81,10 +85,15 @@ impl fmt::Display for Interruption {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "interrupted after epoch {}; ", self.epoch)?;
         match &self.resume {
-            Some(command) => write!(f, "to go on: {command}"),
-            None => write!(f, "with --checkpoint FILE it could go on from here"),
+            Some(command) => write!(f, "to resume: {command}"),
+            None => write!(f, "with --checkpoint FILE it could be resumed from here"),
         }
     }
+}
+
+fn joined(errors: &[PictureError]) -> String {
+    let told: Vec<_> = errors.iter().map(ToString::to_string).collect();
+    told.join("; ")
 }
 
 impl From<SettingError> for Failure {

@@ -20,7 +20,7 @@ pub(super) fn install() {
     let _ = ctrlc::try_set_handler(|| {
         // Nobody is left to tell if writing fails.
         if GRACEFUL.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
-            let _ = writeln!(stderr(), "stopping after this epoch; Ctrl-C again ends at once");
+            let _ = writeln!(stderr(), "stopping after this epoch; press Ctrl-C again to end at once");
             return;
         }
         let _ = writeln!(stderr(), "interrupted");

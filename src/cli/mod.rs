@@ -9,6 +9,7 @@ mod checkpointing;
 mod decode;
 mod failure;
 mod interruption;
+mod output;
 mod outside_training;
 mod parsers;
 mod reproduce;

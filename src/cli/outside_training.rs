@@ -5,7 +5,7 @@ use crate::network::DecouplingNetwork;
 /// Lines that are told one by one; a damaged file may have thousands.
 const MOST_TOLD: usize = 10;
 
-/// Lines with readings or coordinates outside the range seen in training, where a network only guesses.
+/// Lines with readings or coordinates outside the range seen in training, where a network extrapolates.
 #[derive(Default)]
 pub(super) struct OutsideTraining {
     lines: usize,
@@ -74,9 +74,9 @@ impl OutsideTraining {
         }
         let _ = writeln!(
             stderr,
-            "warning: {outside} of {lines} lines are outside the range seen in training, where the network only \
-             guesses; the last two columns have the numbers of such readings and coordinates: check these readings, or \
-             train with a scene that has them"
+            "warning: {outside} of {lines} lines are outside the range seen in training, where the network \
+             extrapolates; the last two columns count such readings and coordinates: check these readings, or train with \
+             a scene that covers them"
         );
     }
 }

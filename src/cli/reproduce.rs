@@ -1,15 +1,16 @@
 use std::{
     fs,
+    io::Write,
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
     failure::Failure,
     interruption::Graceful,
+    output::progress_bar,
     parsers::{count, seed},
     reproduce_report::{Reproduced, print_json, print_text},
 };
@@ -20,16 +21,17 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        atomic_write, check_writable, describe_conditions, draw_experiment,
+        atomic_write, check_writable, describe_conditions,
         figures::{PictureError, PictureFormat},
         format_duration, write_cells, write_experiment_markdown, write_trials,
     },
+    figure::experiment_figure,
     network::LARGEST_HIDDEN,
     sensor::ArrayScale,
     training::StoppingRules,
 };
 
-/// Redo the paper's tables beside the published figures
+/// Reproduce the paper's tables beside the published figures
 ///
 /// Runs every cell with several seeds on all cores and prints the published error beside the median, least and largest
 /// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
@@ -37,18 +39,18 @@ use crate::{
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Reproduce {
-    /// Table to redo
+    /// Table to reproduce
     #[arg(long, default_value = "all")]
     table: Tables,
-    /// Seeds in succession for each cell
+    /// Number of consecutive seeds for each cell
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
     seeds: usize,
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Most epochs", |experiment| experiment.base.training.stopping.epochs))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Maximum number of epochs", |experiment| experiment.base.training.stopping.epochs))]
     epochs: Option<usize>,
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Starts of each network; the best by validation error counts", |experiment| experiment.base.starts))]
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Restarts of each network; the best by validation error is kept", |experiment| experiment.base.starts))]
     starts: Option<usize>,
     /// Hidden nodes of Table 1 [default: 6,8,10,12,14,16]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = count(1..=LARGEST_HIDDEN))]
@@ -57,13 +59,13 @@ pub(super) struct Reproduce {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     arrays: Vec<ArrayScale>,
     /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, so that no training sample
-    /// is of the same moment as a test sample
+    /// is from the same moment as a test sample
     #[arg(long, value_enum, default_value = "sample")]
     folds: Unit,
     /// Number of folds of Table 2
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
     k: usize,
-    /// Times that the samples of Table 2 are shuffled into new folds, for each seed
+    /// Shuffles of the samples of Table 2 into new folds, for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
     /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; created if missing
@@ -113,7 +115,12 @@ impl Reproduce {
             .flat_map(|results| &results.cells)
             .map(|cell| cell.expected)
             .sum();
-        let bar = self.progress_bar(trials);
+        let bar = progress_bar(
+            self.json,
+            trials,
+            "{bar:30} {pos} of {len} trials, {elapsed} elapsed, {msg}",
+        );
+        bar.set_message("estimating the time left");
         let graceful = Graceful::begin();
         let mut done = 0;
         run_experiments(
@@ -141,16 +148,17 @@ impl Reproduce {
             })
             .collect();
         // Whatever fails here, the figures are printed.
-        let written = match &self.out {
-            Some(folder) => reproduced.iter().try_for_each(|table| write_files(folder, table)),
-            None => Ok(()),
-        };
+        let folder = self.out.iter();
+        let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
+        let unwritten: Vec<PictureError> = written.filter_map(Result::err).collect();
         if self.json {
             print_json(&reproduced, begun.elapsed())?;
         } else {
             print_text(&reproduced, begun.elapsed())?;
         }
-        written?;
+        if !unwritten.is_empty() {
+            return Err(Failure::Files(unwritten));
+        }
         if done < trials {
             return Err(Failure::InterruptedTrials { done, trials });
         }
@@ -191,18 +199,6 @@ impl Reproduce {
         }
         experiment
     }
-
-    fn progress_bar(&self, trials: usize) -> ProgressBar {
-        if self.json {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::new(trials as u64);
-        let style = ProgressStyle::with_template("{bar:30} {pos} of {len} trials, {elapsed} gone, {msg}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message("the time left is not known yet");
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
-    }
 }
 
 /// Paths of the files of a table: its cells, its trials, the table in Markdown, and the figure as SVG and PNG.
@@ -228,20 +224,23 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
 }
 
-fn write_files(folder: &Path, reproduced: &Reproduced) -> Result<(), PictureError> {
+/// Writes every file of a table, whatever becomes of the others.
+fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureError>; 5] {
     let Reproduced {
         table,
         results,
         verdicts,
     } = reproduced;
     let [cells, trials, markdown, svg, png] = files(folder, *table);
-    atomic_write(&cells, |writer| write_cells(results, writer))?;
-    atomic_write(&trials, |writer| write_trials(results, writer))?;
-    atomic_write(&markdown, |writer| {
-        let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
-        write_experiment_markdown(&title, &conditions, results, verdicts, writer)
-    })?;
-    let picture = draw_experiment(results);
-    picture.save(PictureFormat::Svg, &svg)?;
-    picture.save(PictureFormat::Png, &png)
+    let picture = experiment_figure(results).draw();
+    let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
+    let write_markdown =
+        |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);
+    [
+        atomic_write(&cells, |writer| write_cells(results, writer)).map_err(PictureError::from),
+        atomic_write(&trials, |writer| write_trials(results, writer)).map_err(PictureError::from),
+        atomic_write(&markdown, write_markdown).map_err(PictureError::from),
+        picture.save(PictureFormat::Svg, &svg),
+        picture.save(PictureFormat::Png, &png),
+    ]
 }

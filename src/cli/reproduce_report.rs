@@ -1,11 +1,14 @@
 use std::{
-    io::{self, Write, stdout},
+    io::{self, Write},
     time::Duration,
 };
 
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::{
+    failure::Failure,
+    output::{print, print_object},
+};
 use crate::{
     evaluation::{
         CrossValidation,
@@ -71,16 +74,12 @@ pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<()
         is_complete: reproduced.iter().all(|table| table.results.is_complete()),
         tables: reproduced.iter().map(table).collect(),
     };
-    let mut output = stdout().lock();
-    let written = serde_json::to_writer(&mut output, &report)
-        .map_err(io::Error::from)
-        .and_then(|()| writeln!(output));
-    written.map_err(Failure::Output)
+    print_object(&report)
 }
 
 /// Prints each table with its conditions and verdicts.
 pub(super) fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
-    write_text(reproduced, took, &mut stdout().lock()).map_err(Failure::Output)
+    print(|output| write_text(reproduced, took, output))
 }
 
 fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -> io::Result<()> {

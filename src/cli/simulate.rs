@@ -93,7 +93,7 @@ impl Simulate {
         let kind = match self.scene.decoder[..] {
             [] => return Ok(None),
             [kind] => kind,
-            _ => return Err(Failure::Arguments("--decoder: give one here".to_owned())),
+            _ => return Err(Failure::Arguments("--decoder: give only one here".to_owned())),
         };
         let networks = if kind.needs_network() {
             announce(settings)?;

@@ -1,18 +1,16 @@
-use std::time::Duration;
-
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
     failure::Failure,
     interruption::Graceful,
+    output::progress_bar,
     parsers::{count, number, seed},
     scene_arguments::SceneArguments,
     trade_report::{Limits, print_json, print_text},
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Preset, SimulatedSettings, TradeLevel, measure_trade},
+    evaluation::{Preset, SimulatedSettings, TradeLevel, TradePoint, measure_trade},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::StoppingRules,
@@ -46,10 +44,10 @@ pub(super) struct Trade {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    /// Also tell the fastest decoder whose Z error is at most this many percent
+    /// Also print the fastest decoder whose Z error is at most this many percent
     #[arg(long, value_name = "PERCENT", value_parser = number)]
     under_percent: Option<f64>,
-    /// Also tell the most accurate decoder that takes at most this many microseconds for a frame
+    /// Also print the most accurate decoder that takes at most this many microseconds for a frame
     #[arg(long, value_name = "US", value_parser = number)]
     under_us: Option<f64>,
     /// Print one JSON object instead of text and progress
@@ -68,35 +66,36 @@ impl Trade {
             None => Preset::ALL.to_vec(),
         };
         let decoders = self.scene.decoders();
-        let bar = self.progress_bar(noises.len() * presets.len());
+        let bar = progress_bar(
+            self.json,
+            noises.len() * presets.len(),
+            "{bar:30} {pos} of {len}, {msg}, {elapsed}",
+        );
         let graceful = Graceful::begin();
-        let mut levels = Vec::new();
-        let mut is_whole = true;
-        for &noise in &noises {
-            let mut points = Vec::new();
-            for &preset in &presets {
-                let settings = self.settings(preset, noise)?;
-                let is_cancelled = || graceful.is_end_requested();
-                is_whole &= measure_trade(preset, &settings, &self.hidden, &decoders, is_cancelled, |point| {
-                    bar.set_message(format!("{preset}, {}", point.report.name()));
-                    points.push(point);
-                })?;
-                bar.inc(1);
-            }
-            levels.push(TradeLevel { noise, points });
-        }
+        let (levels, end) = measure_levels(&noises, &presets, |noise, preset, points| {
+            let settings = self.settings(preset, noise)?;
+            let is_cancelled = || graceful.is_end_requested();
+            let is_whole = measure_trade(preset, &settings, &self.hidden, &decoders, is_cancelled, |point| {
+                bar.set_message(format!("{preset}, {}", point.report.name()));
+                points.push(point);
+            })?;
+            bar.inc(1);
+            Ok(is_whole)
+        });
         bar.finish_and_clear();
         drop(graceful);
         let limits = Limits {
             percent: self.under_percent,
             microseconds: self.under_us,
         };
-        if self.json {
-            print_json(self.array, &levels, limits)?;
-        } else {
-            print_text(self.array, &levels, limits)?;
+        if end.is_ok() || !levels.is_empty() {
+            if self.json {
+                print_json(self.array, &levels, limits)?;
+            } else {
+                print_text(self.array, &levels, limits)?;
+            }
         }
-        if is_whole {
+        if end? {
             return Ok(());
         }
         let done = levels.iter().map(|level| level.points.len()).sum();
@@ -113,15 +112,80 @@ impl Trade {
         stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
         Ok(settings)
     }
+}
 
-    fn progress_bar(&self, parts: usize) -> ProgressBar {
-        if self.json {
-            return ProgressBar::hidden();
+/// Measures every preset at every level of noise, up to the first that fails. Returns the levels that have points, and
+/// whether all were measured to their end.
+fn measure_levels(
+    noises: &[f64],
+    presets: &[Preset],
+    mut measure: impl FnMut(f64, Preset, &mut Vec<TradePoint>) -> Result<bool, Failure>,
+) -> (Vec<TradeLevel>, Result<bool, Failure>) {
+    let mut levels: Vec<TradeLevel> = Vec::new();
+    let mut is_whole = true;
+    for &noise in noises {
+        let mut points = Vec::new();
+        let measured = presets.iter().try_for_each(|&preset| {
+            is_whole &= measure(noise, preset, &mut points).map_err(|cause| (preset, cause))?;
+            Ok(())
+        });
+        if !points.is_empty() {
+            levels.push(TradeLevel { noise, points });
         }
-        let bar = ProgressBar::new(parts as u64);
-        let style = ProgressStyle::with_template("{bar:30} {pos} of {len}, {msg}, {elapsed}");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
+        match measured {
+            Ok(()) => {}
+            // Nothing is lost that would need words.
+            Err((_, cause)) if levels.is_empty() => return (levels, Err(cause)),
+            Err((preset, cause)) => {
+                let cause = Box::new(cause);
+                return (levels, Err(Failure::TradeLevel { noise, preset, cause }));
+            }
+        }
+    }
+    (levels, Ok(is_whole))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decoupling::DecoderKind;
+
+    #[test]
+    fn what_was_measured_before_a_failure_is_kept_and_the_failure_names_its_place() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
+        (settings.source.samples, settings.source.test_samples) = (8, 4);
+        let noises = [0.0, 0.01, 0.1];
+        let measure_until = |fails_at: (f64, Preset)| {
+            measure_levels(&noises, &Preset::ALL, |noise, preset, points| {
+                if (noise, preset) == fails_at {
+                    return Err(Failure::Arguments("too wide".to_owned()));
+                }
+                let keep = |point| points.push(point);
+                Ok(measure_trade(
+                    preset,
+                    &settings,
+                    &[],
+                    &[DecoderKind::Mean],
+                    || false,
+                    keep,
+                )?)
+            })
+        };
+        for (place, preset) in Preset::ALL.into_iter().enumerate() {
+            let (levels, end) = measure_until((0.01, preset));
+            let points: Vec<_> = levels.iter().map(|level| (level.noise, level.points.len())).collect();
+            assert_eq!(points, [(0.0, 2), (0.01, place)][..1 + place]);
+            let failure = end.unwrap_err();
+            assert_eq!(failure.status(), 1);
+            let message = failure.to_string();
+            let expected = format!("noise 0.01, preset {preset}: too wide");
+            assert!(message.starts_with(&expected), "{message}");
+        }
+        let (levels, end) = measure_until((0.0, Preset::ALL[0]));
+        assert!(levels.is_empty());
+        assert_eq!(end.unwrap_err().status(), 2, "an argument is wrong and nothing is lost");
+        let (levels, end) = measure_until((1.0, Preset::ALL[0]));
+        assert_eq!((levels.len(), end.unwrap()), (3, true));
     }
 }

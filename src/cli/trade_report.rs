@@ -1,11 +1,14 @@
 use std::{
-    io::{self, Write, stdout},
+    io::{self, Write},
     time::Duration,
 };
 
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::{
+    failure::Failure,
+    output::{print, print_object},
+};
 use crate::{
     decoupling::Precision,
     evaluation::{SimulatedSettings, TradeCost, TradeLevel, TradePoint, fastest_under, most_accurate_under},
@@ -164,16 +167,12 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeLevel], limits: Limit
         array,
         levels: levels.iter().map(level).collect(),
     };
-    let mut output = stdout().lock();
-    let written = serde_json::to_writer(&mut output, &report)
-        .map_err(io::Error::from)
-        .and_then(|()| writeln!(output));
-    written.map_err(Failure::Output)
+    print_object(&report)
 }
 
 /// Prints a table for each level of noise.
 pub(super) fn print_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits) -> Result<(), Failure> {
-    write_text(array, levels, limits, &mut stdout().lock()).map_err(Failure::Output)
+    print(|output| write_text(array, levels, limits, output))
 }
 
 fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mut impl Write) -> io::Result<()> {
@@ -187,7 +186,7 @@ fn write_text(array: ArrayScale, levels: &[TradeLevel], limits: Limits, out: &mu
     writeln!(
         out,
         "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
-         Training is the time of all rows together, as if one after another."
+         Training time is the sum over all rows and restarts."
     )
 }
 

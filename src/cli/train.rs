@@ -1,32 +1,32 @@
 use std::{
     io::{Write, stderr},
     path::{Path, PathBuf},
-    time::Duration,
 };
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::{
     announcement::announce,
     checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     interruption::Graceful,
+    output::progress_bar,
     same_file::is_same,
     train_report::{print_json, print_text},
     training_arguments::TrainingArguments,
 };
 use crate::{
-    evaluation::{DecoderReport, DecoderSet, Run},
+    evaluation::{DecoderReport, DecoderSet, Run, RunError},
     export::{CheckpointFile, NetworkFile, check_writable, format_number},
 };
 
-/// Train a network and print what it is worth
+/// Train a network and print its errors
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
-/// set, with the best linear map, with other decoders, with what is possible at all in the scene (the reference), and
+/// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
 /// with the published figures where there are any. Ctrl-C stops after the epoch,
-/// keeps what there is, and ends with status 130; a second Ctrl-C ends at once.
+/// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
@@ -72,20 +72,18 @@ impl Train {
         let file = NetworkFile::from_run(&run)?;
         // Whatever fails now, the figures are printed.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
-        let is_interrupted = matches!(end, Err(Failure::Interrupted(_)));
-        let decoders = if is_interrupted {
-            Ok(Vec::new())
-        } else {
-            self.measure_decoders(&file, &run)
+        let mut decoders = Vec::new();
+        let measured = match end {
+            Err(Failure::Interrupted(_)) => Ok(()),
+            _ => self.measure_decoders(&file, &run, &mut decoders),
         };
         let flaw = run.flaw();
-        let measured = decoders.as_deref().unwrap_or_default();
         if self.json {
-            print_json(&file, flaw.as_ref(), measured)?;
+            print_json(&file, flaw.as_ref(), &decoders)?;
         } else {
-            print_text(&file, flaw.as_ref(), measured)?;
+            print_text(&file, flaw.as_ref(), &decoders)?;
         }
-        decoders?;
+        measured?;
         match (saved, end) {
             (Err(unsaved), Err(end)) => {
                 // Nobody is left to tell if this fails.
@@ -96,15 +94,19 @@ impl Train {
         }
     }
 
-    fn measure_decoders(&self, file: &NetworkFile, run: &Run) -> Result<Vec<DecoderReport>, Failure> {
+    fn measure_decoders(
+        &self,
+        file: &NetworkFile,
+        run: &Run,
+        reports: &mut Vec<DecoderReport>,
+    ) -> Result<(), RunError> {
         let set = DecoderSet::new(&file.settings, Some(file.network.clone()))?;
-        let mut reports = Vec::new();
         for kind in self.training.scene.decoders() {
             for &precision in kind.precisions() {
                 reports.extend(set.measure(kind, precision, run.test())?);
             }
         }
-        Ok(reports)
+        Ok(())
     }
 
     fn resume(&self, path: &Path) -> Result<Run, Failure> {
@@ -122,7 +124,7 @@ impl Train {
             if run.stop_reason().is_some() {
                 let epochs = training.stopping.epochs;
                 return Err(Failure::Arguments(format!(
-                    "all {epochs} epochs of the checkpoint are run: give more with --epochs to go on with another method"
+                    "the checkpoint has run all of its {epochs} epochs: give more with --epochs to continue with another method"
                 )));
             }
         }
@@ -132,7 +134,14 @@ impl Train {
     /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
     /// terminal.
     fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
-        let bar = self.progress_bar(run);
+        let bar = progress_bar(
+            self.json,
+            run.settings().training.stopping.epochs,
+            "{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left",
+        );
+        bar.set_position(furthest(run) as u64);
+        // The time left is reckoned from the epochs of this session only.
+        bar.reset_eta();
         let graceful = Graceful::begin();
         let mut checkpointing = checkpointing;
         while run.stop_reason().is_none() && !graceful.is_end_requested() {
@@ -161,20 +170,6 @@ impl Train {
             return Err(Failure::Interrupted(Interruption { epoch, resume }));
         }
         Ok(())
-    }
-
-    fn progress_bar(&self, run: &Run) -> ProgressBar {
-        if self.json {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::new(run.settings().training.stopping.epochs as u64);
-        let style = ProgressStyle::with_template("{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_position(furthest(run) as u64);
-        // The time left is reckoned from the epochs of this session only.
-        bar.reset_eta();
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
     }
 
     /// Command that resumes the training.

@@ -1,12 +1,16 @@
 use std::{
     collections::BTreeMap,
-    io::{self, Write, stdout},
+    io::{self, Write},
     time::Duration,
 };
 
 use serde::Serialize;
 
-use super::{failure::Failure, spread_plot::write_starts};
+use super::{
+    failure::Failure,
+    output::{print, print_object},
+    spread_plot::write_starts,
+};
 use crate::{
     evaluation::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
@@ -155,11 +159,7 @@ pub(super) fn print_json(
             z_mm: errors.z_mm,
         }),
     };
-    let mut output = stdout().lock();
-    let written = serde_json::to_writer(&mut output, &report)
-        .map_err(io::Error::from)
-        .and_then(|()| writeln!(output));
-    written.map_err(Failure::Output)
+    print_object(&report)
 }
 
 fn decoder(report: &DecoderReport) -> Decoder {
@@ -204,7 +204,7 @@ pub(super) fn print_text(
     flaw: Option<&RunFlaw>,
     decoders: &[DecoderReport],
 ) -> Result<(), Failure> {
-    write_text(file, flaw, decoders, &mut stdout().lock()).map_err(Failure::Output)
+    print(|output| write_text(file, flaw, decoders, output))
 }
 
 fn write_text(
@@ -270,7 +270,7 @@ fn write_text(
     write_decoders(decoders, reference, out)?;
     writeln!(
         out,
-        "\nErrors in % are means of the coordinate, as in the paper; of the stroke where said so."
+        "\nErrors in % are relative to the coordinate, as in the paper, or to the stroke where stated."
     )?;
     for note in scale.note().iter().map(String::as_str).chain([Geometry::ASSUMPTION]) {
         writeln!(out, "{note}")?;
@@ -361,7 +361,7 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     }
     writeln!(
         out,
-        "The residual is the relative difference (rms) of the readings from those of the answer: it needs no ground truth."
+        "The residual is the rms relative difference between the readings and those of the decoded deformation; it needs no actual one."
     )
 }
 

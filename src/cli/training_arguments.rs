@@ -27,7 +27,7 @@ pub(super) struct TrainingArguments {
     /// Hidden nodes [default: 12]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
-    /// Trainings from different random weights, side by side; the best one by validation error is kept [default: 1]
+    /// Restarts from different random weights, trained side by side; the best by validation error is kept [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
     starts: Option<usize>,
     /// Training method [default: lm]
@@ -92,8 +92,8 @@ impl TrainingArguments {
     pub(super) fn training_from(&self, saved: &SimulatedSettings) -> Result<TrainingSettings, Failure> {
         let same = |argument: &str, given: Option<String>, saved: String| match given {
             Some(given) if given != saved => Err(Failure::Arguments(format!(
-                "--{argument} {given}: the checkpoint has {saved}; leave it out to go on, or begin anew with another \
-                 --checkpoint"
+                "--{argument} {given}: the checkpoint has {saved}; leave it out to resume, or start a new training \
+                 with another --checkpoint"
             ))),
             _ => Ok(()),
         };
@@ -102,8 +102,8 @@ impl TrainingArguments {
         };
         if let Some(what) = self.scene.difference(saved)? {
             return Err(Failure::Arguments(format!(
-                "the checkpoint has another choice of {what}: leave it out to go on, or begin anew with another \
-                 --checkpoint"
+                "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
+                 with another --checkpoint"
             )));
         }
         let scale = saved.source.sensor.scale;
@@ -181,7 +181,7 @@ fn settings_help() -> String {
         format!("{} has {list}", method.short_name())
     };
     let methods = Method::all().map(of).join("; ");
-    format!("Change a setting of the method, as often as you like: {methods}")
+    format!("Change a setting of the method; may be repeated: {methods}")
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use thiserror::Error;
 use super::Errors;
 use crate::decoupling::Precision;
 
-/// Why a decoder has no figures, or no residual.
+/// Reasons for which a decoder has no figures, or no residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MissingFigures {

@@ -2,7 +2,7 @@ use std::fmt;
 
 use super::Baselines;
 
-/// Why the Bayesian reference of an error table is no bound for decoders.
+/// Reasons for which the Bayesian reference of an error table is no bound for decoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReferenceNote {

@@ -1,23 +1,19 @@
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, RunError, RunFlaw, RunSettings, SimulatedSettings, StartRecord, StartTrainer, TargetErrors,
-    TargetRow,
-    baselines::fit_baselines,
-    reference_errors,
-    sets::check_sets,
+    Baselines, Errors, RunError, RunFlaw, RunSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
     starts::lowest,
-    task::{Task, tasks},
-    workload::Workload,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Split, Stream},
-    decoupling::decode_set,
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, nguyen_widrow},
-    training::{Method, ResumeError, SettingError, StopReason, StoppingRules, Trainer, TrainerState, check_width},
+    dataset::{Dataset, PerRow},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
+    training::{Method, SettingError, StopReason, StoppingRules, TrainerState, check_width},
 };
 
 /// A run: its sets of samples, one training per restart, and the errors of the best network.
@@ -26,14 +22,16 @@ use crate::{
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
 /// never decides.
 pub struct Run {
-    settings: RunSettings,
-    test: Arc<Dataset>,
-    scalings: PerRow<(Inputs, MinMax)>,
-    starts: Vec<StartTrainer>,
+    pub(super) settings: RunSettings,
+    pub(super) test: Arc<Dataset>,
+    pub(super) scalings: PerRow<(Inputs, MinMax)>,
+    pub(super) starts: Vec<StartTrainer>,
+    /// See [`Self::wall_time`].
+    pub(super) wall_time: Option<Duration>,
     /// Errors of the training mean and of the linear map, target by target.
-    target_baselines: [TargetRow; 2],
+    pub(super) target_baselines: [TargetRow; 2],
     /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
-    baselines: Option<Baselines>,
+    pub(super) baselines: Option<Baselines>,
 }
 
 /// Errors of networks and baselines on the nodes of a test set.
@@ -46,119 +44,6 @@ pub struct NodeScores {
 }
 
 impl Run {
-    /// Draws and scales the sets, initialises the networks and measures the baselines.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
-        Workload::of(&settings)?.check_memory()?;
-        let (split, test) = settings.draw()?;
-        Self::on_sets(settings.into(), split, test)
-    }
-
-    /// Prepares a run on existing sets, measured or from a cross-validation; see [`Self::prepare`].
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the sets do not belong together.
-    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        Self::with_sets(settings, split, test, |tasks| {
-            let starts = (0..settings.starts).into_par_iter().map(|number| {
-                let mut rng = settings.seed.start_rng(number);
-                let begun: Vec<_> = tasks
-                    .iter()
-                    .map(|task| (task, nguyen_widrow(task.shape, &mut rng)))
-                    .collect();
-                let rows = begun
-                    .into_par_iter()
-                    .map(|(task, start)| Trainer::new(start, task.problem.clone(), settings.training));
-                Ok(StartTrainer::new(rows.collect::<Result<_, _>>()?))
-            });
-            starts.collect()
-        })
-    }
-
-    /// Resumes a run of these settings from the states of all its trainings.
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the states are damaged or from another run.
-    pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        settings.check_counts()?;
-        check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
-        let (split, test) = settings.draw()?;
-        Self::resume_on_sets(settings.into(), states, split, test)
-    }
-
-    /// Resumes a run on the sets it was started on; see [`Self::resume`].
-    ///
-    /// # Errors
-    /// As [`Self::on_sets`], or if the states are damaged or do not match these settings and sets.
-    pub fn resume_on_sets(
-        settings: RunSettings,
-        states: Vec<TrainerState>,
-        split: Split,
-        test: Dataset,
-    ) -> Result<Self, RunError> {
-        Self::with_sets(settings, split, test, |tasks| {
-            let networks = tasks.len();
-            check_states(&states, settings.starts * networks)?;
-            let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
-                let (start, task) = (number / networks, &tasks[number % networks]);
-                let refused = |source| RunError::Resume { start, source };
-                let trainer = Trainer::resume(state, task.problem.clone()).map_err(refused)?;
-                if trainer.present().shape() != task.shape {
-                    return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
-                }
-                Ok(trainer)
-            });
-            let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
-            let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
-            Ok(starts.collect())
-        })
-    }
-
-    fn with_sets(
-        settings: RunSettings,
-        split: Split,
-        test: Dataset,
-        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
-    ) -> Result<Self, RunError> {
-        settings.check_network()?;
-        check_sets(&settings, &split, &test)?;
-        let (mut mean, mut linear) = fit_baselines(&split.training, &settings)?;
-        let (mean, linear) = (decode_set(&mut mean, &test)?, decode_set(&mut linear, &test)?);
-        let baselines = match settings.simulated() {
-            Some(simulated) => {
-                let errors = |answers| Errors::measure(&test, answers, simulated.source.stroke_mm());
-                Some(Baselines {
-                    mean: errors(&mean),
-                    linear: errors(&linear),
-                    reference: reference(&simulated, &test)?,
-                })
-            }
-            None => None,
-        };
-        let target_baselines = [("training mean", &mean), ("linear map", &linear)].map(|(name, answers)| TargetRow {
-            name,
-            targets: TargetErrors::measure(test.targets(), answers.view()),
-        });
-        let tasks = tasks(&settings, &split, &test)?;
-        // The tasks hold the samples scaled; large sets need not be held twice.
-        drop(split);
-        let first = tasks.at(0);
-        let samples = first.problem.training.samples();
-        let trainings = settings.starts * tasks.values().len();
-        check_width(&settings.training.method, first.shape, samples, trainings)?;
-        let starts = begin(tasks.values())?;
-        Ok(Self {
-            settings,
-            test: Arc::new(test),
-            scalings: tasks.map(|task| task.scaling.clone()),
-            starts,
-            target_baselines,
-            baselines,
-        })
-    }
-
     /// Settings of the run.
     pub fn settings(&self) -> &RunSettings {
         &self.settings
@@ -167,16 +52,31 @@ impl Run {
     /// Runs one epoch of every restart that has not ended, in parallel. Returns the reason for stopping once every
     /// restart has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
+        let begun = Instant::now();
         match self.starts.as_mut_slice() {
             // Stays on this thread, which saves a hand-over every epoch.
-            [only] => only.step(),
-            all => {
-                all.par_iter_mut().for_each(|start| {
-                    start.step();
-                });
-                self.stop_reason()
+            [only] => {
+                only.step();
             }
+            all => all.par_iter_mut().for_each(|start| {
+                start.step();
+            }),
         }
+        self.wall_time = self.wall_time.map(|time| time.saturating_add(begun.elapsed()));
+        self.stop_reason()
+    }
+
+    /// Time that all restarts together have taken by the clock, without pauses; `None` if the run was resumed and the
+    /// time before is not known. [`StartTrainer::elapsed`] adds up the times of trainings that ran side by side.
+    pub fn wall_time(&self) -> Option<Duration> {
+        self.wall_time
+    }
+
+    /// Sets the time of a resumed run, if it was saved.
+    #[cfg(feature = "files")]
+    pub(crate) fn with_wall_time(mut self, saved: Option<Duration>) -> Self {
+        self.wall_time = saved.or(self.wall_time);
+        self
     }
 
     /// Stops every restart at the user's request.
@@ -319,21 +219,4 @@ impl Run {
         });
         rows
     }
-}
-
-/// Checks the number of saved trainings.
-fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError> {
-    let found = states.len();
-    if found == expected {
-        Ok(())
-    } else {
-        Err(RunError::Starts { found, expected })
-    }
-}
-
-/// The errors of the Bayesian reference on `test`; `None` where a posterior did not converge.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
-    let SimulatedSettings { source, seed, .. } = settings;
-    let mut rng = seed.rng(Stream::Expectation);
-    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
 }

@@ -10,6 +10,11 @@ impl SimulatedSettings {
     /// # Errors
     /// If the settings are invalid.
     pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
+        Ok(self.draw_unless(&|| false)?.expect("nothing cancels it"))
+    }
+
+    /// As [`Self::draw`]; returns `None` once `is_cancelled`, which is called after each set.
+    pub(super) fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {
         self.check_counts()?;
         self.training.check().map_err(TrainingError::from)?;
         let Simulation {
@@ -30,8 +35,15 @@ impl SimulatedSettings {
             });
         }
         let test = self.draw_test()?;
+        if is_cancelled() {
+            return Ok(None);
+        }
         let drawn = self.draw_training(total)?;
-        Ok((hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split)), test))
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let split = hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split));
+        Ok(Some((split, test)))
     }
 
     /// Draws at least `samples` samples with the noise of the training set.

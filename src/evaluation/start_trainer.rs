@@ -156,9 +156,10 @@ impl StartTrainer {
         self.longest().stages()
     }
 
-    /// Training time of all rows together, without pauses.
+    /// Training time summed over all rows, without pauses.
     pub fn elapsed(&self) -> Duration {
-        self.rows.iter().map(Trainer::elapsed).sum()
+        let times = self.rows.iter().map(Trainer::elapsed);
+        times.fold(Duration::ZERO, Duration::saturating_add)
     }
 
     /// Total number of weights in all networks.

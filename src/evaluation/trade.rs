@@ -1,4 +1,4 @@
-use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, run::reference};
+use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, preparation::reference};
 use crate::decoupling::{DecoderKind, Precision};
 
 /// One decoder on the trade-off between speed and accuracy.
@@ -81,7 +81,9 @@ pub fn measure_trade(
     }
     for &hidden in hidden {
         let settings = SimulatedSettings { hidden, ..*settings };
-        let mut run = Run::prepare(settings)?;
+        let Some(mut run) = Run::prepare_unless(settings, &is_cancelled)? else {
+            return Ok(false);
+        };
         while run.step().is_none() {
             if is_cancelled() {
                 return Ok(false);

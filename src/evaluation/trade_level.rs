@@ -1,4 +1,7 @@
-use super::{TradePoint, trade::pareto_front};
+use super::{
+    TradePoint,
+    trade::{fastest_under, most_accurate_under, pareto_front},
+};
 
 /// Cost weighed against the error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -31,6 +34,24 @@ impl TradeCost {
     }
 }
 
+/// Limits of the questions "fastest under" and "most accurate under".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TradeLimits {
+    /// Largest Z error, in percent.
+    pub percent: f64,
+    /// Longest time of a frame, in microseconds.
+    pub microseconds: f64,
+}
+
+impl Default for TradeLimits {
+    fn default() -> Self {
+        Self {
+            percent: 1.0,
+            microseconds: 10.0,
+        }
+    }
+}
+
 /// Points of the trade-off at one noise level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeLevel {
@@ -45,5 +66,17 @@ impl TradeLevel {
     pub fn front(&self, cost: TradeCost) -> Vec<bool> {
         let points: Vec<_> = self.points.iter().map(|point| cost.of(point)).collect();
         pareto_front(&points)
+    }
+
+    /// Returns the indices of the points that answer "fastest under" and "most accurate under".
+    pub fn answers(&self, limits: &TradeLimits) -> [Option<usize>; 2] {
+        let index = |chosen: Option<&TradePoint>| {
+            let chosen = chosen?;
+            self.points.iter().position(|point| std::ptr::eq(point, chosen))
+        };
+        [
+            index(fastest_under(&self.points, limits.percent)),
+            index(most_accurate_under(&self.points, limits.microseconds)),
+        ]
     }
 }

@@ -6,7 +6,7 @@ use std::{
 
 use thiserror::Error;
 
-use super::unfinished::Unfinished;
+use super::unfinished::{Unfinished, folder_of};
 use crate::dataset::system_cause;
 
 /// Errors of writing a file.
@@ -45,6 +45,11 @@ impl WriteError {
             source,
         }
     }
+
+    /// Returns true if there is such a file already, see [`AtomicFile::commit_new`].
+    pub(super) fn is_taken(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists)
+    }
 }
 
 /// A file that is written under a temporary name beside its target and then renamed over it, so that nobody
@@ -81,12 +86,7 @@ impl Place {
         if is_folder || path.is_dir() {
             return Err(WriteError::Folder(path.to_owned()));
         }
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let folder = parent.unwrap_or(Path::new(".")).to_owned();
-        if !folder.is_dir() {
-            let path = path.to_owned();
-            return Err(WriteError::NoFolder { path, folder });
-        }
+        let folder = existing_folder(path, path)?;
         let error = |source| WriteError::io(path, source);
         match fs::metadata(path) {
             Ok(old) if !old.is_file() => Ok(Self::Special),
@@ -104,12 +104,7 @@ impl Place {
             }
             Err(missing) if missing.kind() == ErrorKind::NotFound => {
                 let target = link_target(path);
-                let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
-                let folder = parent.unwrap_or(Path::new(".")).to_owned();
-                if !folder.is_dir() {
-                    let path = path.to_owned();
-                    return Err(WriteError::NoFolder { path, folder });
-                }
+                let folder = existing_folder(path, &target)?;
                 Ok(Self::File {
                     target,
                     folder,
@@ -119,6 +114,16 @@ impl Place {
             Err(source) => Err(error(source)),
         }
     }
+}
+
+/// Returns the folder of `target`, the file that `path` leads to.
+fn existing_folder(path: &Path, target: &Path) -> Result<PathBuf, WriteError> {
+    let folder = folder_of(target).to_owned();
+    if folder.is_dir() {
+        return Ok(folder);
+    }
+    let path = path.to_owned();
+    Err(WriteError::NoFolder { path, folder })
 }
 
 /// Follows a link to a file that is missing, through further links.
@@ -165,12 +170,24 @@ impl AtomicFile {
     /// # Errors
     /// Any error of the operating system; a file that was there before is then unchanged.
     pub fn commit(self) -> Result<(), WriteError> {
+        self.finish(Unfinished::persist)
+    }
+
+    /// As [`Self::commit`], but never replaces a file, not even one that another program has just written.
+    ///
+    /// # Errors
+    /// Any error of the operating system: [`ErrorKind::AlreadyExists`] if there is such a file.
+    pub(super) fn commit_new(self) -> Result<(), WriteError> {
+        self.finish(Unfinished::persist_new)
+    }
+
+    fn finish(self, persist: fn(Unfinished, &Path) -> io::Result<()>) -> Result<(), WriteError> {
         let error = |source| WriteError::io(&self.path, source);
         match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
             Sink::Through(_) => Ok(()),
             Sink::Beside(file, target) => {
                 file.as_file().sync_all().map_err(error)?;
-                file.persist(&target).map_err(error)
+                persist(file, &target).map_err(error)
             }
         }
     }
@@ -292,5 +309,44 @@ mod tests {
         assert_eq!(mode(&path), 0o640);
         atomic_write(Path::new("/dev/null"), |writer| writer.write_all(b"gone")).unwrap();
         assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_a_file_that_is_missing_stay_links_and_the_file_is_made() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("inner")).unwrap();
+        symlink("second", at("first")).unwrap();
+        symlink("inner/file", at("second")).unwrap();
+        symlink("none/file", at("stray")).unwrap();
+        symlink("circle", at("circle")).unwrap();
+        atomic_write(&at("first"), |writer| writer.write_all(b"through")).unwrap();
+        for link in ["first", "second"] {
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
+        }
+        assert_eq!(fs::read(at("inner/file")).unwrap(), b"through");
+        let missing = atomic_write(&at("stray"), |_| Ok(())).unwrap_err().to_string();
+        assert!(missing.contains("none' does not exist"), "{missing}");
+        assert!(atomic_write(&at("circle"), |_| Ok(())).is_err());
+        assert_eq!(names(&at("inner")), ["file"]);
+    }
+
+    #[test]
+    fn a_new_file_never_takes_the_place_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.json");
+        let write = |text: &[u8]| {
+            let mut file = AtomicFile::create(&path)?;
+            file.write_all(text).unwrap();
+            Ok(file)
+        };
+        let (first, second) = (write(b"first"), write(b"second"));
+        let commit = |file: Result<AtomicFile, WriteError>| file.unwrap().commit_new();
+        commit(first).unwrap();
+        assert!(commit(second).unwrap_err().is_taken());
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(names(folder.path()), ["run.json"]);
     }
 }

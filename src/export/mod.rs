@@ -3,48 +3,39 @@
 
 mod atomic;
 mod checkpoint_file;
-#[cfg(feature = "figures")]
-mod experiment_figure;
-#[cfg(feature = "figures")]
-pub(crate) mod experiment_points;
+mod document;
 mod experiment_tables;
 mod experiment_words;
 #[cfg(feature = "figures")]
 pub mod figures;
-mod format;
 mod heading;
+mod kept_files;
 mod limited;
 mod network_document;
 mod network_file;
+mod old_run_list;
+mod run_folder;
 mod samples;
 mod sealed;
 mod soundness;
 mod tables;
-#[cfg(feature = "figures")]
-pub(crate) mod ticks;
 mod trade_file;
-#[cfg(feature = "figures")]
-mod trade_plot;
 mod unfinished;
 mod workload_words;
-mod workspace_file;
 
+pub use crate::evaluation::format::{format_duration, format_number, format_percent};
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
-pub use checkpoint_file::{CheckpointFile, CheckpointFileError};
-#[cfg(feature = "figures")]
-pub use experiment_figure::draw_experiment;
+pub use checkpoint_file::CheckpointFile;
+pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
-pub use format::{format_duration, format_number, format_percent};
-pub use network_file::{NetworkFile, NetworkFileError, TrainingRecord};
+pub use network_file::{NetworkFile, TrainingRecord};
+pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
 pub use tables::{write_errors, write_loss_curves};
 pub use trade_file::write_trade;
-#[cfg(feature = "figures")]
-pub use trade_plot::trade_plot;
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
 pub use workload_words::describe_workload;
-pub use workspace_file::{FoundWorkspace, KeptRun, Workspace, WorkspaceError};

@@ -1,33 +1,24 @@
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
-use serde_json::value::{RawValue, to_raw_value};
-use thiserror::Error;
+use serde_json::value::to_raw_value;
 
 use super::{
-    WriteError, atomic_write,
-    heading::{Heading, NoHeading},
-    limited::read_limited,
+    AtomicFile, DocumentError, DocumentKind,
+    document::PROGRAM,
+    heading::Heading,
     network_document::{RunDocument, UnsealedDocument},
-    sealed::Sealed,
+    sealed::{Commit, Sealed},
     soundness::flaw,
 };
 use crate::{
-    dataset::system_cause,
     evaluation::{Baselines, Errors, Run, SimulatedSettings, StartRecord},
     network::Networks,
     training::{EpochRecord, Stage, StopReason},
 };
 
-const FORMAT: &str = "decoupler network";
-const VERSION: u64 = 3;
+const KIND: DocumentKind = DocumentKind::Network;
 /// First version with a checksum, and with the ranges of the readings in training.
 const SEALED_VERSION: u64 = 3;
-/// Oldest version that can be read, which had one network and the paper's scene only.
-const OLDEST_VERSION: u64 = 1;
-pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
 /// A trained network with its settings, the record of its training, and its errors.
 /// The file is JSON; a network that is read back gives bit-identical results.
@@ -67,88 +58,18 @@ pub struct TrainingRecord {
     pub starts: Vec<StartRecord>,
 }
 
-/// Errors of reading or writing a network file.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum NetworkFileError {
-    /// The operating system refuses to read it.
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    /// Not JSON.
-    #[error("'{}' is not a network file: {reason}; choose one that Decoupler saved", .path.display())]
-    NotJson {
-        /// The file.
-        path: PathBuf,
-        /// The parser's message, with line and column.
-        reason: String,
-    },
-    /// JSON that ends too early.
-    #[error("'{}' is cut off at line {line}, column {column}; copy or save it again", .path.display())]
-    CutOff {
-        /// The file.
-        path: PathBuf,
-        /// Line of the end, counted from 1.
-        line: usize,
-        /// Column of the end, counted from 1.
-        column: usize,
-    },
-    /// JSON of another program.
-    #[error("'{}' is not a network file: it has no field \"format\": \"{FORMAT}\"; choose one that Decoupler saved", .path.display())]
-    NotOurs {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Written in a format unknown to this version.
-    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads versions {OLDEST_VERSION} to {VERSION}: install a newer one", .path.display())]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Version of the file.
-        version: String,
-        /// Program that wrote the file.
-        program: String,
-    },
-    /// A field that is missing, of the wrong kind, or does not fit the others.
-    #[error("'{}' is damaged: {flaw}; copy or save it again", .path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Description of the defect, with the field or with line and column.
-        flaw: String,
-    },
-    /// A network of measured samples: the file tells of a simulated sensor.
-    #[error("a network of measured samples has no network file; write the networks themselves instead")]
-    Measured,
-    /// The network has values that could not be read back.
-    #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
-    Unsound {
-        /// The file.
-        path: PathBuf,
-        /// Description of the defect, with the field.
-        flaw: String,
-    },
-    /// The file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-}
-
 impl NetworkFile {
     /// Takes the best network of `run` so far, with its record and errors.
     ///
     /// # Errors
-    /// [`NetworkFileError::Measured`] if the samples were measured.
-    pub fn from_run(run: &Run) -> Result<Self, NetworkFileError> {
+    /// [`DocumentError::Measured`] if the samples were measured.
+    pub fn from_run(run: &Run) -> Result<Self, DocumentError> {
         let simulated = run.settings().simulated().zip(run.node_scores());
-        let (settings, scores) = simulated.ok_or(NetworkFileError::Measured)?;
+        let (settings, scores) = simulated.ok_or(DocumentError::Measured(KIND))?;
         let trainer = run.leader();
         Ok(Self {
             program: PROGRAM.to_owned(),
-            version: VERSION,
+            version: *KIND.versions().end(),
             settings,
             network: run.network(),
             training: TrainingRecord {
@@ -168,59 +89,35 @@ impl NetworkFile {
     ///
     /// # Errors
     /// The network has values that could not be read back, or the path cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), NetworkFileError> {
-        if let Some(flaw) = flaw(self) {
-            let path = path.to_owned();
-            return Err(NetworkFileError::Unsound { path, flaw });
-        }
-        let unsound = |flaw: String| NetworkFileError::Unsound {
+    pub fn save(&self, path: &Path) -> Result<(), DocumentError> {
+        self.save_by(path, AtomicFile::commit)
+    }
+
+    /// As [`Self::save`]; `commit` puts the file in its place.
+    pub(super) fn save_by(&self, path: &Path, commit: Commit) -> Result<(), DocumentError> {
+        let unsound = |flaw: String| DocumentError::Unsound {
             path: path.to_owned(),
             flaw,
         };
-        let run = self.run_text().map_err(unsound)?;
-        let sealed = self.sealed(&run);
-        atomic_write(path, |writer| {
-            sealed.check_size()?;
-            serde_json::to_writer(&mut *writer, &sealed)?;
-            writeln!(writer)
-        })?;
-        Ok(())
+        if let Some(flaw) = flaw(self) {
+            return Err(unsound(flaw));
+        }
+        let run = to_raw_value(&RunDocument::of(self)).map_err(|error| unsound(error.to_string()))?;
+        Ok(Sealed::new(KIND, &self.program, &run).save(path, commit)?)
     }
 
     /// Reads the file at `path`.
     ///
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
-    pub fn load(path: &Path) -> Result<Self, NetworkFileError> {
-        let bytes = read_limited(path).map_err(|source| NetworkFileError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::parse(path, &bytes)
+    pub fn load(path: &Path) -> Result<Self, DocumentError> {
+        let (heading, bytes) = KIND.read(path)?;
+        Self::parse(path, &heading, &bytes)
     }
 
     /// Describes the first defect that would keep the file from being read back.
     pub fn flaw(&self) -> Option<String> {
         flaw(self)
-    }
-
-    /// The contents of the file, for a file that holds several; or what is wrong with it.
-    pub(super) fn to_raw(&self) -> Result<Box<RawValue>, String> {
-        match flaw(self) {
-            Some(flaw) => Err(flaw),
-            None => {
-                let run = self.run_text()?;
-                to_raw_value(&self.sealed(&run)).map_err(|error| error.to_string())
-            }
-        }
-    }
-
-    fn run_text(&self) -> Result<Box<RawValue>, String> {
-        to_raw_value(&RunDocument::of(self)).map_err(|error| error.to_string())
-    }
-
-    fn sealed<'a>(&self, run: &'a RawValue) -> Sealed<'a> {
-        Sealed::new(FORMAT, VERSION, &self.program, run)
     }
 
     /// Tells what cannot be noticed because an old version of the program wrote the file.
@@ -234,39 +131,16 @@ impl NetworkFile {
         })
     }
 
-    pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, NetworkFileError> {
-        let path = || path.to_owned();
-        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
-            NoHeading::NotJson(reason) => NetworkFileError::NotJson { path: path(), reason },
-            NoHeading::CutOff { line, column } => NetworkFileError::CutOff {
-                path: path(),
-                line,
-                column,
-            },
-            NoHeading::Other => NetworkFileError::NotOurs { path: path() },
-        })?;
-        if heading.format != FORMAT {
-            return Err(NetworkFileError::NotOurs { path: path() });
-        }
-        if let Some(version) = heading.newer_than(VERSION) {
-            return Err(NetworkFileError::Version {
-                path: path(),
-                version,
-                program: heading.program(),
-            });
-        }
-        let damaged = |flaw| NetworkFileError::Damaged { path: path(), flaw };
+    /// Reads the file at `path` from its `bytes`.
+    pub(super) fn parse(path: &Path, heading: &Heading, bytes: &[u8]) -> Result<Self, DocumentError> {
         let is_sealed = heading.version.as_u64() >= Some(SEALED_VERSION);
         let read = if is_sealed {
             Self::read_sealed(bytes)
         } else {
             Self::read_unsealed(bytes)
         };
-        let file = read.map_err(damaged)?;
-        match flaw(&file) {
-            Some(flaw) => Err(damaged(flaw)),
-            None => Ok(file),
-        }
+        let sound = read.and_then(|file| flaw(&file).map_or(Ok(file), Err));
+        sound.map_err(|flaw| KIND.damaged(path, flaw))
     }
 
     fn read_sealed(bytes: &[u8]) -> Result<Self, String> {
@@ -279,7 +153,7 @@ impl NetworkFile {
 
     fn read_unsealed(bytes: &[u8]) -> Result<Self, String> {
         let document: UnsealedDocument = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
-        if document.version < OLDEST_VERSION {
+        if !KIND.versions().contains(&document.version) {
             return Err(format!("version: there is no version {}", document.version));
         }
         let (program, version) = (document.program.clone(), document.version);

@@ -1,7 +1,12 @@
+use std::{io::Write as _, path::Path};
+
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::limited::{LARGEST_BYTES, too_large};
+use super::{
+    AtomicFile, DocumentKind, WriteError,
+    limited::{LARGEST_BYTES, too_large},
+};
 
 /// Layout of a file with a checksum: a heading and the record of a run. A change anywhere in the record is noticed.
 #[derive(Serialize, Deserialize)]
@@ -17,10 +22,10 @@ pub(super) struct Sealed<'a> {
 }
 
 impl<'a> Sealed<'a> {
-    pub(super) fn new(format: &str, version: u64, program: &str, run: &'a RawValue) -> Self {
+    pub(super) fn new(kind: DocumentKind, program: &str, run: &'a RawValue) -> Self {
         Self {
-            format: format.to_owned(),
-            version,
+            format: kind.format().to_owned(),
+            version: *kind.versions().end(),
             program: program.to_owned(),
             crc32: checksum(run),
             run,
@@ -40,19 +45,26 @@ impl<'a> Sealed<'a> {
         }
     }
 
-    /// Checks that the file will not be too large to be read again.
+    /// Writes the file at `path`, whole or not at all; `commit` puts it in its place.
     ///
     /// # Errors
-    /// It will.
-    pub(super) fn check_size(&self) -> std::io::Result<()> {
+    /// The path cannot be written, or the file would be too large to be read again.
+    pub(super) fn save(&self, path: &Path, commit: Commit) -> Result<(), WriteError> {
         /// More than the heading takes.
         const HEADING: u64 = 1 << 10;
+        let error = |source| WriteError::io(path, source);
         if self.run.get().len() as u64 + HEADING > LARGEST_BYTES {
-            return Err(too_large());
+            return Err(error(too_large()));
         }
-        Ok(())
+        let mut file = AtomicFile::create(path)?;
+        serde_json::to_writer(&mut file, self).map_err(|source| error(source.into()))?;
+        writeln!(file).map_err(error)?;
+        commit(file)
     }
 }
+
+/// Puts a written file in its place: [`AtomicFile::commit`] or [`AtomicFile::commit_new`].
+pub(super) type Commit = fn(AtomicFile) -> Result<(), WriteError>;
 
 fn checksum(run: &RawValue) -> String {
     format!("{:08x}", crc32fast::hash(run.get().as_bytes()))

@@ -7,7 +7,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError};
 
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
@@ -82,10 +82,39 @@ impl Unfinished {
 
     /// Puts it in the place of `target`.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
+        self.persist_by(target, NamedTempFile::persist)
+    }
+
+    /// Puts it at `target`, where no file may be.
+    pub(super) fn persist_new(self, target: &Path) -> io::Result<()> {
+        self.persist_by(target, NamedTempFile::persist_noclobber)
+    }
+
+    fn persist_by(
+        self,
+        target: &Path,
+        persist: fn(NamedTempFile, PathBuf) -> Result<File, PersistError>,
+    ) -> io::Result<()> {
         let Self { file, listed } = self;
-        let persisted = file.persist(target);
+        let persisted = persist(file, target.to_owned());
         drop(listed);
-        persisted.map(drop).map_err(|error| error.error)
+        persisted.map_err(|error| error.error)?;
+        sync_folder(folder_of(target));
+        Ok(())
+    }
+}
+
+/// Folder of the file `path`.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
+}
+
+/// Has the names in `folder` outlast a power failure, as far as its file system can.
+fn sync_folder(folder: &Path) {
+    // The file is whole and in its place, so there is nothing to fail; Windows opens no folders.
+    if cfg!(unix) {
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
     }
 }
 

@@ -8,10 +8,10 @@ use super::SceneError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rows {
-    /// All row-wires by one decoder that is not told which one it reads: the paper's experiments.
+    /// One decoder for all row-wires, which does not know the row it reads: the paper's experiments.
     #[default]
     All,
-    /// All row-wires, each by a decoder of its own: the electronics know which row they address.
+    /// One decoder for each row-wire: the electronics know which row they address.
     Known,
     /// One row-wire, counted from 0.
     One(usize),
@@ -21,7 +21,7 @@ pub enum Rows {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowModel {
-    /// One for every row-wire, which is not told which one it reads.
+    /// One for all row-wires, which does not know the row it reads.
     Shared,
     /// One for each row-wire read: the electronics know which one they address.
     Each,

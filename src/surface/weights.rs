@@ -13,7 +13,7 @@ const LARGEST_ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Weights(Array2<f64>);
 
-/// What is known of a point beforehand.
+/// Properties of a point that are known beforehand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     /// Within the nodes, and not extrapolated.

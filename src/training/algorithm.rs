@@ -69,7 +69,7 @@ pub(super) struct Description {
     pub(super) summary: &'static str,
     /// Name of [`Algorithm::parameter`].
     pub(super) parameter_name: &'static str,
-    /// What to try where the training diverged or did not lower the error; it completes "to mend it, …".
+    /// Cure for a training that diverged or did not lower the error; completes "to mend it, …".
     pub(super) cure: &'static str,
 }
 

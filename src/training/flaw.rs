@@ -44,7 +44,7 @@ impl TrainingFlaw {
         (flaw.diverged_in.is_some() || flaw.is_at_start).then_some(flaw)
     }
 
-    /// What to change.
+    /// Returns the setting to change, in words.
     pub fn cure(&self) -> String {
         match self.reason {
             StopReason::GoalReached => "set a lower goal".to_owned(),

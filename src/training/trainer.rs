@@ -179,7 +179,7 @@ impl Trainer {
                 self.mlp.weights_mut().copy_from_slice(self.best.mlp.weights());
                 self.restart_method();
             }
-            self.elapsed += begun.elapsed();
+            self.elapsed = self.elapsed.saturating_add(begun.elapsed());
         }
         self.stop_reason
     }

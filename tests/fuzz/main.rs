@@ -16,6 +16,6 @@ mod mutation;
 mod names;
 mod network_file;
 mod readings;
+mod run_folder;
 mod sealing;
 mod trained;
-mod workspace_file;

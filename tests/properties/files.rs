@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use decoupler::{
     dataset::{Dataset, ResistanceReader},
     evaluation::{Run, SimulatedSettings},
-    export::{CheckpointFile, KeptRun, NetworkFile, Workspace, write_samples, write_samples_header},
+    export::{CheckpointFile, NetworkFile, RunFolder, write_samples, write_samples_header},
     network::{DecouplingNetwork, Mlp},
     training::Method,
 };
@@ -119,21 +119,23 @@ proptest! {
 
     #[test]
     fn run_lists_are_read_as_they_were_written(
-        named in prop::collection::btree_map(any::<u32>().prop_map(u64::from), "\\PC{0,20}", 0..4),
+        names in prop::collection::vec("\\PC{0,20}", 0..4),
         pinned in prop::sample::select(vec![None, Some(0_usize), Some(1)]),
     ) {
-        let kept = |(&id, name): (&u64, &String)| KeptRun {
-            id,
-            name: name.clone(),
-            file: Arc::new(TRAINED.clone()),
-        };
-        let runs = Vec::from_iter(named.iter().map(kept));
-        let pinned = pinned.and_then(|index| runs.get(index)).map(|run| run.id);
-        let workspace = Workspace { runs, pinned: [pinned, None] };
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("workspace.json");
-        workspace.save(&path).unwrap();
-        let found = Workspace::load(&path).unwrap();
-        prop_assert_eq!((found.workspace, found.warning), (workspace, None));
+        let open = || RunFolder::open(folder.path()).unwrap();
+        let (mut kept, _) = open();
+        let file = Arc::new(TRAINED.clone());
+        for name in &names {
+            kept.keep(Arc::clone(&file)).unwrap();
+            let id = kept.runs().runs.last().map(|run| run.id).unwrap();
+            kept.rename(id, name).unwrap();
+        }
+        let pinned = pinned.and_then(|index| kept.runs().runs.get(index)).map(|run| run.id);
+        kept.pin([pinned, None]).unwrap();
+        let found = Vec::from_iter(kept.runs().runs.iter().map(|run| &run.name));
+        prop_assert_eq!(found, Vec::from_iter(&names));
+        let (again, problems) = open();
+        prop_assert_eq!((again.runs(), problems), (kept.runs(), Vec::new()));
     }
 }

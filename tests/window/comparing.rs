@@ -1,16 +1,19 @@
 //! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
 
-use std::fs;
+use std::{fs, path::Path};
 
 use decoupler::{
-    app::{BottomTab, Phase, View, surface_view::ViewMode},
+    app::{BottomTab, Phase},
     export::{NetworkFile, format_number},
+    figure::surface::ViewMode,
 };
-use eframe::egui::Key;
+use eframe::egui::{Event, Key};
 
 use crate::driver::{Driver, small, trained};
 
 const FIRST: &str = "10×6_3×18 h6 lm";
+/// Folder in which the window keeps its runs.
+const PLACE: &str = "runs";
 const SECOND: &str = "10×6_3×18 h4 lm";
 
 fn kept(driver: &Driver) -> usize {
@@ -32,19 +35,24 @@ fn trained_twice(driver: &mut Driver) {
 
 fn wait_for_both(driver: &mut Driver) {
     driver.wait("both surfaces", |driver| {
-        driver.state().runs.compared.iter().all(Option::is_some)
+        driver
+            .views()
+            .compare
+            .places
+            .iter()
+            .all(|place| place.compared.is_some())
     });
 }
 
-/// Waits until the file in which runs are kept was read.
+/// Waits until the folder in which runs are kept was read.
 fn wait_for_file(driver: &mut Driver) {
-    driver.wait("the file", |driver| driver.state().runs.path.is_some());
+    driver.wait("the folder", |driver| driver.state().runs.path.is_some());
 }
 
 #[test]
 fn two_runs_are_compared_and_survive_a_restart() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("data").join("workspace.json");
+    let path = folder.path().join("data").join(PLACE);
     let mut driver = Driver::open_keeping(&path);
     trained_twice(&mut driver);
     driver.click(&format!("{FIRST} as A"));
@@ -56,6 +64,17 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
+    // What is compared is saved as it is in view, by the names of the runs.
+    let saved = folder.path().join("compared.svg");
+    driver.save("Surfaces, PNG or SVG…", &saved);
+    driver.click("Dismiss");
+    let svg = fs::read_to_string(saved).unwrap();
+    let titles = [
+        "A: Six hidden nodes, decoupled".to_owned(),
+        format!("B: {SECOND}, decoupled"),
+    ];
+    assert_eq!(titles.map(|title| count(&svg, &title)), [1, 1]);
+    assert_eq!(count(&svg, "z (mm)"), 3, "two axes and one key");
     let check = |driver: &Driver| {
         let [a, b] = shown.each_ref().map(|file| file.errors);
         for (letter, errors) in [("A", a), ("B", b)] {
@@ -65,7 +84,8 @@ fn two_runs_are_compared_and_survive_a_restart() {
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));
-        for (compared, run) in driver.state().runs.compared.iter().flatten().zip(&runs) {
+        let places = driver.views().compare.places.iter();
+        for (compared, run) in places.filter_map(|place| place.compared.as_ref()).zip(&runs) {
             assert_eq!(*compared.decoupled_mm, run.decouple_test(), "the same bits");
         }
         let kept = driver.state().runs.workspace.runs.iter();
@@ -74,8 +94,16 @@ fn two_runs_are_compared_and_survive_a_restart() {
         }
     };
     check(&driver);
+    let picture = folder.path().join("losses.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = fs::read_to_string(picture).unwrap();
+    for curve in ["A: Six hidden nodes, test", &format!("B: {SECOND}, training")] {
+        assert!(picture.contains(curve), "{curve} is in the picture as in the window");
+        assert!(driver.has(curve), "{curve}: {:#?}", driver.texts());
+    }
     driver.click("Next snapshot");
-    assert_eq!(driver.state().runs.snapshot, 1);
+    assert_eq!(driver.views().compare.snapshot, 1);
     driver.click_button("Error");
     driver.settle();
     // Closing the window waits for what is to be written.
@@ -89,13 +117,13 @@ fn two_runs_are_compared_and_survive_a_restart() {
     check(&driver);
     assert!(driver.harness().run() <= 2, "an idle view draws nothing");
     driver.click("Use the settings of Six hidden nodes");
-    assert_eq!((driver.state().view, driver.state().draft), (View::Train, small()));
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
 
 #[test]
 fn a_run_is_removed_only_when_that_is_confirmed() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
+    let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
     trained_twice(&mut driver);
     driver.click(&format!("{FIRST} as A"));
@@ -114,52 +142,87 @@ fn a_run_is_removed_only_when_that_is_confirmed() {
 }
 
 #[test]
-fn a_damaged_list_is_told_of_and_kept_aside() {
+fn a_damaged_run_is_named_and_the_others_are_there() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    fs::write(&path, "{\"format\": \"decoupler workspace\", \"vers").unwrap();
+    let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
-    wait_for_file(&mut driver);
-    let aside = folder.path().join("workspace.json.damaged-1");
-    assert!(driver.says(&aside.display().to_string()), "{:#?}", driver.texts());
-    assert!(aside.exists());
-    drop(driver);
-    let mut driver = Driver::open_keeping(&path);
-    wait_for_file(&mut driver);
-    assert!(
-        driver.state().notice.is_none(),
-        "told once: {:?}",
-        driver.state().notice
-    );
     driver.configure_small();
     train_and_keep(&mut driver, 1);
     drop(driver);
+    let damaged = path.join("run-12.json");
+    fs::write(&damaged, "{\"format\": \"decoupler netw").unwrap();
     let mut driver = Driver::open_keeping(&path);
     wait_for_file(&mut driver);
-    assert_eq!(kept(&driver), 1, "the new list is kept");
-    assert!(driver.state().notice.is_none());
+    assert!(driver.says(&damaged.display().to_string()), "{:#?}", driver.texts());
+    assert_eq!(kept(&driver), 1);
+    driver.click("Dismiss");
+    driver.click_button("Compare");
+    driver.settle();
+    assert!(driver.notice().is_none(), "told once: {:?}", driver.notice());
+    assert!(damaged.exists(), "nothing is lost");
+}
+
+/// Waits until something in the folder holds this text.
+fn wait_for_text(driver: &mut Driver, folder: &Path, text: &str) {
+    let holds = |path: &Path| fs::read_to_string(path).is_ok_and(|found| found.contains(text));
+    driver.wait(text, |_| {
+        let files = fs::read_dir(folder).into_iter().flatten().flatten();
+        files.map(|file| file.path()).any(|path| holds(&path))
+    });
 }
 
 #[test]
-fn a_second_window_leaves_the_list_to_the_first() {
+fn two_windows_see_each_others_runs_names_pins_and_removals() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    let mut first = Driver::open_keeping(&path);
-    wait_for_file(&mut first);
-    let mut second = Driver::open_keeping(&path);
-    second.wait("what it is told", |driver| driver.state().notice.is_some());
-    assert!(
-        second.says("Another window keeps the run list"),
-        "{:#?}",
-        second.texts()
-    );
-    second.click_button("Compare");
-    assert!(second.has("Not kept after this session."));
-    drop(second);
+    let path = folder.path().join(PLACE);
+    let [mut first, mut second] = [(); 2].map(|()| Driver::open_keeping(&path));
     first.configure_small();
-    train_and_keep(&mut first, 1);
-    drop(first);
-    assert!(fs::read_to_string(&path).unwrap().contains(FIRST));
+    first.train();
+    wait_for_text(&mut first, &path, FIRST);
+    second.click_button("Compare");
+    second.wait("the run of the first window", |driver| {
+        driver.has(&format!("{FIRST} as A"))
+    });
+    second.enter("Name of run 1", "Renamed");
+    wait_for_text(&mut second, &path, "Renamed");
+    second.click("Renamed as A");
+    second.wait("its surface", |driver| driver.has("Surface of A"));
+    drop(second);
+
+    first.click_button("Compare");
+    first.wait("the name", |driver| driver.has("Renamed as A"));
+    first.wait("what was pinned", |driver| driver.has("Surface of A"));
+
+    let mut third = Driver::open_keeping(&path);
+    third.click_button("Compare");
+    third.wait("the run", |driver| driver.has("Remove Renamed"));
+    third.click("Remove Renamed");
+    third.click_button("Remove");
+    drop(third);
+    first.harness().event(Event::WindowFocused(true));
+    first.wait("the removal", |driver| !driver.has("Renamed as A"));
+    first.settle();
+    assert!(!first.has("Surface of A"));
+    assert!(first.harness().run() <= 2, "an idle view draws nothing");
+}
+
+#[test]
+fn any_number_of_a_kept_run_leaves_room_for_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let network = fs::read_to_string(fixtures.join("network_version_1.json")).unwrap();
+    let old = format!(
+        r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":{},"name":"Old","network":{network}}}],"pinned":[null,null]}}"#,
+        u64::MAX
+    );
+    fs::write(folder.path().join("workspace.json"), old).unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join(PLACE));
+    driver.configure_small();
+    driver.train();
+    driver.click_button("Compare");
+    driver.wait("both runs", |driver| {
+        driver.has("Old as A") && driver.has(&format!("{FIRST} as A"))
+    });
 }
 
 #[test]
@@ -175,14 +238,14 @@ fn figures_of_the_paper_are_one_click() {
     driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
     driver.click("Fig. 6");
-    assert_eq!(driver.state().look.tab, BottomTab::Nodes);
+    assert_eq!(driver.views().train.tab, BottomTab::Nodes);
     driver.wait("another training, for the first was stopped", |driver| {
         driver.state().phase == Phase::Training && driver.state().result().is_some()
     });
     driver.click("Error bars");
-    driver.wait("the bars", |driver| driver.state().frames.spread_mm.is_some());
-    let nodes = driver.state().frames.actual.nodes_mm.len();
-    assert_eq!(driver.state().frames.spread_mm.as_ref().map(Vec::len), Some(nodes));
+    driver.wait("the bars", |driver| driver.views().train.error_bars_mm().is_some());
+    let nodes = driver.views().train.drawn.frames.actual.nodes_mm.len();
+    assert_eq!(driver.views().train.error_bars_mm().map(<[f64]>::len), Some(nodes));
     driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
     driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
 }
@@ -217,4 +280,63 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     assert!(driver.says("give a name that ends in .png or .svg"));
     let png = image::open(at("a.png")).unwrap();
     assert!(png.width() > 2000);
+}
+
+/// The surfaces in view as the window saves them.
+fn saved_surfaces(driver: &mut Driver) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("surfaces.svg");
+    driver.save("Type a path for the picture of the surfaces", &path);
+    assert!(driver.says("Saved "), "{:#?}", driver.texts());
+    driver.click("Dismiss");
+    fs::read_to_string(path).unwrap()
+}
+
+/// How often a picture says a text.
+fn count(svg: &str, text: &str) -> usize {
+    svg.matches(&format!(">{text}</text>")).count()
+}
+
+#[test]
+fn saved_surfaces_are_seen_by_the_camera_in_view() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let first = saved_surfaces(&mut driver);
+    assert!(
+        first == saved_surfaces(&mut driver),
+        "the same view gives the same picture"
+    );
+    let press = |driver: &mut Driver, key| {
+        driver.get("Actual surface").focus();
+        driver.settle();
+        driver.press(key);
+    };
+    press(&mut driver, Key::ArrowLeft);
+    let turned = saved_surfaces(&mut driver);
+    assert!(first != turned, "the camera was turned");
+    press(&mut driver, Key::Home);
+    assert!(first == saved_surfaces(&mut driver), "the camera was turned back");
+    driver.click("Top view");
+    let from_above = saved_surfaces(&mut driver);
+    assert_eq!(
+        [&first, &from_above].map(|svg| count(svg, "z (mm)")),
+        [3, 1],
+        "two axes and a key, the key alone"
+    );
+}
+
+#[test]
+fn the_error_card_in_view_is_saved_with_its_own_colours() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let titles = ["Actual", "Decoupled", "Error", "error (mm)"];
+    let says = |driver: &mut Driver| {
+        let svg = saved_surfaces(driver);
+        titles.map(|text| count(&svg, text))
+    };
+    assert_eq!(says(&mut driver), [1, 1, 0, 0]);
+    driver.click_button("Error");
+    assert_eq!(says(&mut driver), [1, 0, 1, 2], "the error's axis and key");
 }

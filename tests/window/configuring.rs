@@ -1,7 +1,7 @@
 //! Choosing what to train.
 
 use decoupler::{
-    app::{Action, Phase},
+    app::{Effect, Phase},
     evaluation::{Run, SimulatedSettings},
     sensor::{ArrayScale, Geometry},
     training::Method,
@@ -77,7 +77,7 @@ fn presets_set_the_array_and_its_surface_follows() {
         assert_eq!(driver.state().draft.source.sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
-            let frame = &driver.state().frames.actual;
+            let frame = &driver.views().train.drawn.frames.actual;
             frame.nodes_mm.len() == scale.rows() * scale.nodes_per_row()
         });
     }
@@ -198,7 +198,9 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
             .is_some_and(|test| test.sensor == driver.state().draft.source.sensor)
     });
     let x_mm: Vec<f64> = driver
-        .state()
+        .views()
+        .train
+        .drawn
         .frames
         .actual
         .nodes_mm
@@ -240,8 +242,8 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
     let run = driver.state().run.as_ref().unwrap().settings;
     let mut other = run;
     other.source.sensor.scale = ArrayScale::PRESETS[1];
-    driver.window_mut().apply(Action::Configure(Box::new(other)));
-    driver.window_mut().apply(Action::Configure(Box::new(run)));
+    driver.window_mut().apply(Effect::Configure(Box::new(other)));
+    driver.window_mut().apply(Effect::Configure(Box::new(run)));
     for _ in 0..40 {
         std::thread::sleep(std::time::Duration::from_millis(5));
         driver.harness().step();
@@ -261,13 +263,13 @@ fn keys_train_and_walk_the_snapshots() {
     driver.press(Key::PageDown);
     driver.press(Key::PageDown);
     driver.press(Key::PageUp);
-    assert_eq!(driver.state().look.snapshot, 1);
+    assert_eq!(driver.views().train.snapshot, 1);
     assert!(driver.has("2 of 10"));
     driver.press_with(Modifiers::COMMAND, Key::Enter);
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
-    assert_eq!(driver.state().look.snapshot, 1, "training keeps the snapshot on show");
+    assert_eq!(driver.views().train.snapshot, 1, "training keeps the snapshot on show");
     driver.settle();
 }
 

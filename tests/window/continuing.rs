@@ -1,6 +1,6 @@
 //! Several starts, checkpoints, and going on with another method.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Duration};
 
 use decoupler::{
     app::{Notice, Phase},
@@ -53,8 +53,7 @@ fn start_endless(driver: &mut Driver) {
 /// Presses Pause and waits until the last epoch under way is shown.
 fn pause(driver: &mut Driver) {
     driver.click("⏸ Pause");
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    driver.harness().run_steps(2);
+    driver.wait_for_hold();
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
@@ -210,6 +209,29 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     assert!(driver.has("Continue"));
 }
 
+/// Starts run side by side: the time by the clock is saved, and without it there is none to show.
+#[test]
+fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6)).unwrap();
+    let mut driver = Driver::open();
+    for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
+        file.wall_time = saved.map(Duration::from_secs);
+        file.save(&path).unwrap();
+        give_path(&mut driver, OPEN, &path);
+        driver.wait("the training", |driver| {
+            let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
+            result.is_some_and(|result| result.wall_time == file.wall_time)
+        });
+        let texts = driver.texts();
+        for (name, value) in [("Training, all starts", all), ("An epoch", an_epoch)] {
+            let place = texts.iter().rposition(|text| text == name).unwrap();
+            assert_eq!(texts[place + 1], value, "{texts:#?}");
+        }
+    }
+}
+
 #[test]
 fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -227,15 +249,15 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         ("is cut off", sound[..sound.len() / 2].to_owned()),
         ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
         ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
-        ("has version 9", sound.replacen("\"version\":2", "\"version\":9", 1)),
+        ("has version 9", sound.replacen("\"version\":3", "\"version\":9", 1)),
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
         give_path(&mut driver, OPEN, &path);
-        driver.wait("the reason", |driver| driver.state().notice.is_some());
+        driver.wait("the reason", |driver| driver.notice().is_some());
         let expected = CheckpointFile::load(&path).unwrap_err().to_string();
         assert!(expected.contains(reason), "{expected}");
-        assert_eq!(driver.state().notice, Some(Notice::Failed(expected.clone())));
+        assert_eq!(driver.notice(), Some(&Notice::Failed(expected.clone())));
         assert!(driver.has(&expected));
         assert_eq!(
             (driver.table(), driver.state().phase, driver.state().draft),
@@ -275,13 +297,13 @@ fn levenberg_marquardt_goes_on_where_momentum_ended() {
     assert_eq!(driver.table(), table_of(&run));
     assert!(driver.has(&format!("Epoch {} of 30", driver.epochs())));
     assert!(
-        driver.has("lm from epoch 15"),
+        driver.says(" from epoch 15"),
         "the chart marks where the method changed"
     );
     assert!(!driver.says("The settings have changed"));
     driver.click("Training state");
     driver.settle();
-    assert!(driver.has("lm from epoch 15"));
+    assert!(driver.says(" from epoch 15"));
 
     driver.enter("Hidden nodes", "7");
     assert!(!driver.has("Continue"), "another network begins anew");

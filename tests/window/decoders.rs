@@ -27,7 +27,7 @@ const NAMES: [&str; 8] = [
 /// Waits until every decoder is measured.
 fn wait_for_all(driver: &mut Driver) {
     driver.wait("all decoders", |driver| {
-        let decoders = &driver.state().decoders;
+        let decoders = &driver.views().train.decoders;
         decoders.measured.is_some() && !decoders.is_measuring()
     });
 }
@@ -114,14 +114,14 @@ fn a_training_under_way_is_not_measured_before_it_stands_still() {
     driver.enter("Epochs", "1000000");
     driver.click("▶ Train");
     driver.wait_for_epochs(2);
-    assert_eq!(driver.state().decoders.measured, None);
+    assert_eq!(driver.views().train.decoders.measured, None);
     assert!(driver.has("They are measured when the training is paused or has ended."));
     driver.press_with(Modifiers::COMMAND, Key::P);
     wait_for_all(&mut driver);
     assert_eq!(table(&driver).len(), 2 * NAMES.len());
     driver.press_with(Modifiers::COMMAND, Key::P);
     assert_eq!(
-        driver.state().decoders.measured,
+        driver.views().train.decoders.measured,
         None,
         "the network is another one from now on"
     );

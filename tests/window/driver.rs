@@ -4,11 +4,11 @@ use std::{
     cell::RefCell,
     path::{Path, PathBuf},
     rc::Rc,
-    thread,
-    time::Duration,
+    sync::mpsc::{Receiver, channel},
+    time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, DialogKind, Phase, State};
+use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views};
 use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
@@ -19,8 +19,8 @@ use egui_kittest::{
 
 use crate::support::rasterise::Rasteriser;
 
-/// Looks at the window before something awaited counts as never coming: at 5 ms each, two minutes.
-const MOST_LOOKS: usize = 24_000;
+/// Time after which something awaited counts as never coming.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
@@ -28,6 +28,8 @@ const SCROLLING: usize = 5;
 /// The window and hands to work it.
 pub(crate) struct Driver {
     harness: Harness<'static, Option<DecouplerWindow>>,
+    /// The delay of each frame that the window asked for.
+    asked: Receiver<Duration>,
 }
 
 impl Driver {
@@ -49,8 +51,13 @@ impl Driver {
     fn open_with(size: Vec2, runs: Option<PathBuf>) -> Self {
         let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
         let place = Rc::clone(&made);
+        let (asks, asked) = channel();
         // Before the first frame, as the real window does, so that its fonts are there.
         let set_up = move |ctx: &Context| {
+            // At the end of a test the window outlives the driver.
+            ctx.set_request_repaint_callback(move |info| {
+                let _ = asks.send(info.delay);
+            });
             let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
             let window = match runs {
                 Some(path) => window.keeping_runs(path),
@@ -70,14 +77,29 @@ impl Driver {
         let builder = Harness::builder().with_size(size).with_context_setup(set_up);
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
         let harness = builder.build_ui_state(frame, None);
-        let mut driver = Self { harness };
+        let mut driver = Self { harness, asked };
         driver.wait("the first surface", |driver| driver.state().test().is_some());
         driver
     }
 
     /// What the window knows.
-    pub(crate) fn state(&self) -> &State {
-        self.window().state()
+    pub(crate) fn state(&self) -> &Shared {
+        self.window().shared()
+    }
+
+    /// What only one of its views knows.
+    pub(crate) fn views(&self) -> &Views {
+        self.window().views()
+    }
+
+    /// What the user is told.
+    pub(crate) fn notice(&self) -> Option<&Notice> {
+        self.window().notice()
+    }
+
+    /// The name of the view on show.
+    pub(crate) fn shown(&self) -> &'static str {
+        self.window().shown()
     }
 
     fn window(&self) -> &DecouplerWindow {
@@ -94,19 +116,38 @@ impl Driver {
         &mut self.harness
     }
 
-    /// Looks at the window until `holds`.
+    /// Draws the frames that the window asks for until `holds`.
     #[track_caller]
     pub(crate) fn wait(&mut self, what: &str, holds: impl Fn(&Self) -> bool) {
-        for _ in 0..MOST_LOOKS {
+        let latest = Instant::now() + PATIENCE;
+        loop {
             if holds(self) {
                 // What came with the last frame is drawn by the next.
                 self.harness.step();
                 return;
             }
-            thread::sleep(Duration::from_millis(5));
-            self.harness.step();
+            self.wait_for_frame(what, latest);
         }
-        panic!("{what} never came; the window shows {:#?}", self.texts());
+    }
+
+    /// Draws the next frame that the window asks for.
+    #[track_caller]
+    pub(crate) fn wait_for_frame(&mut self, what: &str, latest: Instant) {
+        let patience = latest.saturating_duration_since(Instant::now());
+        if self.asked.recv_timeout(patience).is_err() {
+            panic!("{what} never came; the window shows {:#?}", self.texts());
+        }
+        // One frame answers all that was asked before it.
+        self.asked.try_iter().for_each(drop);
+        self.harness.step();
+    }
+
+    /// Whether the window comes to draw no more frames: it asks for none, at no delay.
+    pub(crate) fn comes_to_rest(&mut self) -> bool {
+        self.harness.run();
+        while self.asked.try_recv().is_ok() {}
+        self.harness.step();
+        self.asked.try_iter().next().is_none()
     }
 
     /// Draws frames until the window asks for none. Panics if it asks for ever.
@@ -201,7 +242,7 @@ impl Driver {
         self.open_form(button);
         self.type_into("File", &path.display().to_string());
         self.click_button("Save");
-        self.wait("the answer", |driver| driver.state().notice.is_some());
+        self.wait("the answer", |driver| driver.notice().is_some());
         self.settle();
     }
 
@@ -258,6 +299,15 @@ impl Driver {
         self.click("▶ Train");
         self.wait("the end of the training", |driver| {
             matches!(driver.state().phase, Phase::Ended(_))
+        });
+    }
+
+    /// Waits until the training that was held or has ended shows its last epoch: only then is a frame's time measured.
+    #[track_caller]
+    pub(crate) fn wait_for_hold(&mut self) {
+        self.wait("the hold", |driver| {
+            let result = driver.state().result();
+            result.is_some_and(|result| result.frame_time.is_some())
         });
     }
 

@@ -3,7 +3,7 @@
 use std::{fs, num::NonZero};
 
 use decoupler::{
-    app::{Phase, View},
+    app::Phase,
     evaluation::experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts},
     export::ExperimentTable,
 };
@@ -28,7 +28,7 @@ fn tiny(driver: &mut Driver) -> Experiment {
     wanted.axis = Axis::Hidden(vec![2, 4]);
     (wanted.seeds, wanted.base.starts) = (1, 1);
     wanted.base.training.stopping.epochs = 3;
-    let typed = driver.state().experiments.form().experiment();
+    let typed = driver.views().experiments.form().experiment();
     assert_eq!(typed.as_ref(), Ok(&wanted), "typing the values gives the experiment");
     wanted
 }
@@ -36,7 +36,7 @@ fn tiny(driver: &mut Driver) -> Experiment {
 fn run_to_the_end(driver: &mut Driver) {
     driver.click("▶ Run");
     driver.wait("the end of the experiment", |driver| {
-        driver.state().experiments.running.is_none()
+        driver.views().experiments.running.is_none()
     });
 }
 
@@ -88,7 +88,7 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
 
     driver.click("Order by Z % median");
     driver.click("Order by Z % median");
-    let sort = driver.state().experiments.sort;
+    let sort = driver.views().experiments.look.sort;
     assert!(sort.is_descending && sort.column.is_some());
 
     assert!(!driver.is_enabled(OPEN), "no cell is marked");
@@ -105,7 +105,7 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
 const OPEN: &str = "Open in Train view";
 
 fn wait_for_the_network(driver: &mut Driver) {
-    assert_eq!(driver.state().view, View::Train);
+    assert_eq!(driver.shown(), "Train");
     driver.wait("the network", |driver| {
         matches!(driver.state().phase, Phase::Ended(_)) && driver.state().result().is_some()
     });
@@ -126,7 +126,9 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
     driver.click(OPEN);
     wait_for_the_network(&mut driver);
     let state = driver.state();
-    let wanted = state.experiments.outcome().unwrap().results.cells[0].cell.settings;
+    let wanted = driver.views().experiments.outcome().unwrap().results.cells[0]
+        .cell
+        .settings;
     assert_eq!(state.draft, wanted);
     assert_eq!(state.result().unwrap().epochs_run, 3);
 }
@@ -151,7 +153,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     driver.click("▶ Run");
     driver.wait("a finished trial", |driver| {
         driver
-            .state()
+            .views()
             .experiments
             .running
             .is_some_and(|running| running.done >= 2)
@@ -159,9 +161,9 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     assert!(!driver.is_enabled("▶ Run"), "one experiment at a time");
     driver.click("■ Cancel");
     driver.wait("the end of the experiment", |driver| {
-        driver.state().experiments.running.is_none()
+        driver.views().experiments.running.is_none()
     });
-    let outcome = driver.state().experiments.outcome().unwrap();
+    let outcome = driver.views().experiments.outcome().unwrap();
     let (done, all) = outcome.trials();
     assert_eq!(all, 800);
     assert!((2..800).contains(&done), "{done} trials");
@@ -171,7 +173,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     driver.click("Table 3");
     assert!(driver.says("Press Run"));
     driver.click("Table 1");
-    assert_eq!(driver.state().experiments.outcome().unwrap().trials().0, done);
+    assert_eq!(driver.views().experiments.outcome().unwrap().trials().0, done);
 }
 
 #[test]
@@ -211,7 +213,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     driver.type_into("Values down", "50 100");
     driver.enter("Epochs", "3");
     run_to_the_end(&mut driver);
-    let outcome = driver.state().experiments.outcome().unwrap();
+    let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
         let percent = decoupler::export::format_percent(cell.z_percent().map(|spread| spread.median));

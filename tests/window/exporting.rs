@@ -125,17 +125,17 @@ fn a_form_is_closed_without_writing() {
     driver.press(Key::Escape);
     assert!(!driver.has("File"));
     driver.settle();
-    assert!(driver.state().notice.is_none());
+    assert!(driver.notice().is_none());
     assert!(names(folder.path()).is_empty());
 
     driver.open_form(ERRORS);
     driver.type_into("File", "  ");
     assert!(!driver.is_enabled("Save"), "a file needs a name");
-    let (phase, shown) = (driver.state().phase, driver.state().look.snapshot);
+    let (phase, shown) = (driver.state().phase, driver.views().train.snapshot);
     driver.press_with(Modifiers::COMMAND, Key::Enter);
     driver.press(Key::PageDown);
     assert_eq!(
-        (driver.state().phase, driver.state().look.snapshot),
+        (driver.state().phase, driver.views().train.snapshot),
         (phase, shown),
         "nothing happens behind the form"
     );

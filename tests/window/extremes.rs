@@ -12,7 +12,7 @@ fn try_training(driver: &mut Driver) -> Option<String> {
     });
     driver.settle();
     assert_ne!(driver.state().phase, Phase::Died);
-    match &driver.state().notice {
+    match driver.notice() {
         Some(Notice::Failed(reason)) => Some(reason.clone()),
         _ => None,
     }
@@ -64,7 +64,7 @@ fn a_large_array_trains() {
     driver.enter("Hidden nodes", "4");
     driver.enter("Epochs", "3");
     drawn(&mut driver);
-    assert_eq!(driver.state().frames.actual.nodes_mm.len(), 1600);
+    assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 1600);
     assert_eq!(try_training(&mut driver), None);
     assert!(driver.has("Decoupled surface"));
     driver.click_button("Top view");
@@ -121,7 +121,7 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
         }
         driver.wait("an answer", |driver| {
             let drawn = driver.state().test().map(|test| test.sensor);
-            drawn == Some(driver.state().draft.source.sensor) || driver.state().notice.is_some()
+            drawn == Some(driver.state().draft.source.sensor) || driver.notice().is_some()
         });
         driver.settle();
         if let Some(reason) = try_training(&mut driver) {

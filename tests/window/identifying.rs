@@ -1,7 +1,7 @@
 //! What readings can tell at all: figures, warnings, and the way back to the Train view.
 
 use decoupler::{
-    app::{Analysis, Question, View},
+    app::{Analysis, Question},
     export::format_number,
     sensor::{Identifiability, SensorModel},
 };
@@ -20,13 +20,13 @@ fn open() -> Driver {
 /// Waits for the answer to the question as it stands.
 fn wait_for_the_answer(driver: &mut Driver) {
     driver.wait("the answer", |driver| {
-        let shown = &driver.state().identifiability;
+        let shown = &driver.views().identifiability;
         !shown.is_pending && shown.analysis.is_some()
     });
 }
 
 fn analysis(driver: &Driver) -> &Analysis {
-    driver.state().identifiability.analysis.as_ref().unwrap()
+    driver.views().identifiability.analysis.as_ref().unwrap()
 }
 
 /// The row with the smallest singular value, all nodes pressed by `compression` of the height, found by the library alone.
@@ -59,12 +59,17 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     sensor.scale = "10×10_5×40".parse().unwrap();
     shows_condition_of(&driver, &sensor);
     driver.settle();
+    let folder = tempfile::tempdir().unwrap();
+    let picture = folder.path().join("values.svg");
+    driver.save("Chart, PNG or SVG…", &picture);
+    driver.click("Dismiss");
+    let picture = std::fs::read_to_string(picture).unwrap();
+    for word in ["worst row", "other rows", "deformation pattern, best seen first"] {
+        assert!(picture.contains(word), "{word}");
+    }
 
     driver.click("Use this sensor in the Train view");
-    assert_eq!(
-        (driver.state().view, driver.state().draft.source.sensor),
-        (View::Train, sensor)
-    );
+    assert_eq!((driver.shown(), driver.state().draft.source.sensor), ("Train", sensor));
     driver.click_button("Identifiability");
     wait_for_the_answer(&mut driver);
     assert!(!driver.is_enabled("Use this sensor in the Train view"), "it is there");
@@ -125,7 +130,7 @@ fn sideways_movement_has_a_picture_for_each_axis() {
     wait_for_the_answer(&mut driver);
     assert!(driver.has("Unknowns of a row: 30"));
     driver.click_button("x");
-    assert_eq!(driver.state().identifiability.axis, 0);
+    assert_eq!(driver.views().identifiability.axis, 0);
     driver.settle();
     driver.enter("Column-wires", "12");
     wait_for_the_answer(&mut driver);
@@ -148,4 +153,23 @@ fn everything_keeps_to_a_narrow_window() {
         let rect = driver.get(label).rect();
         assert!(rect.max.x <= 1024.0 && rect.width() > 40.0, "{label}: {rect}");
     }
+}
+
+#[test]
+fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("identifiability.svg");
+    let mut driver = open();
+    driver.save("Surfaces, PNG or SVG…", &path);
+    let svg = std::fs::read_to_string(path).unwrap();
+    let says = |text: &str| svg.matches(&format!(">{text}</text>")).count();
+    assert_eq!(
+        [says("Worst-seen deformation"), says("Sensitivity of each node")],
+        [1, 1]
+    );
+    assert_eq!(
+        [says("pattern"), says("1/mm")],
+        [2, 1],
+        "an axis and a key, a key from above"
+    );
 }

@@ -88,24 +88,23 @@ fn the_buttons_that_run_the_training_stand_apart() {
     }
 }
 
-/// News from the workers may still make it draw for a moment; a window that draws for ever panics here.
-fn comes_to_rest(driver: &mut Driver) -> bool {
-    (0..200).any(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(10));
-        driver.harness().run() <= 2
-    })
-}
-
 #[test]
 fn an_idle_window_draws_nothing() {
     let mut driver = Driver::open();
-    assert!(comes_to_rest(&mut driver), "before a training");
+    driver.wait("the last news", |driver| !driver.table().is_empty());
+    assert!(driver.comes_to_rest(), "before a training");
     driver.configure_small();
     driver.train();
-    assert!(comes_to_rest(&mut driver), "after a training");
+    driver.wait("the last news", |driver| {
+        driver
+            .state()
+            .result()
+            .is_some_and(|result| result.frame_time.is_some())
+    });
+    assert!(driver.comes_to_rest(), "after a training");
     driver.click_button("Error");
     driver.click("Regression");
-    assert!(comes_to_rest(&mut driver), "with another picture");
+    assert!(driver.comes_to_rest(), "with another picture");
 }
 
 #[test]

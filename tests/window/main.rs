@@ -2,6 +2,7 @@
 #![cfg(feature = "gui")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod closing;
 mod comparing;
 mod configuring;
 mod continuing;
@@ -14,6 +15,7 @@ mod identifying;
 mod looking;
 mod pictures;
 mod scenes;
+mod snapshots;
 mod trading;
 mod training;
 

@@ -70,7 +70,7 @@ fn album(size: Vec2, is_dark: bool) {
     for place in places {
         album.driver.harness().hover_at(surface.lerp_inside(place));
         album.driver.harness().run_steps(2);
-        if album.driver.state().look.node.is_some() {
+        if album.driver.views().train.node.is_some() {
             break;
         }
     }
@@ -80,9 +80,7 @@ fn album(size: Vec2, is_dark: bool) {
     album.take("10-save");
     album.driver.type_into("File", "/nowhere/network.json");
     album.driver.click_button("Save");
-    album
-        .driver
-        .wait("the refusal", |driver| driver.state().notice.is_some());
+    album.driver.wait("the refusal", |driver| driver.notice().is_some());
     album.take("11-refused");
     album.driver.click("Dismiss");
     choose_method(&mut album.driver, "Momentum, Eq. (11)");

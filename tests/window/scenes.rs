@@ -62,7 +62,7 @@ fn one_row_is_all_that_is_drawn() {
     assert_eq!(driver.state().draft.source.scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations a frame"));
     wait_for_scene(&mut driver);
-    assert_eq!(driver.state().frames.actual.nodes_mm.len(), 6);
+    assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
     assert!(driver.has("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
@@ -322,13 +322,14 @@ fn files_written_before_there_were_scenes_still_open() {
         r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":1,"name":"Old","network":{network}}}],"pinned":[1,null]}}"#
     );
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("workspace.json");
-    fs::write(&path, workspace).unwrap();
-    let mut driver = Driver::open_keeping(&path);
+    fs::write(folder.path().join("workspace.json"), workspace).unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
     driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
-    assert_eq!(driver.state().notice, None);
+    assert_eq!(driver.notice(), None);
     let kept = &driver.state().runs.workspace.runs[0].file.settings;
     assert_eq!((kept.source.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
     driver.click_button("Compare");
-    driver.wait("its surface", |driver| driver.state().runs.compared[0].is_some());
+    driver.wait("its surface", |driver| {
+        driver.views().compare.places[0].compared.is_some()
+    });
 }

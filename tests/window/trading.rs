@@ -3,7 +3,7 @@
 use std::fs;
 
 use decoupler::{
-    app::{TradeEnding, TradePlan, View},
+    app::{TradeEnding, TradePlan},
     evaluation::{Preset, TradePoint, fastest_under, measure_trade, most_accurate_under},
     export::format_percent,
 };
@@ -29,13 +29,13 @@ fn tiny(driver: &mut Driver) -> TradePlan {
     driver.enter("Epochs at most", "3");
     driver.enter("Test samples", "20");
     assert!(driver.has("16 points"), "{:#?}", driver.texts());
-    driver.state().trade.plan(&driver.state().draft).unwrap()
+    driver.views().trade_off.plan(&driver.state().draft).unwrap()
 }
 
 fn measure(driver: &mut Driver) {
     driver.click("▶ Measure");
     driver.wait("the end of the measurement", |driver| {
-        driver.state().trade.running.is_none()
+        driver.views().trade_off.running.is_none()
     });
 }
 
@@ -55,7 +55,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     let mut driver = open();
     let plan = tiny(&mut driver);
     measure(&mut driver);
-    let outcome = driver.state().trade.outcome.as_ref().unwrap();
+    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     assert_eq!(
         (outcome.points(), outcome.ending),
         ((16, 16), Some(TradeEnding::Complete))
@@ -84,12 +84,12 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
         }
     }
     driver.click_button("1e-3");
-    assert_eq!(driver.state().trade.level, 1);
+    assert_eq!(driver.views().trade_off.look.level, 1);
     driver.settle();
 
     driver.enter("Fastest under", "5");
     driver.enter("Most accurate under", "1e9");
-    let level = driver.state().trade.shown().unwrap();
+    let level = driver.views().trade_off.shown().unwrap();
     let fastest = fastest_under(&level.points, 5.0).unwrap().clone();
     let best = most_accurate_under(&level.points, 1e9).unwrap().clone();
     let is_best = format_percent(best.report.errors.z_percent);
@@ -105,16 +105,13 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
         .find(|text| text.starts_with("Fastest: "))
         .unwrap();
     driver.click(&answer);
-    let marked = driver.state().trade.marked.unwrap();
-    assert_eq!(driver.state().trade.shown().unwrap().points[marked], fastest);
+    let marked = driver.views().trade_off.look.marked.unwrap();
+    assert_eq!(driver.views().trade_off.shown().unwrap().points[marked], fastest);
     driver.enter("Fastest under", "1e-12");
     assert!(driver.has("Nothing measured here is as accurate."));
 
     driver.click("Load into Train view");
-    assert_eq!(
-        (driver.state().view, driver.state().draft),
-        (View::Train, fastest.settings)
-    );
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", fastest.settings));
 }
 
 #[test]
@@ -123,7 +120,7 @@ fn a_click_on_a_point_loads_its_configuration() {
     let plan = tiny(&mut driver);
     measure(&mut driver);
     driver.click("Decoding: Ridge, best preset");
-    assert_eq!(driver.state().view, View::Train);
+    assert_eq!(driver.shown(), "Train");
     let ridge = plan.settings(Preset::Best, 0.0);
     let draft = driver.state().draft;
     assert_eq!(
@@ -132,8 +129,8 @@ fn a_click_on_a_point_loads_its_configuration() {
     );
     driver.click_button("Trade-off");
     let (marked, level) = (
-        driver.state().trade.marked.unwrap(),
-        driver.state().trade.shown().unwrap(),
+        driver.views().trade_off.look.marked.unwrap(),
+        driver.views().trade_off.shown().unwrap(),
     );
     assert_eq!(level.points[marked].preset, Preset::Best);
     let row = driver
@@ -143,11 +140,11 @@ fn a_click_on_a_point_loads_its_configuration() {
         .unwrap();
     driver.click(&row);
     assert_ne!(
-        driver.state().trade.marked,
+        driver.views().trade_off.look.marked,
         Some(marked),
         "a row of the table marks its point"
     );
-    assert_eq!(driver.state().view, View::TradeOff);
+    assert_eq!(driver.shown(), "Trade-off");
 }
 
 #[test]
@@ -159,8 +156,8 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     measure(&mut driver);
     let saved = [
         ("All points as CSV…", "points.csv", &b"noise,preset,decoder"[..]),
-        ("Decoding chart as SVG…", "decoding.svg", b"<svg"),
-        ("Training chart as PNG…", "training.png", b"\x89PNG"),
+        ("Charts as SVG…", "charts.svg", b"<svg"),
+        ("Charts as PNG…", "charts.png", b"\x89PNG"),
     ];
     for (button, name, expected) in saved {
         let path = folder.path().join(name);
@@ -175,11 +172,18 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     let columns = |line: &str| line.split(',').count();
     let heading = columns(table.lines().next().unwrap());
     assert!(table.lines().all(|line| columns(line) == heading), "{table}");
-    let points = &driver.state().trade.outcome.as_ref().unwrap().levels[0].points;
+    let points = &driver.views().trade_off.outcome.as_ref().unwrap().levels[0].points;
     let z = points[0].report.errors.z_percent.unwrap();
     assert!(table.lines().nth(1).unwrap().contains(&format!(",{z:?},")), "{table}");
-    let svg = fs::read_to_string(folder.path().join("decoding.svg")).unwrap();
-    for text in ["newton, best preset", "time to decode a frame (µs)", "Z error (%)"] {
+    let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
+    for text in [
+        ">Newton<",
+        ">best preset<",
+        ">best preset, 32 bits<",
+        "time to decode a frame (µs)",
+        "training time (s)",
+        "Z error (%)",
+    ] {
         assert!(svg.contains(text), "{text}");
     }
 }
@@ -194,17 +198,17 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     driver.enter("Epochs at most", "200");
     driver.click("▶ Measure");
     driver.wait("the first points", |driver| {
-        let outcome = driver.state().trade.outcome.as_ref();
+        let outcome = driver.views().trade_off.outcome.as_ref();
         outcome.is_some_and(|outcome| outcome.points().0 >= 3)
     });
     assert!(driver.has("Decoding: Ridge, paper preset"));
     assert!(!driver.is_enabled("▶ Measure"), "one measurement at a time");
     driver.click("■ Cancel");
     assert!(
-        driver.state().trade.running.is_none(),
+        driver.views().trade_off.running.is_none(),
         "nobody waits for what is in hand"
     );
-    let outcome = driver.state().trade.outcome.as_ref().unwrap();
+    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     let (done, all) = outcome.points();
     assert!((3..all).contains(&done), "{done} of {all}");
     assert_eq!(outcome.ending, Some(TradeEnding::Cut));
@@ -213,7 +217,7 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     driver.type_into("Hidden nodes", "3");
     driver.enter("Epochs at most", "3");
     measure(&mut driver);
-    assert_eq!(driver.state().trade.outcome.as_ref().unwrap().points(), (16, 16));
+    assert_eq!(driver.views().trade_off.outcome.as_ref().unwrap().points(), (16, 16));
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Training, watched, held, ended and gone wrong.
 
-use std::{thread, time::Duration};
+use std::fs;
 
 use decoupler::{
-    app::{Phase, surface_view::ViewMode},
+    app::{Effect, Phase},
     evaluation::{Run, SimulatedSettings},
+    figure::surface::ViewMode,
     training::{Method, MomentumSettings, StopReason},
 };
 use eframe::egui::{Key, Modifiers};
@@ -108,8 +109,8 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
 
     driver.click("Show");
     let worst = driver.state().result().unwrap().errors.worst_node;
-    assert_eq!(driver.state().look.snapshot, worst.snapshot);
-    assert_eq!(driver.state().look.node, Some(worst.row * 6 + worst.node));
+    assert_eq!(driver.views().train.snapshot, worst.snapshot);
+    assert_eq!(driver.views().train.node, Some(worst.row * 6 + worst.node));
     for theme in ["Light", "Dark"] {
         driver.click_button(theme);
         driver.settle();
@@ -117,14 +118,14 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
 }
 
 /// A training that goes on for as long as one looks.
-fn endless() -> SimulatedSettings {
+pub(crate) fn endless() -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = 1_000_000;
     settings
 }
 
-fn start_endless(driver: &mut Driver) {
+pub(crate) fn start_endless(driver: &mut Driver) {
     driver.configure_small();
     choose_method(driver, "Momentum, Eq. (11)");
     driver.enter("Epochs", "1000000");
@@ -140,16 +141,20 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
     assert!(!driver.is_enabled("▶ Train") && !driver.is_enabled("Hidden nodes"));
     driver.click("⏸ Pause");
     driver.wait("the pause", |driver| driver.has("Paused"));
-    // The epoch that was under way when the button was pressed.
-    thread::sleep(Duration::from_millis(500));
-    driver.harness().run_steps(2);
+    driver.wait_for_hold();
     let held = driver.epochs();
-    for _ in 0..50 {
-        thread::sleep(Duration::from_millis(5));
-        driver.harness().step();
-    }
-    assert_eq!(driver.epochs(), held);
-    driver.settle();
+    // What the training thread knows once it has answered what came after Pause.
+    let folder = tempfile::tempdir().unwrap();
+    let curves = folder.path().join("curves.csv");
+    driver.save("Type a path for the loss curves", &curves);
+    let lines = fs::read_to_string(curves).unwrap().lines().count();
+    assert_eq!(
+        (driver.epochs(), lines),
+        (held, held + 2),
+        "a heading, the start, and the epochs"
+    );
+    driver.click("Dismiss");
+    assert!(driver.comes_to_rest());
     assert!(!driver.is_enabled("▶ Train") && driver.is_enabled("■ Stop"));
 
     driver.click("▶ Resume");
@@ -188,15 +193,24 @@ fn keys_hold_resume_and_stop_and_the_next_training_starts_afresh() {
 }
 
 #[test]
-fn stop_pressed_at_once_still_leaves_a_network_to_look_at() {
+fn stop_while_a_training_is_prepared_is_answered_at_once_and_the_one_before_stays() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.click("▶ Train");
-    driver.press_with(Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-    assert_eq!(driver.table().len(), 20);
-    assert!(driver.has("Decoupled surface"));
-    driver.settle();
+    for before in [Phase::Idle, Phase::Ended(StopReason::EpochsReached)] {
+        assert_eq!(driver.state().phase, before);
+        // So many that the training cannot have begun before it is stopped.
+        let mut many = small();
+        many.source.samples = 200_000;
+        driver.window_mut().apply(Effect::Configure(Box::new(many)));
+        driver.window_mut().apply(Effect::Train);
+        assert_eq!(driver.state().phase, Phase::Preparing);
+        driver.window_mut().apply(Effect::Stop);
+        assert_eq!(driver.state().phase, before);
+        driver.window_mut().apply(Effect::Configure(Box::new(small())));
+        driver.train();
+        assert_eq!(driver.table(), table_of(&trained(small())));
+        assert!(!driver.says("stopped by you"));
+    }
 }
 
 #[test]

@@ -1,23 +1,12 @@
-//! The surface plot: a height field in space or from above, projected on the CPU into one `egui::Mesh`.
+//! The widget that shows a [`Surface`](crate::figure::surface::Surface) and lets the user turn it.
 //!
-//! `view` is the widget. It shows a `drawing`, which is kept for as long as nothing in it changes. The drawing asks
-//! [`camera`](OrbitCamera) and `projection` where things lie, lets `axes` or `plan` lay out the frame with its ticks,
-//! `mesh` paint the surface with the lines of `contour` from far to near, and `nodes` put the dots on it.
+//! `view` is the widget, `painted` what it paints: the surface as laid out in its card, kept for as long as nothing in it
+//! changes.
 
-mod axes;
-mod camera;
 mod colour_bar;
-mod contour;
-mod drawing;
-mod edge;
-mod labels;
-mod mesh;
-mod nodes;
-mod plan;
-mod projection;
+mod painted;
 mod ribbon;
 mod view;
 
-pub use camera::OrbitCamera;
 pub use colour_bar::ColourBar;
-pub use view::{Colours, SurfaceView, SurfaceViewResponse, ViewMode};
+pub use view::{SurfaceView, SurfaceViewResponse};

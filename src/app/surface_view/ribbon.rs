@@ -5,6 +5,10 @@ use eframe::egui::{Color32, Mesh, Pos2};
 /// Half the width over which a line fades out, in points.
 const REACH: f32 = 1.0;
 
+/// Vertices and triangles of one line.
+pub(super) const VERTICES: usize = 6;
+pub(super) const TRIANGLES: usize = 4;
+
 /// Appends a line about one point wide whose colour fades out on both sides.
 pub(super) fn line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
     let along = to - from;

@@ -1,81 +1,29 @@
 //! The widget.
 
-use std::ops::RangeInclusive;
-
 use eframe::egui::{
     self, EventFilter, Key, Label, Modifiers, PointerButton, Pos2, Rect, RectAlign, Response, RichText, Sense, Stroke,
     StrokeKind, Tooltip, Ui, Vec2, WidgetInfo,
 };
-use glam::DVec3;
 
-use super::camera::OrbitCamera;
-use super::nodes::{self, Dot};
-use crate::app::theme::{ColourMap, Theme, type_size};
-use crate::app::ticks::tick_text;
-use crate::export::format_number;
-use crate::surface::Grid;
-
-/// What the values mean, and with it their colours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Colours {
-    /// Heights, in viridis.
-    Height,
-    /// Errors, diverging about zero.
-    Error,
-    /// A deformation pattern without a scale of its own, diverging about zero.
-    Pattern,
-    /// How much readings change with each node, in viridis.
-    Sensitivity,
-}
-
-impl Colours {
-    pub(super) fn map(self, theme: &Theme) -> &ColourMap {
-        match self {
-            Self::Height | Self::Sensitivity => &theme.heights,
-            Self::Error | Self::Pattern => &theme.errors,
-        }
-    }
-
-    /// Name of the value axis, with its unit.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Height => "z (mm)",
-            Self::Error => "error (mm)",
-            Self::Pattern => "pattern",
-            Self::Sensitivity => "1/mm",
-        }
-    }
-}
-
-/// From where the surface is seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum ViewMode {
-    /// In space.
-    #[default]
-    ThreeD,
-    /// From above, as a map.
-    Top,
-}
+use super::painted::{Painted, to_egui, to_glam};
+use crate::{
+    app::theme::{Theme, type_size},
+    export::format_number,
+    figure::{
+        surface::{OrbitCamera, Quantity, Surface, ViewMode},
+        ticks::tick_text,
+    },
+};
 
 /// A surface plot that fills the space it is given.
 #[derive(Clone, Debug)]
 pub struct SurfaceView<'a> {
     /// Name for assistive technology and tests, and the id among its siblings: "Actual surface".
     pub label: &'a str,
-    /// Where the values are.
-    pub grid: &'a Grid,
-    /// Millimetres on the grid, `x points × y points`. NaN leaves a gap.
-    pub values_mm: &'a [f64],
-    /// The nodes: x, y and value in millimetres. NaN hides one.
-    pub nodes_mm: &'a [DVec3],
-    /// Values at the ends of the colours and of the z axis.
-    pub range_mm: RangeInclusive<f64>,
-    /// What the values mean.
-    pub colours: Colours,
-    /// From where.
-    pub mode: ViewMode,
+    /// What is shown.
+    pub surface: &'a Surface,
     /// A node to mark, for instance the one hovered in a neighbouring view.
-    pub highlight: Option<usize>,
+    pub marked_node: Option<usize>,
     /// Dark or light.
     pub theme: &'a Theme,
 }
@@ -108,20 +56,11 @@ impl SurfaceViewResponse {
     }
 }
 
-/// Says of nodes beyond the axes that they are drawn at their edge.
-fn beyond_text(dots: &[Option<Dot>]) -> Option<String> {
-    match nodes::beyond(dots) {
-        0 => None,
-        1 => Some("1 node beyond the axes is drawn at their edge".to_owned()),
-        count => Some(format!("{count} nodes beyond the axes are drawn at their edge")),
-    }
-}
-
 impl SurfaceView<'_> {
     /// Draws the surface in the space that is left and lets the user turn it.
     pub fn show(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
-        let camera = match self.mode {
+        let camera = match self.surface.mode {
             ViewMode::ThreeD => operate(ui, &response, camera),
             ViewMode::Top => camera,
         };
@@ -145,19 +84,16 @@ impl SurfaceView<'_> {
 
     fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
         let painter = ui.painter_at(rect);
-        let drawing = self.drawing(ui, &painter, rect, shown);
-        drawing.paint(&painter, self.theme);
+        let painted = Painted::of(self.surface, shown.camera, self.theme, ui, &shown.response);
         let is_idle = !shown.response.dragged();
         let pointer = shown.response.hover_pos().filter(|_| is_idle);
-        shown.hovered_node = pointer.and_then(|pointer| nodes::nearest(&drawing.dots, pointer));
-        shown.hovered_at = shown.hovered_node.and_then(|node| nodes::position(&drawing.dots, node));
-        nodes::paint(
-            &painter,
-            &drawing.dots,
-            shown.hovered_node.or(self.highlight),
-            self.theme,
-        );
-        if let Some(note) = beyond_text(&drawing.dots) {
+        shown.hovered_node = pointer.and_then(|pointer| painted.dots.nearest(to_glam(pointer)));
+        shown.hovered_at = shown
+            .hovered_node
+            .and_then(|node| painted.dots.position(node))
+            .map(to_egui);
+        painted.paint(&painter, &self.theme.palette, shown.hovered_node.or(self.marked_node));
+        if let Some(note) = painted.dots.note() {
             // Below the axes, partly in the margin of the card, so that the picture keeps its size.
             let size = type_size().small;
             let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
@@ -170,19 +106,16 @@ impl SurfaceView<'_> {
     fn describe(&self, ui: &Ui, response: &Response) {
         response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, self.label));
         ui.ctx().accesskit_node_builder(response.id, |node| {
-            let heights = self
-                .nodes_mm
-                .iter()
-                .map(|node| node.z)
-                .filter(|height| height.is_finite());
-            let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+            let values = self.surface.nodes.iter().map(|node| node.z);
+            let finite = values.filter(|value| value.is_finite());
+            let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
             let millimetres = |value: f64| tick_text(value, 0.01);
             node.set_value(if low <= high {
-                match self.colours {
-                    Colours::Height => format!("z {} to {} mm", millimetres(low), millimetres(high)),
-                    Colours::Error => format!("error {} to {} mm", millimetres(low), millimetres(high)),
-                    Colours::Pattern => format!("pattern {} to {}", format_number(low), format_number(high)),
-                    Colours::Sensitivity => {
+                match self.surface.quantity {
+                    Quantity::Height => format!("z {} to {} mm", millimetres(low), millimetres(high)),
+                    Quantity::Error => format!("error {} to {} mm", millimetres(low), millimetres(high)),
+                    Quantity::Pattern => format!("pattern {} to {}", format_number(low), format_number(high)),
+                    Quantity::Sensitivity => {
                         format!("sensitivity {} to {} per mm", format_number(low), format_number(high))
                     }
                 }

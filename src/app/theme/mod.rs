@@ -2,22 +2,19 @@
 //!
 //! Panels take colours, sizes and distances from here and write none of their own.
 
-mod colour_map;
-mod components;
 mod fonts;
 mod style;
 mod tokens;
 
-pub use colour_map::ColourMap;
-pub use components::{
-    PrimaryButton, card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button,
-    progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, slider_style, tabs_ui,
-};
 pub use fonts::{font_definitions, semibold};
 pub use style::{apply, install};
 pub use tokens::{Palette, SPACE, TypeSizes, radius, space, type_size};
 
 use std::sync::OnceLock;
+
+use eframe::egui::Color32;
+
+use crate::figure::{ColourMap, Rgb, surface::Quantity};
 
 /// Everything that depends on dark or light.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +23,6 @@ pub struct Theme {
     pub is_dark: bool,
     /// Named colours.
     pub palette: Palette,
-    /// Colours of heights: viridis.
-    pub heights: ColourMap,
     /// Colours of errors: diverging, zero in the colour of the panel.
     pub errors: ColourMap,
 }
@@ -59,8 +54,21 @@ impl Theme {
         Self {
             is_dark,
             palette,
-            heights: ColourMap::viridis(),
-            errors: ColourMap::diverging(&palette),
+            errors: ColourMap::diverging(palette.error_stops.map(|stop| [stop.r(), stop.g(), stop.b()])),
         }
     }
+
+    /// Colours of the values of a surface.
+    pub fn colours(&self, quantity: Quantity) -> &ColourMap {
+        if quantity.is_diverging() {
+            &self.errors
+        } else {
+            ColourMap::viridis()
+        }
+    }
+}
+
+/// An opaque colour.
+pub fn rgb([red, green, blue]: Rgb) -> Color32 {
+    Color32::from_rgb(red, green, blue)
 }

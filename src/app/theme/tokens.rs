@@ -35,14 +35,10 @@ pub struct Palette {
     pub warning_tint: Color32,
     /// Something failed.
     pub bad: Color32,
-    /// Curve of the training set.
-    pub training_series: Color32,
-    /// Curve of the validation set.
-    pub validation_series: Color32,
-    /// Curve of the test set.
-    pub test_series: Color32,
-    /// A series that is none of the sets.
-    pub further_series: Color32,
+    /// A series told apart from all others.
+    pub violet: Color32,
+    /// Another one.
+    pub cyan: Color32,
     /// The diverging map from most negative to most positive; its middle is the panel.
     pub error_stops: [Color32; 5],
 }
@@ -65,10 +61,8 @@ impl Palette {
         warning: Color32::from_rgb(0xf0, 0xa8, 0x3c),
         warning_tint: Color32::from_rgb(0x33, 0x2b, 0x22),
         bad: Color32::from_rgb(0xf2, 0x6d, 0x6d),
-        training_series: Color32::from_rgb(0x5b, 0x9d, 0xff),
-        validation_series: Color32::from_rgb(0x4c, 0xc3, 0x8a),
-        test_series: Color32::from_rgb(0xf0, 0xa8, 0x3c),
-        further_series: Color32::from_rgb(0xb9, 0x8c, 0xf0),
+        violet: Color32::from_rgb(0xb9, 0x8c, 0xf0),
+        cyan: Color32::from_rgb(0x4f, 0xc4, 0xd9),
         error_stops: [
             Color32::from_rgb(0x9a, 0xd8, 0xff),
             Color32::from_rgb(0x2f, 0x7f, 0xd0),
@@ -95,10 +89,8 @@ impl Palette {
         warning: Color32::from_rgb(0xa8, 0x64, 0x00),
         warning_tint: Color32::from_rgb(0xf7, 0xef, 0xe2),
         bad: Color32::from_rgb(0xc6, 0x2f, 0x2f),
-        training_series: Color32::from_rgb(0x1f, 0x6f, 0xeb),
-        validation_series: Color32::from_rgb(0x1a, 0x7f, 0x4b),
-        test_series: Color32::from_rgb(0xa8, 0x64, 0x00),
-        further_series: Color32::from_rgb(0x7a, 0x3e, 0xb1),
+        violet: Color32::from_rgb(0x7a, 0x3e, 0xb1),
+        cyan: Color32::from_rgb(0x0b, 0x76, 0x8c),
         error_stops: [
             Color32::from_rgb(0x0b, 0x3d, 0x91),
             Color32::from_rgb(0x5b, 0x9b, 0xe6),

@@ -1,217 +1,153 @@
-use super::{DecouplerWindow, decoupler_window::wake};
+use std::{
+    path::PathBuf,
+    sync::{Arc, mpsc::channel},
+};
+
+use super::{DecouplerWindow, closing::Closing, save_form::Saving};
 use crate::{
     app::{
-        action::Action,
-        experiments,
-        identifiability::{self, IdentifiabilityAction},
-        paper_figure::PaperFigure,
-        runs::{self, RunsAction, RunsRequest},
-        state::{Notice, Phase, RightCard, RunView, Saving, View},
-        theme, trade,
-        worker::{Request, Worker},
+        preview,
+        shared::{Effect, FileTask, Phase, Purpose},
+        theme,
+        training_worker::{LOST, Request, Worker},
+        views::ExportKind,
     },
     evaluation::SimulatedSettings,
-    training::StopReason,
 };
 
 impl DecouplerWindow {
-    /// Does what the user meant.
-    pub fn apply(&mut self, action: Action) {
-        let state = &mut self.state;
-        match action {
-            Action::Configure(draft) => self.configure(*draft),
-            Action::Train => {
-                state.phase = Phase::Preparing;
-                state.notice = None;
-                self.worker.ask(Request::Train(Box::new(state.draft)));
+    /// Does what a view asks for.
+    pub fn apply(&mut self, effect: Effect) {
+        let shared = &mut self.shared;
+        match effect {
+            Effect::Configure(draft) => self.configure(*draft),
+            Effect::ShowTraining => self.show(0),
+            Effect::Train => {
+                let settings = Box::new(shared.draft);
+                self.prepare(Request::Train(settings));
             }
-            Action::TakeUp(settings, states) => {
-                // A training may have begun in the same frame.
-                if !state.phase.is_busy() {
-                    state.phase = Phase::Preparing;
-                    state.notice = None;
-                    self.worker.ask(Request::TakeUp(settings, states));
-                }
-            }
-            Action::Pause => {
-                state.phase = Phase::Paused;
+            // A training may have begun in the same frame.
+            Effect::TakeUp(..) if shared.phase.is_busy() => {}
+            Effect::TakeUp(settings, states) => self.prepare(Request::TakeUp(settings, states)),
+            Effect::Pause => {
+                shared.phase = Phase::Paused;
                 self.worker.ask(Request::Pause);
             }
-            Action::Resume => {
+            Effect::Resume => {
                 // The settings on the left are always those that are trained with.
-                if let Some(run) = &state.run {
-                    state.draft.training = run.asked.training;
+                if let Some(run) = &mut shared.run {
+                    run.is_saved = false;
+                    shared.draft.training = run.asked.training;
                 }
-                state.phase = Phase::Training;
-                self.measuring.forget(&mut state.decoders);
+                shared.phase = Phase::Training;
                 self.worker.ask(Request::Resume);
             }
-            Action::Continue if state.can_continue() => {
-                state.phase = Phase::Training;
-                state.notice = None;
-                self.worker.ask(Request::Continue(state.draft.training));
+            Effect::Continue if shared.can_continue() => {
+                shared.phase = Phase::Training;
+                self.notice = None;
+                self.worker.ask(Request::Continue(shared.draft.training));
             }
-            Action::Continue => {}
-            Action::Stop => self.worker.ask(Request::Stop),
-            Action::ShowSnapshot(snapshot) => {
-                state.look.snapshot = snapshot;
-                state.refresh_frames();
-            }
-            Action::GoTo(address) => {
-                state.look.snapshot = address.snapshot;
-                state.look.node = state.test().and_then(|test| test.node(address));
-                state.refresh_frames();
-            }
-            Action::MoveCamera(camera) => state.look.camera = camera,
-            Action::SetViewMode(mode) => state.look.mode = mode,
-            Action::SetRightCard(right) => state.look.right = right,
-            Action::HoverNode(node) => state.look.node = node,
-            Action::ShowTab(tab) => state.look.tab = tab,
-            Action::ShowErrorBars(has_error_bars) => {
-                state.look.has_error_bars = has_error_bars;
-                state.refresh_frames();
-            }
-            Action::ShowDecoders(is_open) => {
-                state.decoders.is_open = is_open;
-                self.measure_decoders();
-            }
-            Action::ShowPaperFigure(figure) => self.show_paper_figure(figure),
-            Action::SetDark(is_dark) => {
-                state.look.is_dark = is_dark;
-                theme::apply(&self.ctx, is_dark);
-            }
-            Action::ChooseFile(task) => {
-                let ctx = self.ctx.clone();
-                self.dialogs
-                    .ask(task, &state.suggested_path(task), move || ctx.request_repaint());
-            }
-            Action::TypePath(task) => {
-                let typed = state.typed.clone().filter(|typed| typed.task == task);
-                let suggested = || state.suggested_path(task).display().to_string();
-                state.saving = Some(typed.unwrap_or_else(|| Saving {
-                    task,
-                    path: suggested(),
-                }));
-            }
-            Action::EditPath(path) => {
-                if let Some(saving) = &mut state.saving {
-                    saving.path = path;
+            Effect::Continue => {}
+            Effect::Stop => {
+                self.worker.ask(Request::Stop);
+                // What was being prepared does not begin; the training before it stays.
+                if shared.phase == Phase::Preparing {
+                    shared.phase = shared.phase_at_rest();
                 }
             }
-            Action::Export(kind, path) => {
-                state.typed = state.saving.take();
-                self.worker.ask(Request::Export(kind, path));
-            }
-            Action::ShowView(view) => {
-                state.view = view;
-                if view == View::Identifiability {
-                    identifiability::enter(state, &mut self.identifiability);
+            Effect::Look(look) => shared.look = look,
+            Effect::ChooseFile(task) => {
+                if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
+                    self.type_path(task);
                 }
             }
-            Action::Identifiability(IdentifiabilityAction::UseSensor) => {
-                let settings = state.identifiability.hand_over(&state.draft);
-                state.view = View::Train;
-                self.configure(settings);
-            }
-            Action::Identifiability(action) => identifiability::apply(action, state, &mut self.identifiability),
-            Action::Experiments(action) => experiments::apply(action, state, &mut self.experiments),
-            Action::ExportPicture(picture, path) => {
-                state.typed = state.saving.take();
-                if let Some(picture) = picture.of(state) {
-                    self.runs.ask(RunsRequest::Write(Box::new(picture), path));
-                }
-            }
-            Action::Runs(RunsAction::TakeSettings(id)) => {
-                if let Some(settings) = state.runs.run(id).map(|run| run.file.settings) {
-                    state.view = View::Train;
-                    self.configure(settings);
-                }
-            }
-            Action::Runs(action) => runs::apply(action, state, &self.runs),
-            Action::Trade(action) => {
-                if let Some(settings) = trade::apply(action, state, &mut self.trade) {
-                    state.view = View::Train;
-                    self.configure(settings);
-                }
-            }
-            Action::OpenCheckpoint(path) => {
-                state.typed = state.saving.take();
-                // A training may have begun while the desktop's dialog was open.
-                if !state.phase.is_busy() {
-                    state.phase = Phase::Preparing;
-                    state.notice = None;
-                    self.worker.ask(Request::Open(path));
-                }
-            }
-            Action::CancelSave => state.saving = None,
-            Action::DismissNotice => state.notice = None,
-            Action::RestartWorker => match Worker::start(wake(&self.ctx)) {
-                Ok(worker) => {
-                    self.worker = worker;
-                    state.phase = state.phase_at_rest();
-                    state.notice = None;
-                    self.ask_for_what_is_missing();
-                }
-                Err(error) => state.notice = Some(Notice::Failed(format!("No thread could be started: {error}"))),
-            },
+            Effect::TypePath(task) => self.type_path(task),
+            Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
+            Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
+            Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
+            Effect::Tell(notice) => self.notice = Some(notice),
+            Effect::DismissNotice => self.notice = None,
         }
     }
 
-    /// Asks for the networks to be measured beside other decoders, once they stand still and their table is unfolded.
-    pub(super) fn measure_decoders(&mut self) {
-        let state = &mut self.state;
-        let is_standing = matches!(state.phase, Phase::Paused | Phase::Ended(_));
-        if state.decoders.is_open && is_standing && state.decoders.measured.is_none() {
-            let number = self.measuring.expect(&mut state.decoders);
-            self.worker.ask(Request::Networks(number));
-        }
+    /// Asks for another training than the one on show.
+    fn prepare(&mut self, request: Request) {
+        self.shared.phase = Phase::Preparing;
+        self.notice = None;
+        self.worker.ask(request);
     }
 
-    /// Looks at a figure of the paper, and trains what it shows unless that is there.
-    pub(super) fn show_paper_figure(&mut self, figure: PaperFigure) {
-        // A training may have begun since the button was drawn.
-        if self.state.phase.is_busy() {
-            return;
-        }
-        let settings = figure.settings();
-        self.configure(settings);
-        let look = &mut self.state.look;
-        look.right = RightCard::Decoupled;
-        look.mode = figure.mode().unwrap_or(look.mode);
-        look.tab = figure.tab().unwrap_or(look.tab);
-        let is_complete = |run: &RunView| {
-            let was_stopped = run.stop_reason == Some(StopReason::Stopped);
-            run.asked == settings && run.stop_reason.is_some() && !was_stopped
+    /// Shows the view in this place.
+    pub(super) fn show(&mut self, place: usize) {
+        self.shown = place;
+        // Another window may have been at work.
+        self.runs.look();
+        self.views.all()[place].enter(&self.shared);
+    }
+
+    pub(super) fn set_dark(&mut self, is_dark: bool) {
+        self.shared.look.is_dark = is_dark;
+        theme::apply(&self.ctx, is_dark);
+    }
+
+    /// Asks for a path in the window itself; the one last typed is offered again for the same file.
+    pub(super) fn type_path(&mut self, task: FileTask) {
+        let is_same = |typed: &&Saving| (typed.task.words, &typed.task.suggestion) == (task.words, &task.suggestion);
+        let path = match self.typed.as_ref().filter(is_same) {
+            Some(typed) => typed.path.clone(),
+            None => task.suggested_path().display().to_string(),
         };
-        if !self.state.shown_run().is_some_and(is_complete) {
-            self.apply(Action::Train);
+        self.saving = Some(Saving { task, path });
+    }
+
+    /// Does with the file in `path` what it was asked for.
+    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
+        let is_checkpoint = task.words == ExportKind::Checkpoint.words();
+        if is_checkpoint && self.closing == Some(Closing::ChoosingPath) {
+            self.closing = Some(Closing::Finishing);
         }
+        match task.purpose {
+            Purpose::SaveTraining(run, write) => {
+                let (send, written) = channel();
+                self.worker.ask(Request::Export(run, write, path.clone(), send));
+                self.files
+                    .write(path, move |_| written.recv().unwrap_or_else(|_| Err(LOST.to_owned())));
+            }
+            Purpose::Save(contents) => self.files.write(path, move |path| contents.write(path)),
+            // A training may have begun while the desktop's dialog was open.
+            Purpose::Open if self.shared.phase.is_busy() => {}
+            Purpose::Open => self.prepare(Request::Open(path)),
+        }
+    }
+
+    /// Starts the worker again after it died.
+    pub(super) fn restart_worker(&mut self) {
+        self.worker = Worker::start(Arc::clone(&self.wake));
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notice = None;
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
     pub(super) fn configure(&mut self, draft: SimulatedSettings) {
-        let before = self.state.draft;
-        self.state.draft = draft;
-        let run = self.state.run.as_ref();
+        let before = std::mem::replace(&mut self.shared.draft, draft);
+        let run = self.shared.run.as_ref();
         if run.is_some_and(|run| have_same_test_set(&run.settings, &draft)) {
-            if self.state.preview.take().is_some() {
-                self.state.refresh_frames();
-            }
+            self.shared.preview = None;
         } else if !have_same_sets(&before, &draft) {
             self.ask_for_what_is_missing();
         }
     }
 
     /// Asks for what the settings are to show before a training and the window does not know yet.
-    pub(super) fn ask_for_what_is_missing(&self) {
-        let state = &self.state;
-        let draft = Box::new(state.draft);
-        match (&state.preview, &state.run) {
+    pub(super) fn ask_for_what_is_missing(&mut self) {
+        let shared = &self.shared;
+        let draft = shared.draft;
+        match (&shared.preview, &shared.run) {
             (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
-                self.worker.ask(Request::Baselines(draft));
+                preview::compare(&mut self.previews, draft);
             }
             (None, Some(run)) if have_same_test_set(&run.settings, &draft) => {}
-            _ => self.worker.ask(Request::Preview(draft)),
+            _ => preview::draw(&mut self.previews, draft),
         }
     }
 }

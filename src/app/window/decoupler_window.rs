@@ -1,33 +1,45 @@
 use std::{path::PathBuf, sync::Arc};
 
-use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
+use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui};
 
-use crate::app::{
-    decoders::DecoderMeasuring,
+use super::{
+    closing::Closing,
     dialogs::{DialogKind, Dialogs},
-    experiments::{self, ExperimentWorker},
-    identifiability::{self, IdentifiabilityWorker},
-    panels,
-    runs::{self, RunsRequest, RunsWorker},
-    shortcuts::pressed_shortcuts,
-    state::{State, View},
+    files::Files,
+    notice::{self, notice_ui},
+    save_form::{self, Saving, save_form_ui},
+    top_bar::top_bar_ui,
+};
+use crate::app::{
+    job::{Job, Wake},
+    preview::PreviewEvent,
+    shared::{Effect, Notice, RunsWorker, Shared},
     theme::{self, Theme, space},
-    threads::Wake,
-    trade::{self, TradeWorker},
-    worker::Worker,
+    training_worker::Worker,
+    views::Views,
 };
 
-/// The window: its state, the worker, and the one place where actions are applied.
-#[derive(Debug)]
+/// The window: what is shared, the views, and the one place where what they ask for is done.
 pub struct DecouplerWindow {
-    pub(super) state: State,
+    pub(super) shared: Shared,
+    pub(super) views: Views,
+    /// Their places and names.
+    names: Vec<(usize, &'static str)>,
+    /// The place of the view on show among all.
+    pub(super) shown: usize,
+    /// Something to tell the user.
+    pub(super) notice: Option<Notice>,
+    /// A file waiting for its path.
+    pub(super) saving: Option<Saving>,
+    /// The path last typed, offered again for the same file.
+    pub(super) typed: Option<Saving>,
     pub(super) worker: Worker,
-    pub(super) experiments: ExperimentWorker,
+    pub(super) previews: Job<PreviewEvent>,
     pub(super) runs: RunsWorker,
-    pub(super) identifiability: IdentifiabilityWorker,
-    pub(super) trade: TradeWorker,
-    pub(super) measuring: DecoderMeasuring,
+    pub(super) files: Files,
     pub(super) dialogs: Dialogs,
+    pub(super) closing: Option<Closing>,
+    pub(super) wake: Wake,
     pub(super) ctx: Context,
 }
 
@@ -39,54 +51,76 @@ impl DecouplerWindow {
     pub fn new(ctx: &Context, dialogs: DialogKind) -> std::io::Result<Self> {
         let is_dark = ctx.system_theme() != Some(egui::Theme::Light);
         theme::install(ctx, is_dark);
-        let wake = wake(ctx);
-        let window = Self {
-            state: State::new(is_dark),
-            worker: Worker::start(Arc::clone(&wake))?,
-            experiments: ExperimentWorker::new(Arc::clone(&wake)),
-            runs: RunsWorker::start(Arc::clone(&wake))?,
-            identifiability: IdentifiabilityWorker::new(Arc::clone(&wake)),
-            trade: TradeWorker::new(wake),
-            measuring: DecoderMeasuring::default(),
+        let wake: Wake = {
+            let ctx = ctx.clone();
+            Arc::new(move || ctx.request_repaint())
+        };
+        let mut views = Views::new(&wake);
+        let names = views.all().into_iter().map(|view| view.name()).enumerate();
+        let mut window = Self {
+            names: names.collect(),
+            shared: Shared::new(is_dark),
+            views,
+            shown: 0,
+            notice: None,
+            saving: None,
+            typed: None,
+            worker: Worker::start(Arc::clone(&wake)),
+            previews: Job::new("preview", Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake)),
+            files: Files::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
+            closing: None,
+            wake,
             ctx: ctx.clone(),
         };
         window.ask_for_what_is_missing();
         Ok(window)
     }
 
-    /// Takes up the run list in `path`, and keeps finished trainings there from now on. Without it they are gone when the
-    /// window closes.
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.ask(RunsRequest::Load(path));
+        self.runs.open(path);
         self
     }
 
-    /// What the panels read.
-    pub fn state(&self) -> &State {
-        &self.state
+    /// What all views read.
+    pub fn shared(&self) -> &Shared {
+        &self.shared
     }
 
-    /// Lays out the window and applies what the user did.
+    /// The views, on show or not.
+    pub fn views(&self) -> &Views {
+        &self.views
+    }
+
+    /// The name of the view on show.
+    pub fn shown(&self) -> &'static str {
+        self.names[self.shown].1
+    }
+
+    /// What the user is told.
+    pub fn notice(&self) -> Option<&Notice> {
+        self.notice.as_ref()
+    }
+
+    /// Lays out the window and does what the user meant.
     pub fn show_ui(&mut self, ui: &mut Ui) {
-        let state = &self.state;
-        let is_training_view = state.view == View::Train;
-        let mut actions = match state.view {
-            View::Train => pressed_shortcuts(ui.ctx(), state),
-            View::Experiments => experiments::pressed_shortcuts(ui.ctx(), state),
-            View::TradeOff => trade::pressed_shortcuts(ui.ctx(), state),
-            View::Compare | View::Identifiability => Vec::new(),
-        };
+        // Another window may have been at work.
+        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+            self.runs.look();
+        }
+        let mut effects = Vec::new();
+        let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
+        // A question is to be answered first.
+        if self.saving.is_none() && self.closing.is_none() {
+            view.take_shortcuts(ui.ctx(), shared, &mut effects);
+        }
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let layout = panels::WorkbenchLayout::of_width(ui.available_width());
-        let has_report_beside = layout == panels::WorkbenchLayout::ReportBeside;
-        let left = if has_report_beside || !is_training_view {
-            space(68)
-        } else {
-            space(62)
-        };
+        let columns = view.columns(ui.available_width());
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -94,64 +128,93 @@ impl DecouplerWindow {
             top: 4,
             bottom: 4,
         };
-        Panel::top("top bar")
+        let top_bar = Panel::top("top bar")
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
-            .show(ui, |ui| actions.extend(panels::top_bar_ui(ui, state)));
+            .show(ui, |ui| {
+                top_bar_ui(ui, &self.names, self.shown, |ui| {
+                    view.tools_ui(ui, shared, &mut effects);
+                })
+            });
         Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
-            .show(ui, |ui| {
-                match state.view {
-                    View::Train | View::Compare => panels::status_line_ui(ui, state),
-                    View::Experiments => experiments::status_ui(ui, &state.experiments),
-                    View::Identifiability => identifiability::status_ui(ui, &state.identifiability),
-                    View::TradeOff => trade::status_ui(ui, &state.trade),
-                };
-            });
+            .show(ui, |ui| view.status_ui(ui, shared));
         Panel::left("configuration")
-            .exact_size(left)
+            .exact_size(columns.form_width)
             .resizable(false)
             .frame(panel(side))
-            .show(ui, |ui| {
-                actions.extend(match state.view {
-                    View::Train => panels::configuration_ui(ui, state),
-                    View::Experiments => experiments::form_ui(ui, state),
-                    View::Compare => runs::run_list_ui(ui, state),
-                    View::Identifiability => identifiability::form_ui(ui, state),
-                    View::TradeOff => trade::form_ui(ui, state),
-                });
-            });
-        if has_report_beside && is_training_view {
+            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
+        if columns.has_report {
             Panel::right("report")
                 .exact_size(space(96))
                 .resizable(false)
                 .frame(panel(side))
-                .show(ui, |ui| actions.extend(panels::report_ui(ui, state)));
+                .show(ui, |ui| view.report_ui(ui, shared, &mut effects));
         }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
-        egui::CentralPanel::default().frame(background).show(ui, |ui| {
-            actions.extend(panels::notice_ui(ui, state));
-            actions.extend(match state.view {
-                View::Train => panels::workbench_ui(ui, state, layout),
-                View::Experiments => experiments::experiments_ui(ui, state),
-                View::Compare => runs::compare_ui(ui, state),
-                View::Identifiability => identifiability::identifiability_ui(ui, state),
-                View::TradeOff => trade::trade_ui(ui, state),
-            });
+        let reply = egui::CentralPanel::default().frame(background).show(ui, |ui| {
+            let reply = self
+                .notice
+                .as_ref()
+                .and_then(|notice| notice_ui(ui, notice, shared.phase));
+            view.body_ui(ui, shared, &mut effects);
+            reply
         });
-        actions.extend(panels::save_form_ui(ui, state));
-        for action in actions {
-            self.apply(action);
+        if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
+        }
+        self.apply_all(effects);
+        match reply.inner {
+            Some(notice::Reply::Dismiss) => self.notice = None,
+            Some(notice::Reply::Restart) => self.restart_worker(),
+            None => {}
+        }
+        let (picked, is_other_theme) = top_bar.inner;
+        if let Some(place) = picked {
+            self.show(place);
+        }
+        if is_other_theme {
+            self.set_dark(!self.shared.look.is_dark);
+        }
+        self.ask_for_path(ui);
+        // What was begun in this frame must be finished too.
+        self.take_close_request();
+        self.closing_ui(ui);
+    }
+
+    /// Does what views ask for.
+    pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            self.apply(effect);
+        }
+    }
+
+    fn ask_for_path(&mut self, ui: &mut Ui) {
+        match self.saving.as_mut().and_then(|saving| save_form_ui(ui, saving)) {
+            Some(save_form::Reply::Path(path)) => {
+                self.typed = self.saving.take();
+                if let Some(typed) = self.typed.clone() {
+                    self.answer(typed.task, path);
+                }
+            }
+            Some(save_form::Reply::Cancel) => self.saving = None,
+            None => {}
         }
     }
 }
 
-/// Makes the window draw a frame.
-pub(super) fn wake(ctx: &Context) -> Wake {
-    let ctx = ctx.clone();
-    Arc::new(move || ctx.request_repaint())
+/// Whether the user did something in this frame that parts of the window already drawn may depend on: one frame more
+/// shows it everywhere. A pointer that merely moves changes nothing.
+fn changes_something(ctx: &Context) -> bool {
+    ctx.input(|input| {
+        let is_change = |event: &Event| match event {
+            Event::PointerMoved(_) | Event::MouseMoved(_) => input.pointer.any_down(),
+            Event::PointerGone | Event::WindowFocused(_) => false,
+            _ => true,
+        };
+        input.events.iter().any(is_change)
+    })
 }
 
 impl eframe::App for DecouplerWindow {
@@ -166,69 +229,101 @@ impl eframe::App for DecouplerWindow {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::{path::Path, time::Duration};
 
     use super::*;
-    use crate::app::{ExportKind, Notice, Phase, action::Action};
+    use crate::{
+        app::{
+            shared::{FileTask, FileWords, Phase, Purpose},
+            test_view::TestView,
+        },
+        evaluation::Run,
+        export::NetworkFile,
+    };
 
     fn window() -> DecouplerWindow {
         let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
-        wait(&mut window, |state| state.test().is_some());
-        let mut small = window.state.draft;
+        wait(&mut window, |window| window.shared.test().is_some());
+        let mut small = window.shared.draft;
         small.source.sensor.scale = "4x4_2x12".parse().unwrap();
         (small.hidden, small.source.samples, small.training.stopping.epochs) = (3, 40, 5);
-        window.apply(Action::Configure(Box::new(small)));
-        window.apply(Action::Train);
-        wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
+        window.apply(Effect::Configure(Box::new(small)));
+        window.apply(Effect::Train);
+        wait(&mut window, |window| matches!(window.shared.phase, Phase::Ended(_)));
         window
     }
 
+    /// Saves the network on show.
+    fn export(window: &mut DecouplerWindow, path: PathBuf) {
+        let task = save_task(window);
+        window.answer(task, path);
+    }
+
+    /// What the user asks for who wants to save the network on show.
+    fn save_task(window: &DecouplerWindow) -> FileTask {
+        let write = |run: &Run, path: &Path| {
+            let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
+            file.save(path).map_err(|error| error.to_string())
+        };
+        FileTask {
+            words: FileWords {
+                name: "Network…",
+                kind: "network",
+                description: "",
+                extensions: &["json"],
+            },
+            suggestion: "network.json".to_owned(),
+            purpose: Purpose::SaveTraining(window.shared.run.as_ref().unwrap().id, write),
+        }
+    }
+
     /// Takes news until `holds`; at most a minute.
-    fn wait(window: &mut DecouplerWindow, holds: impl Fn(&State) -> bool) {
+    fn wait(window: &mut DecouplerWindow, holds: impl Fn(&DecouplerWindow) -> bool) {
         for _ in 0..12_000 {
             window.take_news();
-            if holds(&window.state) {
+            if holds(window) {
                 return;
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        panic!("it never came: {:?}", window.state);
+        panic!("it never came: {:?}", window.shared);
     }
 
     #[test]
     fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
         let mut window = window();
-        let ended = window.state.phase;
+        let ended = window.shared.phase;
         window.worker = Worker::dead();
-        wait(&mut window, |state| state.phase == Phase::Died);
-        assert!(window.state.result().is_some());
-        window.apply(Action::RestartWorker);
+        wait(&mut window, |window| window.shared.phase == Phase::Died);
+        assert!(window.shared.result().is_some());
+        window.restart_worker();
         std::thread::sleep(Duration::from_millis(300));
         window.take_news();
-        assert_eq!((window.state.phase, &window.state.notice), (ended, &None));
-        assert!(window.state.result().is_some() && window.state.frames.decoupled.is_some());
+        assert_eq!((window.shared.phase, &window.notice), (ended, &None));
+        assert!(window.shared.result().is_some());
 
-        window.apply(Action::Export(ExportKind::Errors, "errors.csv".into()));
-        wait(&mut window, |state| state.notice.is_some());
+        export(&mut window, "network.json".into());
+        wait(&mut window, |window| window.notice.is_some());
         let lost = "the network was lost when the training thread ended: train again";
-        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
-        window.apply(Action::DismissNotice);
-        window.apply(Action::Continue);
-        wait(&mut window, |state| state.notice.is_some());
-        assert_eq!(window.state.notice, Some(Notice::Failed(lost.to_owned())));
-        assert_eq!(window.state.phase, ended);
-        window.apply(Action::Train);
-        wait(&mut window, |state| matches!(state.phase, Phase::Ended(_)));
+        assert_eq!(window.notice, Some(Notice::Failed(lost.to_owned())));
+        window.apply(Effect::DismissNotice);
+        window.apply(Effect::Continue);
+        wait(&mut window, |window| window.notice.is_some());
+        assert_eq!(window.notice, Some(Notice::Failed(lost.to_owned())));
+        assert_eq!(window.shared.phase, ended);
+        window.apply(Effect::Train);
+        wait(&mut window, |window| matches!(window.shared.phase, Phase::Ended(_)));
     }
 
     #[test]
     fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
         let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
         window.worker = Worker::dead();
-        wait(&mut window, |state| state.phase == Phase::Died);
-        window.apply(Action::RestartWorker);
-        wait(&mut window, |state| {
-            state
+        wait(&mut window, |window| window.shared.phase == Phase::Died);
+        window.restart_worker();
+        wait(&mut window, |window| {
+            window
+                .shared
                 .preview
                 .as_ref()
                 .is_some_and(|preview| preview.baselines.is_some())
@@ -236,28 +331,76 @@ mod tests {
     }
 
     #[test]
+    fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
+        let mut window = window();
+        let settings = window.shared.draft;
+        let drawn = TestView::draw(&settings);
+        window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
+        assert!(window.shared.preview.is_none() && window.shared.result().is_some());
+    }
+
+    #[test]
     fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("network.json");
         let mut window = window();
-        let (ended, shown) = (window.state.phase, window.state.draft);
+        let (ended, shown) = (window.shared.phase, window.shared.draft);
         let mut impossible = shown;
         impossible.training.stopping.goal_mse = f64::NAN;
-        window.apply(Action::Configure(Box::new(impossible)));
-        window.apply(Action::Train);
-        wait(&mut window, |state| state.notice.is_some());
-        assert!(matches!(window.state.notice, Some(Notice::Failed(_))));
-        assert_eq!(window.state.phase, ended, "the training on show has ended so");
-        assert!(window.state.result().is_some());
+        window.apply(Effect::Configure(Box::new(impossible)));
+        window.apply(Effect::Train);
+        wait(&mut window, |window| window.notice.is_some());
+        assert!(matches!(window.notice, Some(Notice::Failed(_))));
+        assert_eq!(window.shared.phase, ended, "the training on show has ended so");
+        assert!(window.shared.result().is_some());
 
-        window.apply(Action::DismissNotice);
-        window.apply(Action::Export(ExportKind::Network, path.clone()));
-        wait(&mut window, |state| state.notice.is_some());
-        assert_eq!(
-            window.state.notice,
-            Some(Notice::Done(format!("Saved {}", path.display())))
-        );
-        let file = crate::export::NetworkFile::load(&path).unwrap();
+        window.apply(Effect::DismissNotice);
+        export(&mut window, path.clone());
+        wait(&mut window, |window| window.notice.is_some());
+        assert_eq!(window.notice, Some(Notice::Done(format!("Saved {}", path.display()))));
+        let file = NetworkFile::load(&path).unwrap();
         assert_eq!(file.settings.hidden, shown.hidden);
+    }
+
+    #[test]
+    fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("network.json");
+        let mut window = window();
+        // The desktop's dialog is open.
+        let task = save_task(&window);
+        let mut other = window.shared.draft;
+        other.hidden = 4;
+        window.apply(Effect::Configure(Box::new(other)));
+        window.apply(Effect::Train);
+        wait(&mut window, |window| {
+            matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings.hidden == 4
+        });
+        window.answer(task, path.clone());
+        wait(&mut window, |window| window.notice.is_some());
+        let Some(Notice::Failed(reason)) = &window.notice else {
+            panic!("{:?}", window.notice)
+        };
+        assert!(reason.contains("another training has taken the place"), "{reason}");
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
+        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
+        wait(&mut window, |window| window.shared.test().is_some());
+        let mut impossible = window.shared.draft;
+        impossible.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        impossible.training.stopping.goal_mse = f64::NAN;
+        window.apply(Effect::Configure(Box::new(impossible)));
+        // Before the new test set is there.
+        window.apply(Effect::Train);
+        wait(&mut window, |window| window.notice.is_some());
+        wait(&mut window, |window| {
+            window
+                .shared
+                .test()
+                .is_some_and(|test| test.sensor == impossible.source.sensor)
+        });
     }
 }

@@ -1,151 +1,166 @@
-use std::sync::Arc;
+use std::path::PathBuf;
 
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set},
-    decoupler_window::wake,
+    dialogs::Answer,
 };
 use crate::{
     app::{
-        action::Action,
-        dialogs::Answer,
-        experiments, identifiability, runs,
-        state::{Notice, Phase, Preview, RunView},
-        trade,
-        worker::Event,
+        preview::PreviewEvent,
+        shared::{Notice, Phase, Preview, RunView},
+        training_worker::Event,
     },
     evaluation::SimulatedSettings,
 };
 
 impl DecouplerWindow {
-    /// Takes what the worker and the dialogs have to tell.
+    /// Takes what the threads and the dialogs have to tell.
     pub fn take_news(&mut self) {
-        loop {
-            match self.worker.next_event() {
-                Ok(Some(event)) => self.take_event(event),
-                Ok(None) => break,
-                Err(_) => {
-                    if self.state.phase != Phase::Died {
-                        self.state.phase = Phase::Died;
-                        let text = "The training thread ended unexpectedly. What is shown can still be looked at.";
-                        self.state.notice = Some(Notice::Failed(text.to_owned()));
-                    }
-                    break;
-                }
-            }
+        while let Some(event) = self.worker.next_event() {
+            self.take_event(event);
         }
-        experiments::take_news(&mut self.state, &self.experiments);
-        runs::take_news(&mut self.state, &self.runs);
-        identifiability::take_news(&mut self.state, &mut self.identifiability);
-        trade::take_news(&mut self.state, &self.trade);
-        self.measuring.take_news(&mut self.state.decoders);
-        while let Some(answer) = self.dialogs.next_answer() {
+        while let Some(event) = self.previews.next_event() {
+            self.take_preview(event);
+        }
+        if let Some(notice) = self.shared.runs.take_news(&self.runs) {
+            self.notice = Some(notice);
+        }
+        while let Some(written) = self.files.next_written() {
+            self.tell_written(written);
+        }
+        while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(task, path) => self.apply(task.at(path)),
-                Answer::NoDialog(task) => self.apply(Action::TypePath(task)),
+                Answer::Chosen(path) => self.answer(task, path),
+                Answer::NoDialog => self.type_path(task),
                 Answer::Cancelled => {}
             }
         }
+        let mut effects = Vec::new();
+        let mut working = Vec::new();
+        for view in self.views.all() {
+            view.take_news(&self.shared, &mut effects);
+            working.extend(view.is_working().then(|| view.name()));
+        }
+        self.shared.working = working;
+        self.apply_all(effects);
+        self.take_close_request();
     }
 
-    fn take_event(&mut self, event: Event) {
-        let state = &mut self.state;
+    /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
+    fn refuse(&mut self, reason: String) {
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notice = Some(Notice::Failed(reason));
+        self.ask_for_what_is_missing();
+    }
+
+    fn tell_written(&mut self, written: Result<PathBuf, String>) {
+        self.notice = Some(match written {
+            Ok(path) => {
+                self.typed = None;
+                Notice::Done(format!("Saved {}", path.display()))
+            }
+            Err(reason) => {
+                // The user has to see this.
+                self.closing = None;
+                Notice::Failed(reason)
+            }
+        });
+    }
+
+    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
+        let shared = &mut self.shared;
         match event {
             // Settings that have moved on meanwhile have asked for another test set, or need none.
-            Event::Previewed(settings, _) if !have_same_test_set(&settings, &state.draft) => {}
-            Event::Previewed(settings, Ok(test)) => {
-                if !state.phase.is_busy() {
-                    state.preview = Some(Preview {
-                        settings: *settings,
-                        test,
-                        baselines: None,
-                    });
-                    state.refresh_frames();
-                    self.ask_for_what_is_missing();
-                }
+            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
+            // A training has begun meanwhile, and shows the same.
+            PreviewEvent::Drawn(settings, _)
+                if shared
+                    .run
+                    .as_ref()
+                    .is_some_and(|run| have_same_test_set(&run.settings, &settings)) => {}
+            PreviewEvent::Drawn(settings, Ok(test)) => {
+                shared.preview = Some(Preview {
+                    settings: *settings,
+                    test,
+                    baselines: None,
+                });
+                self.ask_for_what_is_missing();
             }
-            Event::Previewed(_, Err(error)) => state.notice = Some(Notice::Failed(error.to_string())),
-            Event::Compared(settings, baselines) => {
-                if let Some(preview) = &mut state.preview
-                    && have_same_sets(&settings, &state.draft)
+            PreviewEvent::Drawn(_, Err(error)) => self.notice = Some(Notice::Failed(error.to_string())),
+            PreviewEvent::Compared(settings, baselines) => {
+                if let Some(preview) = &mut shared.preview
+                    && have_same_sets(&settings, &shared.draft)
                 {
                     preview.baselines = baselines;
                 }
             }
+            PreviewEvent::Failed(error) => self.notice = Some(Notice::Failed(error.to_string())),
+        }
+    }
+
+    fn take_event(&mut self, event: Event) {
+        let shared = &mut self.shared;
+        match event {
             Event::Began(Ok(began)) => {
-                self.measuring.forget(&mut state.decoders);
-                state.preview = None;
-                state.run = Some(RunView::new(*began));
-                state.phase = Phase::Training;
-                state.refresh_frames();
+                shared.preview = None;
+                shared.run = Some(RunView::new(*began));
+                shared.phase = Phase::Training;
             }
-            Event::Began(Err(error)) => {
-                state.phase = state.phase_at_rest();
-                state.notice = Some(Notice::Failed(error.to_string()));
-            }
+            Event::Began(Err(error)) => self.refuse(error.to_string()),
             Event::Opened(Ok(began)) => {
-                self.measuring.forget(&mut state.decoders);
-                state.draft = began.settings;
-                state.preview = None;
-                state.run = Some(RunView::new(*began));
-                state.typed = None;
+                shared.draft = began.settings;
+                shared.preview = None;
+                shared.run = Some(RunView {
+                    is_saved: true,
+                    ..RunView::new(*began)
+                });
+                self.typed = None;
                 // If it has ended, the news of it say so.
-                state.phase = Phase::Paused;
-                state.refresh_frames();
+                shared.phase = Phase::Paused;
             }
-            Event::Opened(Err(error)) => {
-                state.phase = state.phase_at_rest();
-                state.notice = Some(Notice::Failed(error));
-            }
+            Event::Opened(Err(reason)) => self.refuse(reason),
             Event::Continued(Ok(settings)) => {
-                self.measuring.forget(&mut state.decoders);
-                if let Some(run) = &mut state.run {
+                if let Some(run) = &mut shared.run {
                     run.asked = SimulatedSettings {
-                        training: state.draft.training,
+                        training: shared.draft.training,
                         ..run.asked
                     };
                     run.settings = *settings;
+                    run.is_saved = false;
                     run.stop_reason = None;
                 }
-                state.phase = Phase::Training;
+                shared.phase = Phase::Training;
             }
             Event::Continued(Err(error)) => {
-                state.phase = match state.phase_at_rest() {
+                shared.phase = match shared.phase_at_rest() {
                     Phase::Idle => Phase::Paused,
                     ended => ended,
                 };
-                state.notice = Some(Notice::Failed(error));
+                self.notice = Some(Notice::Failed(error));
             }
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
-                    state.phase = Phase::Ended(reason);
+                    shared.phase = Phase::Ended(reason);
                 }
-                if let Some(run) = &mut state.run {
+                if let Some(run) = &mut shared.run {
                     run.progress(*progress);
                 }
-                state.refresh_frames();
-                self.measure_decoders();
             }
-            Event::Networks(number, networks) if self.measuring.awaits(number) => match (networks, &state.run) {
-                (Ok(networks), Some(run)) => {
-                    let test = Arc::clone(&run.test.set);
-                    let measured = self.measuring.begin(run.settings, *networks, test, wake(&self.ctx));
-                    if let Err(error) = measured {
-                        state.decoders.end(&format!("no thread could be started: {error}"));
-                    }
-                }
-                (Err(reason), _) => state.decoders.end(&reason),
-                (Ok(_), None) => {}
-            },
-            // The network is another one by now.
-            Event::Networks(..) => {}
-            Event::Finished(Ok(file)) => runs::keep(state, *file, &self.runs),
-            Event::Finished(Err(reason)) => state.notice = Some(Notice::Failed(reason)),
-            Event::Exported(Ok(path)) => {
-                state.typed = None;
-                state.notice = Some(Notice::Done(format!("Saved {}", path.display())));
+            Event::Finished(Ok(file)) => self.runs.keep(*file),
+            Event::Finished(Err(reason)) => self.notice = Some(Notice::Failed(reason)),
+            Event::Died(reason) => {
+                shared.phase = Phase::Died;
+                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                let text = format!("The training ended unexpectedly{reason}. What is shown can still be looked at.");
+                self.notice = Some(Notice::Failed(text));
             }
-            Event::Exported(Err(error)) => state.notice = Some(Notice::Failed(error)),
+            // The worker keeps these to itself.
+            Event::Abandoned => {}
+        }
+        if self.worker.is_preparing() {
+            // This was news of the training before.
+            self.shared.phase = Phase::Preparing;
         }
     }
 }

@@ -27,11 +27,11 @@ const MOST_VALIDATED: usize = 1000;
 /// A system with more rules must reduce the mean squared error to this, so that it is not chosen by chance.
 const WORTHWHILE: f64 = 0.99;
 
-/// What a cross-validation chooses.
+/// Choice of a cross-validation.
 pub(super) struct Choice {
     pub antecedents: Antecedents,
     pub ridge: f64,
-    /// Whether the consequents are those expected with noise of the inputs.
+    /// True if the consequents are those expected with noise of the inputs.
     pub is_noisy: bool,
 }
 

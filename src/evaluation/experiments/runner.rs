@@ -1,5 +1,6 @@
 use std::{
     num::NonZero,
+    panic::resume_unwind,
     sync::{
         atomic::{AtomicUsize, Ordering},
         mpsc::channel,
@@ -73,7 +74,7 @@ pub fn run_experiments(
     let next = AtomicUsize::new(0);
     let (sender, receiver) = channel();
     thread::scope(|scope| {
-        for pool in &pools {
+        let workers = Vec::from_iter(pools.iter().map(|pool| {
             let (sender, jobs, next, is_cancelled) = (sender.clone(), &jobs, &next, &is_cancelled);
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -85,8 +86,8 @@ pub fn run_experiments(
                     }
                 }
             };
-            scope.spawn(move || pool.install(work_off));
-        }
+            scope.spawn(move || pool.install(work_off))
+        }));
         drop(sender);
         for (done, (job, outcome, took)) in (1..).zip(receiver) {
             time_left.finished(job.time_cell, took);
@@ -98,6 +99,10 @@ pub fn run_experiments(
                 trials: jobs.len(),
                 time_left: time_left.estimate(),
             });
+        }
+        for worker in workers {
+            // The scope itself would panic without the reason.
+            worker.join().unwrap_or_else(|panic| resume_unwind(panic));
         }
     });
     Ok(())

@@ -22,7 +22,8 @@ pub(super) type At = [f64; 2];
 pub(super) struct Stroke {
     pub colour: Rgb,
     pub width: f64,
-    pub is_dashed: bool,
+    /// Lengths of dashes and gaps; empty for a solid line.
+    pub dashes: &'static str,
 }
 
 impl Stroke {
@@ -30,14 +31,7 @@ impl Stroke {
         Self {
             colour,
             width,
-            is_dashed: false,
-        }
-    }
-
-    pub fn dashed(self) -> Self {
-        Self {
-            is_dashed: true,
-            ..self
+            dashes: "",
         }
     }
 }
@@ -66,6 +60,12 @@ impl Area {
 
     pub fn bottom(&self) -> f64 {
         self.top + self.height
+    }
+
+    /// The corners, clockwise from the upper left one.
+    pub fn corners(&self) -> [At; 4] {
+        let (left, top, right, bottom) = (self.left, self.top, self.right(), self.bottom());
+        [[left, top], [right, top], [right, bottom], [left, bottom]]
     }
 
     pub fn centre(&self) -> At {
@@ -104,12 +104,33 @@ impl Canvas {
         self.put(format_args!(r#"<polyline points="{points}" fill="none" {style}/>"#));
     }
 
-    /// A filled shape; a hairline of its own colour closes the seam to its neighbours.
-    pub fn facet(&mut self, corners: &[At], fill: Rgb) {
+    /// A filled shape.
+    pub fn polygon(&mut self, corners: &[At], fill: Rgb) {
         let (points, fill) = (coordinates(corners), hex(fill));
-        self.put(format_args!(
-            r#"<polygon points="{points}" fill="{fill}" stroke="{fill}" stroke-width=".3"/>"#
-        ));
+        self.put(format_args!(r#"<polygon points="{points}" fill="{fill}"/>"#));
+    }
+
+    /// Begins a group of [`Self::facet`]s.
+    pub fn begin_facets(&mut self) {
+        self.put(r#"<g fill="currentColor" stroke="currentColor" stroke-width=".3">"#);
+    }
+
+    /// Ends a group.
+    pub fn end_group(&mut self) {
+        self.put("</g>");
+    }
+
+    /// A piece of a surface. A hairline of its own colour closes the seam to its neighbours; where it lets shine through
+    /// what lies behind it, its edges are sharp instead, for the hairlines would show.
+    pub fn facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
+        let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
+        if opacity == "1" {
+            self.put(format_args!(r#"<path color="{fill}" d="M{points}z"/>"#));
+        } else {
+            self.put(format_args!(
+                r#"<path color="{fill}" d="M{points}z" fill-opacity="{opacity}" stroke="none" shape-rendering="crispEdges"/>"#
+            ));
+        }
     }
 
     /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
@@ -128,25 +149,40 @@ impl Canvas {
         ));
     }
 
-    pub fn outline(&mut self, area: Area, stroke: Stroke) {
-        let (left, top) = (area.left, area.top);
-        let corners = [
-            [left, top],
-            [area.right(), top],
-            [area.right(), area.bottom()],
-            [left, area.bottom()],
-            [left, top],
-        ];
-        self.polyline(&corners, stroke);
+    /// Straight lines that do not cover each other.
+    pub fn segments(&mut self, ends: &[[At; 2]], stroke: Stroke, opacity: f64) {
+        let pieces = ends.iter().map(|&[from, to]| format!("M{}L{}", pair(from), pair(to)));
+        let (path, style) = (pieces.collect::<String>(), stroke_style(stroke));
+        let opacity = if opacity < 1.0 {
+            format!(r#" stroke-opacity="{}""#, number(opacity))
+        } else {
+            String::new()
+        };
+        self.put(format_args!(r#"<path d="{path}" fill="none" {style}{opacity}/>"#));
     }
 
-    pub fn disc(&mut self, at: At, radius: f64, fill: Rgb, edge: Option<Stroke>) {
-        let [x, y] = at.map(number);
-        let (radius, fill) = (number(radius), hex(fill));
-        let edge = edge.map(stroke_style).unwrap_or_default();
+    pub fn outline(&mut self, area: Area, stroke: Stroke) {
+        let [a, b, c, d] = area.corners();
+        self.polyline(&[a, b, c, d, a], stroke);
+    }
+
+    pub fn disc(&mut self, at: At, radius: f64, fill: Rgb) {
+        let ([x, y], radius, fill) = (at.map(number), number(radius), hex(fill));
         self.put(format_args!(
-            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}" {edge}/>"#
+            r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}"/>"#
         ));
+    }
+
+    /// A filled circle, or a ring with a line of this width.
+    pub fn circle(&mut self, at: At, radius: f64, ring: Option<f64>, colour: Rgb, opacity: f64) {
+        let ([x, y], radius, colour, opacity) = (at.map(number), number(radius), hex(colour), number(opacity));
+        let style = match ring.map(number) {
+            Some(width) => {
+                format!(r#"fill="none" stroke="{colour}" stroke-width="{width}" stroke-opacity="{opacity}""#)
+            }
+            None => format!(r#"fill="{colour}" fill-opacity="{opacity}""#),
+        };
+        self.put(format_args!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
     }
 
     pub fn ring(&mut self, at: At, radius: f64, stroke: Stroke) {
@@ -219,8 +255,12 @@ fn number(value: f64) -> String {
 }
 
 fn coordinates(points: &[At]) -> String {
-    let pairs = points.iter().map(|point| point.map(number).join(","));
+    let pairs = points.iter().map(|&point| pair(point));
     pairs.collect::<Vec<_>>().join(" ")
+}
+
+fn pair(point: At) -> String {
+    point.map(number).join(",")
 }
 
 fn hex([red, green, blue]: Rgb) -> String {
@@ -229,10 +269,9 @@ fn hex([red, green, blue]: Rgb) -> String {
 
 fn stroke_style(stroke: Stroke) -> String {
     let (colour, width) = (hex(stroke.colour), number(stroke.width));
-    let dashes = if stroke.is_dashed {
-        r#" stroke-dasharray="3 2""#
-    } else {
-        ""
+    let dashes = match stroke.dashes {
+        "" => String::new(),
+        dashes => format!(r#" stroke-dasharray="{dashes}""#),
     };
     format!(r#"stroke="{colour}" stroke-width="{width}"{dashes}"#)
 }

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use super::{
     canvas::{Anchor, Area, Canvas, Stroke},
     colours::{DIM, INK, viridis},
-    plot_axis::{PlotAxis, share},
 };
+use crate::figure::{PlotAxis, share};
 
 const STEPS: usize = 64;
 const WIDTH: f64 = 9.0;
@@ -40,7 +40,9 @@ pub(super) fn draw_colour_bar(
     }
     let edge = Stroke::new(DIM, 0.5);
     canvas.outline(bar, edge);
-    for (place, text) in axis.ticks(range, 6) {
+    let ticks = axis.ticks(range, (range.end() - range.start()) / 6.0);
+    for &place in &ticks.places {
+        let text = axis.tick_text(place, ticks.step);
         let y = bar.bottom() - height * share(place, range);
         canvas.line([bar.right(), y], [bar.right() + 2.5, y], edge);
         canvas.text([bar.right() + 5.0, y], Anchor::Start, INK, &text);

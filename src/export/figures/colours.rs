@@ -1,60 +1,35 @@
 //! The colours of figures: dark enough for paper.
 
-use colorgrad::Gradient;
-
-/// Red, green, blue.
-pub(super) type Rgb = [u8; 3];
+pub(super) use crate::figure::Rgb;
+use crate::figure::{ColourMap, Hue};
 
 pub(super) const INK: Rgb = [0x1b, 0x24, 0x30];
 pub(super) const DIM: Rgb = [0x5b, 0x64, 0x72];
 pub(super) const GRID: Rgb = [0xe3, 0xe7, 0xee];
-pub(super) const BAND: Rgb = [0xee, 0xf1, 0xf5];
 pub(super) const MISSING: Rgb = [0xf3, 0xf5, 0xf8];
 
-/// The colour of a series, told apart also in grey and by most colour-blind readers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hue {
-    /// The network's own result.
-    Blue,
-    /// The results that it is compared with.
-    Red,
-    /// A second comparison.
-    Green,
-    /// A third.
-    Orange,
-    /// A fourth.
-    Violet,
-    /// A fifth.
-    Cyan,
-    /// References and bounds.
-    Grey,
+/// A hue in print.
+pub(super) fn rgb(hue: Hue) -> Rgb {
+    match hue {
+        Hue::Blue => [0x1f, 0x6f, 0xeb],
+        Hue::Red => [0xc6, 0x2f, 0x2f],
+        Hue::Green => [0x1a, 0x7f, 0x4b],
+        Hue::Orange => [0xa8, 0x64, 0x00],
+        Hue::Violet => [0x7a, 0x3e, 0xb1],
+        Hue::Cyan => [0x0b, 0x76, 0x8c],
+        Hue::Grey => DIM,
+        Hue::Ink => INK,
+    }
 }
 
-impl Hue {
-    pub(super) fn rgb(self) -> Rgb {
-        match self {
-            Self::Blue => [0x1f, 0x6f, 0xeb],
-            Self::Red => [0xc6, 0x2f, 0x2f],
-            Self::Green => [0x1a, 0x7f, 0x4b],
-            Self::Orange => [0xa8, 0x64, 0x00],
-            Self::Violet => [0x7a, 0x3e, 0xb1],
-            Self::Cyan => [0x0b, 0x76, 0x8c],
-            Self::Grey => DIM,
-        }
-    }
+/// A colour so much paler, from 0 (itself) to 1 (white).
+pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
+    colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
 }
 
 /// Viridis over 0..=1; beyond, its ends.
 pub(super) fn viridis(position: f64) -> Rgb {
-    let [red, green, blue, _] = colorgrad::preset::viridis()
-        .at(position.clamp(0.0, 1.0) as f32)
-        .to_rgba8();
-    [red, green, blue]
-}
-
-/// The colour under a light of this strength, 1 being full.
-pub(super) fn lit(colour: Rgb, light: f64) -> Rgb {
-    colour.map(|part| (f64::from(part) * light).round() as u8)
+    ColourMap::viridis().at(position as f32)
 }
 
 /// Ink on light colours, white on dark ones.

@@ -3,10 +3,13 @@
 use std::ops::RangeInclusive;
 
 use super::{
-    canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
+    canvas::{Anchor, Area, At, CHARACTER, Canvas, Stroke, TEXT},
     colours::{DIM, GRID, INK},
-    plot_axis::{PlotAxis, share},
 };
+use crate::figure::{PlotAxis, share};
+
+/// Room that a number takes across and up, in points.
+const NUMBER: At = [36.0, 20.0];
 
 /// Position of both axes on the canvas.
 pub(super) struct Frame<'a> {
@@ -24,37 +27,38 @@ impl Frame<'_> {
         self.area.bottom() - self.area.height * share(place, &self.y.1)
     }
 
-    /// Position of a point on the canvas; `None` if an axis has no place for it.
-    pub fn at(&self, x: f64, y: f64) -> Option<At> {
-        Some([self.x_at(self.x.0.place(x)?), self.y_at(self.y.0.place(y)?)])
+    /// Position on the canvas of the places on both axes.
+    pub fn at(&self, [x, y]: [f64; 2]) -> At {
+        [self.x_at(x), self.y_at(y)]
     }
 
     /// Grid, ticks and names.
     pub fn draw(&self, canvas: &mut Canvas) {
         let area = self.area;
         let (grid, edge) = (Stroke::new(GRID, 0.5), Stroke::new(DIM, 0.7));
-        // A number takes about 36 points across and 20 up.
-        let most = |length: f64, each: f64| ((length / each) as usize).clamp(2, 8);
-        for (place, text) in self.x.0.ticks(&self.x.1, most(area.width, 36.0)) {
-            let x = self.x_at(place);
+        let (axis, range) = &self.x;
+        let ticks = axis.ticks(range, (range.end() - range.start()) * NUMBER[0] / area.width);
+        for &place in &ticks.places {
+            let (x, text) = (self.x_at(place), axis.tick_text(place, ticks.step));
             canvas.line([x, area.top], [x, area.bottom()], grid);
             canvas.line([x, area.bottom()], [x, area.bottom() + 3.0], edge);
             canvas.text([x, area.bottom() + 3.0 + TEXT], Anchor::Middle, INK, &text);
         }
-        for (place, text) in self.y.0.ticks(&self.y.1, most(area.height, 20.0)) {
-            let y = self.y_at(place);
+        let (axis, range) = &self.y;
+        let ticks = axis.ticks(range, (range.end() - range.start()) * NUMBER[1] / area.height);
+        // The name stands beside the longest number.
+        let mut characters = 3;
+        for &place in &ticks.places {
+            let (y, text) = (self.y_at(place), axis.tick_text(place, ticks.step));
+            characters = characters.max(text.chars().count());
             canvas.line([area.left, y], [area.right(), y], grid);
             canvas.line([area.left - 3.0, y], [area.left, y], edge);
             canvas.text([area.left - 5.0, y], Anchor::End, INK, &text);
         }
         canvas.outline(area, edge);
-        self.draw_names(canvas);
-    }
-
-    pub fn draw_names(&self, canvas: &mut Canvas) {
-        let area = self.area;
         let [middle_x, middle_y] = area.centre();
         canvas.text([middle_x, area.bottom() + 24.0], Anchor::Middle, INK, &self.x.0.name);
-        canvas.upright_text([area.left - 38.0, middle_y], INK, &self.y.0.name);
+        let name_x = area.left - 14.0 - CHARACTER * characters as f64;
+        canvas.upright_text([name_x, middle_y], INK, &self.y.0.name);
     }
 }

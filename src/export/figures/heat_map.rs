@@ -1,54 +1,34 @@
-use ndarray::Array2;
-
 use super::{
     canvas::{Anchor, Area, CHARACTER, Canvas, TEXT},
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
     colours::{INK, MISSING, contrast, viridis},
     picture::Picture,
-    plot_axis::{PlotAxis, share},
 };
-use crate::export::format_number;
+use crate::{export::format_number, figure::HeatMap};
 
-/// Values over two axes as colours, with the number in each cell.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeatMap {
-    /// Name of the columns' quantity.
-    pub x_name: String,
-    /// Name of the rows' quantity.
-    pub y_name: String,
-    /// Value of each column, in words.
-    pub columns: Vec<String>,
-    /// Value of each row, in words; the first is at the top.
-    pub rows: Vec<String>,
-    /// Rows × columns; NaN where there is none.
-    pub values: Array2<f64>,
-    /// Name of the values, and the scale of the colours.
-    pub value_axis: PlotAxis,
-}
+const WIDTH: f64 = 360.0;
+const ROW: f64 = 24.0;
 
 impl HeatMap {
-    const WIDTH: f64 = 360.0;
-    const ROW: f64 = 24.0;
-
     /// Draws the figure.
     pub fn draw(&self) -> Picture {
         let longest = |names: &[String]| names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let (rows, columns) = self.values.dim();
         let left = 26.0 + CHARACTER * longest(&self.rows) as f64;
-        let width = Self::WIDTH - left - COLOUR_BAR_WIDTH - 16.0;
+        let width = WIDTH - left - COLOUR_BAR_WIDTH - 16.0;
         // Names that do not fit side by side stand upright.
         let column = width / columns.max(1) as f64;
         let name = CHARACTER * longest(&self.columns) as f64;
         let is_upright = name > column - 4.0;
         let names = if is_upright { name + 8.0 } else { 2.0 * TEXT };
-        let height = (Self::ROW * rows as f64).max(100.0);
+        let height = (ROW * rows as f64).max(100.0);
         let area = Area {
             left,
             top: 12.0,
             width,
             height,
         };
-        let mut canvas = Canvas::new(Self::WIDTH, area.bottom() + names + 2.5 * TEXT);
+        let mut canvas = Canvas::new(WIDTH, area.bottom() + names + 2.5 * TEXT);
         let range = self.range();
         for ((row, at), &value) in self.values.indexed_iter() {
             let cell = Area {
@@ -57,12 +37,7 @@ impl HeatMap {
                 width: column,
                 height: height / rows as f64,
             };
-            let colour = match self.value_axis.place(value) {
-                Some(place) => viridis(share(place, &range)),
-                // A zero where colours go by the logarithm.
-                None if value.is_finite() => viridis(0.0),
-                None => MISSING,
-            };
+            let colour = self.colour_share(value, &range).map_or(MISSING, viridis);
             canvas.block(cell, colour);
             let text = format_number(value);
             if CHARACTER * text.chars().count() as f64 <= column {
@@ -98,18 +73,5 @@ impl HeatMap {
             &range,
         );
         canvas.finish()
-    }
-
-    /// The range of places.
-    fn range(&self) -> std::ops::RangeInclusive<f64> {
-        let places = self.values.iter().filter_map(|&value| self.value_axis.place(value));
-        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), place| {
-            (low.min(place), high.max(place))
-        });
-        match low < high {
-            true => low..=high,
-            false if low == high => low - 0.5..=high + 0.5,
-            false => 0.0..=1.0,
-        }
     }
 }

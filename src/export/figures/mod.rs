@@ -1,27 +1,30 @@
-//! Figures at publication size on a light ground, as SVG and PNG, without any window.
+//! Drawings of [figures](crate::figure) at publication size on a light ground, as SVG and PNG, without any window.
 //!
-//! A plot, heat map or pair of surfaces is a value; its `draw` gives a [`Picture`], which is its SVG. The PNG is drawn
-//! from that SVG with the fonts of the program, so both look alike on every machine. Values that are not finite are
-//! left out.
+//! [`Figure::draw`] gives a [`Picture`], which is its SVG. The PNG is drawn from that SVG with the fonts of the program, so
+//! both look alike on every machine. Values that are not finite are left out.
 
 mod canvas;
 mod colour_bar;
 mod colours;
 mod frame;
 mod heat_map;
-mod nodes;
+mod legend;
 mod picture;
 mod plot;
-mod plot_axis;
-mod relief;
-mod surface_panel;
+mod plot_figure;
 mod surfaces;
 
-pub use colours::Hue;
-pub use heat_map::HeatMap;
-pub use nodes::node_plot;
 pub use picture::{Picture, PictureError, PictureFormat};
-pub use plot::{Marker, Plot, PlotPoint, Series, Span};
-pub use plot_axis::{AxisScale, PlotAxis};
-pub use surface_panel::SurfacePanel;
-pub use surfaces::{SurfaceFigure, SurfaceLook};
+
+use crate::figure::Figure;
+
+impl Figure {
+    /// Draws the figure for print.
+    pub fn draw(&self) -> Picture {
+        match self {
+            Self::Plots(plots) => plots.draw(),
+            Self::HeatMap(map) => map.draw(),
+            Self::Surfaces(surfaces) => surfaces::draw_surfaces(surfaces),
+        }
+    }
+}

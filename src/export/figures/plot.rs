@@ -1,234 +1,171 @@
+//! A plot within a frame.
+
 use super::{
-    canvas::{Anchor, Area, At, CHARACTER, Canvas, Stroke, TEXT},
-    colours::{BAND, DIM, Hue, INK},
+    canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
+    colours::{DIM, pale, rgb},
     frame::Frame,
-    picture::Picture,
-    plot_axis::PlotAxis,
 };
+use crate::figure::{Hue, LineAt, LineStyle, Look, Marker, Plot, ReferenceLine, Series};
 
-/// A plot of series of points: curves, scatter, or both.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plot {
-    /// Across.
-    pub x: PlotAxis,
-    /// Up.
-    pub y: PlotAxis,
-    /// Drawn in this order.
-    pub series: Vec<Series>,
-    /// Marked values of x, behind the series.
-    pub spans: Vec<Span>,
-    /// Across, in points (1/72 inch).
-    pub width_pt: f64,
-}
+/// Tint of a span on the ground, 1 being the ground itself.
+const SPAN_PALENESS: f64 = 0.88;
 
-/// Points that belong together.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Series {
-    /// Stands beside the plot.
-    pub name: String,
-    /// Its colour.
-    pub hue: Hue,
-    /// A line from point to point.
-    pub has_line: bool,
-    /// True for a dashed line.
-    pub is_dashed: bool,
-    /// At each point.
-    pub marker: Option<Marker>,
-    /// In the order in which the line runs.
-    pub points: Vec<PlotPoint>,
-}
-
-/// A point of a series.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlotPoint {
-    /// Across.
-    pub x: f64,
-    /// Up.
-    pub y: f64,
-    /// Ends of its error bar.
-    pub bar: Option<[f64; 2]>,
-}
-
-/// Symbol at a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Marker {
-    /// A hollow square.
-    Square,
-    /// A filled disc.
-    Disc,
-    /// A hollow circle.
-    Ring,
-}
-
-/// A marked stretch of the x axis, or a single value.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Span {
-    /// Stands beside the plot.
-    pub name: String,
-    /// Its beginning.
-    pub from: f64,
-    /// Its end; the same for a single value.
-    pub to: f64,
-}
-
-impl Plot {
-    /// Two thirds of a page.
-    pub const WIDTH_PT: f64 = 360.0;
-    /// A whole page.
-    pub const WIDE_PT: f64 = 510.0;
-
-    const HEIGHT: f64 = 230.0;
-    const LEFT: f64 = 50.0;
-    const TOP: f64 = 12.0;
-    const BOTTOM: f64 = 36.0;
-    const RIGHT: f64 = 12.0;
-
-    /// Draws the figure.
-    pub fn draw(&self) -> Picture {
-        let mut canvas = Canvas::new(self.width_pt, Self::HEIGHT);
-        let area = Area {
-            left: Self::LEFT,
-            top: Self::TOP,
-            width: self.width_pt - Self::LEFT - Self::RIGHT - self.legend_width(),
-            height: Self::HEIGHT - Self::TOP - Self::BOTTOM,
-        };
-        let points = || self.series.iter().flat_map(|series| &series.points);
-        let ends = self.spans.iter().flat_map(|span| [span.from, span.to]);
-        let x = points().map(|point| point.x).chain(ends);
-        let y = points().flat_map(|point| std::iter::once(point.y).chain(point.bar.into_iter().flatten()));
-        let frame = Frame {
-            area,
-            x: (&self.x, self.x.range(x.filter_map(|value| self.x.place(value)))),
-            y: (&self.y, self.y.range(y.filter_map(|value| self.y.place(value)))),
-        };
-        self.draw_spans(&frame, &mut canvas);
-        frame.draw(&mut canvas);
-        canvas.clipped(area, |canvas| {
-            for series in &self.series {
-                series.draw(&frame, canvas);
-            }
-        });
-        self.draw_legend(area, &mut canvas);
-        canvas.finish()
+pub(super) fn stroke(hue: Hue, style: LineStyle) -> Stroke {
+    let colour = rgb(hue);
+    match style {
+        LineStyle::Solid => Stroke::new(colour, 1.1),
+        LineStyle::Dashed => Stroke {
+            dashes: "3 2",
+            ..Stroke::new(colour, 1.0)
+        },
+        LineStyle::Dotted => Stroke {
+            dashes: "1 1.8",
+            ..Stroke::new(colour, 1.0)
+        },
+        LineStyle::Fine => Stroke::new(pale(colour, 0.45), 0.6),
     }
+}
 
-    fn draw_spans(&self, frame: &Frame<'_>, canvas: &mut Canvas) {
-        let area = frame.area;
-        for span in &self.spans {
-            let (Some(from), Some(to)) = (self.x.place(span.from), self.x.place(span.to)) else {
-                continue;
-            };
+/// The plot within `area`; names and numbers stand outside it.
+pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
+    let [x, y] = plot.ranges();
+    let frame = Frame {
+        area,
+        x: (&plot.x, x),
+        y: (&plot.y, y),
+    };
+    for span in &plot.spans {
+        let ends = [span.range.start(), span.range.end()].map(|end| plot.x.place(*end));
+        if let [Some(from), Some(to)] = ends {
             let [left, right] = [from, to].map(|place| frame.x_at(place));
-            if right > left {
-                let band = Area {
-                    left,
-                    width: right - left,
-                    ..area
-                };
-                canvas.block(band, BAND);
-            } else {
-                canvas.line([left, area.top], [left, area.bottom()], Stroke::new(DIM, 0.8).dashed());
-            }
+            let band = Area {
+                left,
+                width: right - left,
+                ..area
+            };
+            canvas.polygon(&band.corners(), pale(rgb(span.hue), SPAN_PALENESS));
         }
     }
-
-    fn names(&self) -> impl Iterator<Item = &String> {
-        let series = self.series.iter().map(|series| &series.name);
-        series.chain(self.spans.iter().map(|span| &span.name))
+    frame.draw(canvas);
+    for span in &plot.spans {
+        let middle = plot.x.place(0.5 * (span.range.start() + span.range.end()));
+        if let Some(middle) = middle {
+            let at = [frame.x_at(middle), area.top + 0.8 * TEXT];
+            canvas.text(at, Anchor::Middle, DIM, &span.name);
+        }
     }
+    canvas.clipped(area, |canvas| {
+        let (bars, others): (Vec<_>, Vec<_>) = plot.series.iter().partition(|series| series.bar_width.is_some());
+        for series in bars {
+            draw_series(plot, series, &frame, canvas);
+        }
+        for line in &plot.lines {
+            draw_line(line, &frame, canvas);
+        }
+        for series in others {
+            draw_series(plot, series, &frame, canvas);
+        }
+    });
+}
 
-    fn legend_width(&self) -> f64 {
-        let longest = self.names().map(|name| name.chars().count()).max();
-        longest.map_or(0.0, |characters| 34.0 + CHARACTER * characters as f64)
-    }
-
-    /// Beside the plot, so that it covers nothing.
-    fn draw_legend(&self, area: Area, canvas: &mut Canvas) {
-        let (left, right) = (area.right() + 10.0, area.right() + 28.0);
-        for (line, name) in self.names().enumerate() {
-            let y = area.top + 0.5 * TEXT + 1.6 * TEXT * line as f64;
-            match self.series.get(line) {
-                Some(series) => series.draw_sample([left, y], [right, y], canvas),
-                None => {
-                    let span = &self.spans[line - self.series.len()];
-                    if span.to > span.from {
-                        let sample = Area {
-                            left,
-                            top: y - 0.5 * TEXT,
-                            width: right - left,
-                            height: TEXT,
-                        };
-                        canvas.block(sample, BAND);
-                    } else {
-                        canvas.line([left, y], [right, y], Stroke::new(DIM, 0.8).dashed());
-                    }
-                }
+fn draw_line(line: &ReferenceLine, frame: &Frame<'_>, canvas: &mut Canvas) {
+    let area = frame.area;
+    let stroke = stroke(line.hue, line.style);
+    match line.at {
+        LineAt::X(value) => {
+            let Some(x) = frame.x.0.place(value).map(|place| frame.x_at(place)) else {
+                return;
+            };
+            canvas.line([x, area.top], [x, area.bottom()], stroke);
+            if let Some(label) = &line.label {
+                // On the other side where there is no room on the right.
+                let (anchor, offset) = match area.right() - x < 50.0 {
+                    true => (Anchor::End, -3.0),
+                    false => (Anchor::Start, 3.0),
+                };
+                canvas.text([x + offset, area.top + 0.8 * TEXT], anchor, DIM, label);
             }
-            canvas.text([right + 5.0, y], Anchor::Start, INK, name);
+        }
+        LineAt::Y(value) => {
+            if let Some(y) = frame.y.0.place(value).map(|place| frame.y_at(place)) {
+                canvas.line([area.left, y], [area.right(), y], stroke);
+            }
         }
     }
 }
 
-impl Series {
-    fn stroke(&self) -> Stroke {
-        let stroke = Stroke::new(self.hue.rgb(), 1.1);
-        if self.is_dashed { stroke.dashed() } else { stroke }
+fn draw_series(plot: &Plot, series: &Series, frame: &Frame<'_>, canvas: &mut Canvas) {
+    let colour = rgb(series.look.hue);
+    if let Some(style) = series.look.line {
+        let places = series.points.iter().map(|point| plot.place(point.x, point.y));
+        let places: Vec<Option<At>> = places.map(|place| place.map(|place| frame.at(place))).collect();
+        // A missing point leaves a gap.
+        for stretch in places.split(Option::is_none).filter(|stretch| stretch.len() > 1) {
+            let line: Vec<At> = stretch.iter().copied().flatten().collect();
+            canvas.polyline(&line, stroke(series.look.hue, style));
+        }
     }
-
-    fn draw(&self, frame: &Frame<'_>, canvas: &mut Canvas) {
-        let placed = self.points.iter().map(|point| (point, frame.at(point.x, point.y)));
-        let placed: Vec<(&PlotPoint, Option<At>)> = placed.collect();
-        if self.has_line {
-            // A missing point leaves a gap.
-            for stretch in placed.split(|(_, at)| at.is_none()).filter(|stretch| stretch.len() > 1) {
-                let line: Vec<At> = stretch.iter().filter_map(|(_, at)| *at).collect();
-                canvas.polyline(&line, self.stroke());
+    for (point, place) in plot.placed(series) {
+        let at = frame.at(place);
+        if let Some(width) = series.bar_width {
+            let half = 0.5 * width;
+            let ends = [point.x - half, point.x + half].map(|x| plot.x.place(x).unwrap_or(place[0]));
+            let [left, right] = ends.map(|place| frame.x_at(place));
+            let bar = Area {
+                left,
+                top: at[1],
+                width: right - left,
+                height: frame.area.bottom() - at[1],
+            };
+            if bar.height > 0.0 {
+                canvas.polygon(&bar.corners(), colour);
             }
         }
-        for (point, at) in &placed {
-            if let (Some(at), Some(ends)) = (at, point.bar) {
-                self.draw_bar(frame, at[0], ends, canvas);
+        if let Some(ends) = point.bar {
+            let [low, high] = plot.bar_ends(ends, &frame.y.1).map(|place| frame.y_at(place));
+            let stroke = Stroke::new(colour, 0.8);
+            canvas.line([at[0], low], [at[0], high], stroke);
+            for y in [low, high] {
+                canvas.line([at[0] - 2.0, y], [at[0] + 2.0, y], stroke);
             }
         }
-        for at in placed.iter().filter_map(|(_, at)| *at) {
-            self.draw_marker(at, canvas);
-        }
     }
+    for (_, place) in plot.placed(series) {
+        draw_marker(series.look, frame.at(place), canvas);
+    }
+}
 
-    fn draw_bar(&self, frame: &Frame<'_>, x: f64, ends: [f64; 2], canvas: &mut Canvas) {
-        let axis = &frame.y;
-        // What a logarithmic axis has no place for lies below its lower end.
-        let [low, high] = ends.map(|end| frame.y_at(axis.0.place(end).unwrap_or(*axis.1.start())));
-        let stroke = Stroke::new(self.hue.rgb(), 0.8);
-        canvas.line([x, low], [x, high], stroke);
-        for y in [low, high] {
-            canvas.line([x - 2.0, y], [x + 2.0, y], stroke);
+pub(super) fn draw_marker(look: Look, at: At, canvas: &mut Canvas) {
+    const HALF: f64 = 2.6;
+    let colour = rgb(look.hue);
+    let edge = Stroke::new(colour, 1.0);
+    let [x, y] = at;
+    let diamond = [[x, y - 3.2], [x + 3.2, y], [x, y + 3.2], [x - 3.2, y], [x, y - 3.2]];
+    match look.marker {
+        Some(Marker::Dot) => canvas.disc(at, 0.9, colour),
+        Some(Marker::Disc) => canvas.disc(at, 2.1, colour),
+        Some(Marker::Ring) => canvas.ring(at, 2.1, edge),
+        Some(Marker::Halo) => canvas.ring(at, 4.6, edge),
+        Some(Marker::Square) => {
+            let square = Area {
+                left: x - HALF,
+                top: y - HALF,
+                width: 2.0 * HALF,
+                height: 2.0 * HALF,
+            };
+            canvas.outline(square, edge);
         }
+        Some(Marker::Diamond) => canvas.polygon(&diamond[..4], colour),
+        Some(Marker::HollowDiamond) => canvas.polyline(&diamond, edge),
+        None => {}
     }
+}
 
-    fn draw_marker(&self, at: At, canvas: &mut Canvas) {
-        const HALF: f64 = 2.6;
-        let colour = self.hue.rgb();
-        match self.marker {
-            Some(Marker::Square) => {
-                let square = Area {
-                    left: at[0] - HALF,
-                    top: at[1] - HALF,
-                    width: 2.0 * HALF,
-                    height: 2.0 * HALF,
-                };
-                canvas.outline(square, Stroke::new(colour, 1.0));
-            }
-            Some(Marker::Disc) => canvas.disc(at, 2.1, colour, None),
-            Some(Marker::Ring) => canvas.ring(at, HALF, Stroke::new(colour, 1.0)),
-            None => {}
-        }
+/// A sample of `look`, from the left end to the right.
+pub(super) fn draw_sample(look: Look, from: At, width: f64, canvas: &mut Canvas) {
+    let [left, y] = from;
+    if let Some(style) = look.line {
+        canvas.line(from, [left + width, y], stroke(look.hue, style));
     }
-
-    fn draw_sample(&self, from: At, to: At, canvas: &mut Canvas) {
-        if self.has_line {
-            canvas.line(from, to, self.stroke());
-        }
-        self.draw_marker([0.5 * (from[0] + to[0]), from[1]], canvas);
-    }
+    draw_marker(look, [left + 0.5 * width, y], canvas);
 }

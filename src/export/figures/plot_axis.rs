@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use crate::export::ticks::{multiples, step_for, tick_text};
+use crate::figure::ticks::{multiples, step_for, tick_text};
 
 /// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,11 +7,13 @@ use glam::{DVec2, DVec3};
 use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke},
     colours::{DIM, GRID, INK, lit, viridis},
-    plot_axis::share,
     surface_panel::SurfacePanel,
 };
 use crate::{
-    export::ticks::{multiples, step_for, tick_text},
+    figure::{
+        share,
+        ticks::{multiples, step_for, tick_text},
+    },
     surface::Grid,
 };
 

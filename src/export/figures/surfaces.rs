@@ -1,156 +1,245 @@
-use std::ops::RangeInclusive;
+//! Surfaces in print: what the figure lays out, written as SVG.
+
+use std::sync::OnceLock;
+
+use glam::Vec2;
 
 use super::{
-    canvas::{Anchor, Area, Canvas, Stroke},
-    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
-    colours::{DIM, INK, MISSING, viridis},
-    frame::Frame,
+    canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
+    colours::{DIM, GRID, INK, Rgb, rgb as hue_rgb},
     picture::Picture,
-    plot::Plot,
-    plot_axis::{PlotAxis, share},
-    relief::Relief,
-    surface_panel::SurfacePanel,
+    plot_figure::PAGE_WIDTH,
 };
-use crate::surface::{Grid, Interpolation};
+use crate::figure::{
+    ColourMap, Hue,
+    surface::{
+        Bounds, Card, ColourScale, ContourLine, Disc, Drawing, Ink, Line, Mesh, Quantity, Surface, SurfaceFigure, Text,
+    },
+};
 
-/// View of the surfaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SurfaceLook {
-    /// From above, as a map: the paper's Figs. 4 and 8.
-    Top,
-    /// In three dimensions, without perspective: the paper's Fig. 7.
-    ThreeD,
-}
+/// Size of the type for which surfaces are laid out, in their points.
+const TYPE_SIZE: f32 = 11.0;
+/// Points of the canvas to a point of the layout.
+const SCALE: f64 = TEXT / TYPE_SIZE as f64;
+/// Room for the title of a card, and for a line below the cards.
+const TITLE: f64 = 16.0;
+const LINE: f64 = 14.0;
+/// Height of a card: in its widths, and in points.
+const TALL_PER_WIDE: f64 = 0.98;
+const HEIGHT: [f64; 2] = [150.0, 290.0];
+const BAR_STEPS: usize = 64;
 
-/// Surfaces side by side with one scale of heights and colours. Only what lies between the nodes is drawn; beyond them
-/// there are no data.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SurfaceFigure {
-    /// Grid of the values.
-    pub grid: Grid,
-    /// Interpolation that gave the values, named below the surfaces.
-    pub interpolation: Interpolation,
-    /// The surfaces from left to right.
-    pub panels: Vec<SurfacePanel>,
-    /// Heights at the ends of the scale, in millimetres.
-    pub range_mm: RangeInclusive<f64>,
-    /// View of all surfaces.
-    pub look: SurfaceLook,
-}
+const EDGE: Rgb = [0xa2, 0xa9, 0xb4];
+const WHITE: Rgb = [0xff; 3];
 
-impl SurfaceFigure {
-    const HEIGHT: f64 = 240.0;
-    /// Room below for the caption.
-    const CAPTION: f64 = 14.0;
-    /// Maximum number of cells per side: more would only make the file larger.
-    const MOST_CELLS: usize = 64;
-
-    /// Draws the figure, as wide as a page.
-    pub fn draw(&self) -> Picture {
-        let mut canvas = Canvas::new(Plot::WIDE_PT, Self::HEIGHT + Self::CAPTION);
-        let width = (Plot::WIDE_PT - COLOUR_BAR_WIDTH - 8.0) / self.panels.len().max(1) as f64;
-        let points = [
-            thinned(self.grid.inside_x(), Self::MOST_CELLS),
-            thinned(self.grid.inside_y(), Self::MOST_CELLS),
-        ];
-        for (at, panel) in self.panels.iter().enumerate() {
-            let card = Area {
-                left: width * at as f64,
-                top: 20.0,
-                width,
-                height: Self::HEIGHT - 20.0,
-            };
-            match self.look {
-                SurfaceLook::Top => self.draw_map(&mut canvas, card, panel, &points),
-                SurfaceLook::ThreeD => {
-                    canvas.title([card.centre()[0], 11.0], &panel.title);
-                    let [x, y] = self.sides(&points);
-                    let relief = Relief::new(card, &x, &y, &self.range_mm);
-                    relief.draw_box(&mut canvas, "z (mm)");
-                    relief.draw_surface(&mut canvas, &self.grid, &points, panel, &self.range_mm);
-                }
-            }
-        }
-        let left = Plot::WIDE_PT - COLOUR_BAR_WIDTH;
-        let axis = PlotAxis::linear("z (mm)");
-        draw_colour_bar(&mut canvas, left, 28.0, Self::HEIGHT - 64.0, &axis, &self.range_mm);
-        let caption = format!("Between the nodes: {}.", self.interpolation);
-        let place = [12.0, Self::HEIGHT + 0.4 * Self::CAPTION];
-        canvas.text(place, Anchor::Start, DIM, &caption);
-        canvas.finish()
+/// Draws surfaces side by side, as wide as a page. A key to the colours stands at the right of the last card that it
+/// belongs to.
+pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
+    let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();
+    let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
+    let keys = (0..scales.len()).filter(|&card| has_key(card)).count();
+    let key_width = f64::from(ColourScale::WIDTH) * SCALE;
+    let width = (PAGE_WIDTH - keys as f64 * key_width) / scales.len().max(1) as f64;
+    let height = (TALL_PER_WIDE * width).clamp(HEIGHT[0], HEIGHT[1]);
+    let (mut left, mut notes) = (0.0, Vec::new());
+    let mut pieces = Vec::new();
+    for (card, surface) in figure.surfaces.iter().enumerate() {
+        let drawing = surface.lay_out(
+            figure.camera,
+            &Card {
+                bounds: layout(width, height),
+                measure: &measure,
+                colours: colours(surface.quantity),
+            },
+        );
+        notes.extend(drawing.dots.note().map(|note| (left, note)));
+        pieces.push((left, surface, drawing));
+        left += width + if has_key(card) { key_width } else { 0.0 };
     }
-
-    /// From the first to the last node along x and y, in millimetres.
-    fn sides(&self, [columns, rows]: &[Vec<usize>; 2]) -> [RangeInclusive<f64>; 2] {
-        let side = |points: &[usize], mm: &[f64]| mm[points[0]]..=mm[points[points.len() - 1]];
-        [side(columns, self.grid.x_mm()), side(rows, self.grid.y_mm())]
-    }
-
-    fn draw_map(&self, canvas: &mut Canvas, card: Area, panel: &SurfacePanel, points: &[Vec<usize>; 2]) {
-        let [x, y] = self.sides(points);
-        let [x_axis, y_axis] = ["x (mm)", "y (mm)"].map(PlotAxis::linear);
-        // True to scale, as far as the card allows.
-        let room = Area {
-            left: card.left + 50.0,
-            top: card.top + 8.0,
-            width: card.width - 62.0,
-            height: card.height - 44.0,
-        };
-        let [across, up] = [&x, &y].map(|side| side.end() - side.start());
-        let scale = (room.width / across).min(room.height / up);
-        let width = (across * scale).max(0.6 * room.width).min(room.width);
-        let height = (up * scale).max(0.5 * room.height).min(room.height);
+    let below = TITLE + height;
+    let lines = if notes.is_empty() { 1.0 } else { 2.0 };
+    let mut canvas = Canvas::new(PAGE_WIDTH, below + lines * LINE);
+    for (card, (left, surface, drawing)) in pieces.iter().enumerate() {
         let area = Area {
-            left: room.left + 0.5 * (room.width - width),
+            left: *left,
+            top: TITLE,
             width,
             height,
-            ..room
         };
-        let frame = Frame {
-            area,
-            x: (&x_axis, x),
-            y: (&y_axis, y),
-        };
-        canvas.title([area.centre()[0], 11.0], &panel.title);
-        frame.draw(canvas);
-        let [columns, rows] = points;
+        canvas.title([area.centre()[0], 0.5 * TITLE + 2.0], &surface.title);
         canvas.clipped(area, |canvas| {
-            for ix in columns.windows(2) {
-                for iy in rows.windows(2).rev() {
-                    let corners = [(ix[0], iy[0]), (ix[1], iy[0]), (ix[0], iy[1]), (ix[1], iy[1])];
-                    let sum: f64 = corners
-                        .iter()
-                        .map(|&(ix, iy)| panel.values_mm[self.grid.index(ix, iy)])
-                        .sum();
-                    let colour = if sum.is_finite() {
-                        viridis(share(0.25 * sum, &self.range_mm))
-                    } else {
-                        MISSING
-                    };
-                    let [left, right] = [ix[0], ix[1]].map(|ix| frame.x_at(self.grid.x_mm()[ix]));
-                    let [bottom, top] = [iy[0], iy[1]].map(|iy| frame.y_at(self.grid.y_mm()[iy]));
-                    let cell = Area {
-                        left,
-                        top,
-                        width: right - left,
-                        height: bottom - top,
-                    };
-                    canvas.block(cell, colour);
-                }
-            }
+            Pen { canvas, area }.draw_surface(drawing, figure.marked_node);
         });
-        let edge = Stroke::new(INK, 0.5);
-        for node in &panel.nodes_mm {
-            if let Some(at) = frame.at(node.x, node.y) {
-                canvas.disc(at, 1.0, [255; 3], Some(edge));
+        if has_key(card) {
+            let area = Area {
+                left: area.right(),
+                width: key_width,
+                ..area
+            };
+            Pen {
+                canvas: &mut canvas,
+                area,
             }
+            .draw_scale(&scales[card]);
         }
+    }
+    for (left, note) in notes {
+        canvas.text(
+            [left + 12.0, below + 0.5 * LINE],
+            Anchor::Start,
+            hue_rgb(Hue::Orange),
+            &note,
+        );
+    }
+    let place = [12.0, below + (lines - 0.5) * LINE];
+    canvas.text(place, Anchor::Start, DIM, &figure.note());
+    canvas.finish()
+}
+
+fn layout(width: f64, height: f64) -> Bounds {
+    Bounds {
+        min: Vec2::ZERO,
+        max: Vec2::new((width / SCALE) as f32, (height / SCALE) as f32),
     }
 }
 
-/// Thins `indices` to at most `most` cells between the first and the last one.
-fn thinned(indices: RangeInclusive<usize>, most: usize) -> Vec<usize> {
-    let (first, last) = indices.into_inner();
-    let stride = (last - first).div_ceil(most).max(1);
-    (first..last).step_by(stride).chain([last]).collect()
+/// Size of a text, near enough to leave room for it.
+fn measure(text: &str) -> Vec2 {
+    let width = |character: char| match character {
+        '.' | ',' | ' ' => 0.3,
+        '0'..='9' | '−' => 0.63,
+        _ => 0.57,
+    };
+    Vec2::new(text.chars().map(width).sum(), 1.2) * TYPE_SIZE
+}
+
+fn colours(quantity: Quantity) -> &'static ColourMap {
+    static DIVERGING: OnceLock<ColourMap> = OnceLock::new();
+    const STOPS: [Rgb; 5] = [
+        [0x0b, 0x3d, 0x91],
+        [0x5b, 0x9b, 0xe6],
+        WHITE,
+        [0xf0, 0x87, 0x5a],
+        [0x9a, 0x2c, 0x06],
+    ];
+    if quantity.is_diverging() {
+        DIVERGING.get_or_init(|| ColourMap::diverging(STOPS))
+    } else {
+        ColourMap::viridis()
+    }
+}
+
+fn rgb(ink: Ink) -> Rgb {
+    match ink {
+        Ink::Grid => GRID,
+        Ink::Edge => EDGE,
+        Ink::Label | Ink::Text => INK,
+        Ink::Ground | Ink::Node => WHITE,
+        Ink::Rim => [0; 3],
+        Ink::Warning => hue_rgb(Hue::Orange),
+        Ink::Accent => hue_rgb(Hue::Blue),
+    }
+}
+
+/// Paints what is laid out in an area of the canvas.
+struct Pen<'a> {
+    canvas: &'a mut Canvas,
+    area: Area,
+}
+
+impl Pen<'_> {
+    fn at(&self, place: Vec2) -> At {
+        let [x, y] = place.as_dvec2().to_array();
+        [self.area.left + x * SCALE, self.area.top + y * SCALE]
+    }
+
+    fn draw_surface(&mut self, drawing: &Drawing, marked_node: Option<usize>) {
+        self.draw_frame(&drawing.lines, &drawing.texts);
+        let mesh = &drawing.mesh;
+        self.canvas.begin_facets();
+        for (cells, lines) in mesh.strips() {
+            cells.iter().for_each(|&cell| self.draw_cell(mesh, cell));
+            self.draw_contours(lines);
+        }
+        self.canvas.end_group();
+        for Disc {
+            at,
+            radius,
+            ring,
+            ink,
+            opacity,
+        } in drawing.dots.discs(marked_node)
+        {
+            let [radius, opacity] = [radius, opacity].map(f64::from);
+            let ring = ring.map(|width| f64::from(width) * SCALE);
+            self.canvas.circle(self.at(at), radius * SCALE, ring, rgb(ink), opacity);
+        }
+    }
+
+    fn draw_frame(&mut self, lines: &[Line], texts: &[Text]) {
+        for lines in lines.chunk_by(|a, b| a.ink == b.ink) {
+            let ends: Vec<[At; 2]> = lines
+                .iter()
+                .map(|line| [self.at(line.from), self.at(line.to)])
+                .collect();
+            self.canvas
+                .segments(&ends, Stroke::new(rgb(lines[0].ink), 0.75 * SCALE), 1.0);
+        }
+        for Text { bounds, text } in texts {
+            let middle = self.at(bounds.middle());
+            self.canvas.text(middle, Anchor::Middle, rgb(Ink::Label), text);
+        }
+    }
+
+    /// A cell in the mean colour of its corners.
+    fn draw_cell(&mut self, mesh: &Mesh, cell: u32) {
+        let corners = mesh.corners(cell).map(|corner| mesh.vertices[corner]);
+        let mut colour = [0; 3];
+        for (part, mean) in colour.iter_mut().enumerate() {
+            *mean = (corners.iter().map(|corner| u16::from(corner.colour[part])).sum::<u16>() / 4) as u8;
+        }
+        let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
+        let places = corners.map(|corner| self.at(corner.at));
+        self.canvas.facet(&places, colour, f64::from(opacity));
+    }
+
+    fn draw_contours(&mut self, lines: &[ContourLine]) {
+        let look = |line: &ContourLine| (line.is_black, line.opacity);
+        for lines in lines.chunk_by(|a, b| look(a) == look(b)) {
+            let ends: Vec<[At; 2]> = lines
+                .iter()
+                .map(|line| [self.at(line.from), self.at(line.to)])
+                .collect();
+            let (is_black, opacity) = look(&lines[0]);
+            let ink = if is_black { [0; 3] } else { WHITE };
+            self.canvas.segments(&ends, Stroke::new(ink, SCALE), f64::from(opacity));
+        }
+    }
+
+    fn draw_scale(&mut self, scale: &ColourScale) {
+        let bounds = layout(self.area.width, self.area.height);
+        let Some(drawing) = scale.lay_out(bounds, &measure) else {
+            return;
+        };
+        let [left, top] = self.at(drawing.bar.min);
+        let [right, bottom] = self.at(drawing.bar.max);
+        let bar = Area {
+            left,
+            top,
+            width: right - left,
+            height: bottom - top,
+        };
+        let step = bar.height / BAR_STEPS as f64;
+        for at in (0..BAR_STEPS).rev() {
+            let block = Area {
+                top: bottom - step * (at + 1) as f64,
+                height: step,
+                ..bar
+            };
+            let colour = colours(scale.quantity).at((at as f32 + 0.5) / BAR_STEPS as f32);
+            self.canvas.block(block, colour);
+        }
+        self.canvas.outline(bar, Stroke::new(EDGE, 0.75 * SCALE));
+        self.draw_frame(&drawing.lines, &drawing.texts);
+    }
 }

@@ -80,7 +80,7 @@ impl NormalEquations<SchurComplement> {
         SchurComplement::cost(shape, samples).total()
     }
 
-    /// How many bytes [`Self::trace_of_inverse`] takes in addition.
+    /// Number of bytes that [`Self::trace_of_inverse`] takes in addition.
     pub(in crate::training) fn inverse_bytes(shape: Shape) -> usize {
         let (order, h1) = (shape.hidden_weights(), shape.hidden + 1);
         let entries = order.saturating_mul(order + h1).saturating_add(h1 * h1);

@@ -1,0 +1,192 @@
+//! Background work: a [`Job`] runs one piece of work at a time on a named thread, and the newest wins.
+//!
+//! The work tells what it has through a [`Report`], which wakes the window; the window takes it with
+//! [`Job::next_event`]. Every piece of work has a mailbox of its own, so nothing of an older one is ever seen.
+
+mod mailbox;
+#[cfg(test)]
+mod tests;
+
+use std::{
+    any::Any,
+    fmt,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::Arc,
+    thread::{self, JoinHandle},
+    time::Duration,
+};
+
+use thiserror::Error;
+use thread_priority::{ThreadPriority, ThreadPriorityValue};
+
+use mailbox::Mailbox;
+pub(super) use mailbox::{Report, Wake};
+
+/// Longest time that closing waits for work that was cancelled. What takes longer ends with the program.
+const LONGEST_WAIT: Duration = Duration::from_millis(150);
+
+/// Why work ended without a result.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum JobError {
+    /// A defect in the program.
+    #[error("the thread '{name}' ended unexpectedly: {panic}")]
+    Panicked {
+        /// The thread.
+        name: &'static str,
+        /// Message of the panic.
+        panic: String,
+    },
+    /// The system has no thread left.
+    #[error("no thread could be started: {0}")]
+    NoThread(String),
+}
+
+/// Work in the background, one piece at a time. Dropped, it cancels the work and waits a moment for its end.
+pub(super) struct Job<E> {
+    name: &'static str,
+    wake: Wake,
+    /// Whether the work computes for long, and so yields to the window.
+    yields: bool,
+    newest: Option<Piece<E>>,
+}
+
+struct Piece<E> {
+    mailbox: Arc<Mailbox<E>>,
+    thread: Option<JoinHandle<()>>,
+    is_abandoned: bool,
+}
+
+impl<E: Send + 'static> Job<E> {
+    /// No work yet. `name` is the thread's; `wake` is called after each event. The work yields to the window.
+    pub(super) fn new(name: &'static str, wake: Wake) -> Self {
+        Self {
+            name,
+            wake,
+            yields: true,
+            newest: None,
+        }
+    }
+
+    /// As [`Self::new`], for work that the user waits for: it yields to nothing.
+    pub(super) fn prompt(name: &'static str, wake: Wake) -> Self {
+        let mut job = Self::new(name, wake);
+        job.yields = false;
+        job
+    }
+
+    /// Starts `work`, whose result becomes the last event by `last`, also where it panics or no thread can be started.
+    ///
+    /// Work that still runs is cancelled and heard no more. The new one waits until it has let go of the processor, so
+    /// that neither disturbs the other's timings.
+    pub(super) fn start<T: 'static>(
+        &mut self,
+        work: impl FnOnce(&Report<E>) -> T + Send + 'static,
+        last: fn(Result<T, JobError>) -> E,
+    ) {
+        self.cancel();
+        let (name, yields) = (self.name, self.yields);
+        let before = self.newest.take().map(|piece| piece.mailbox);
+        let mailbox = Arc::new(Mailbox::new());
+        let report = Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
+        let run = move || {
+            if yields {
+                yield_to_window();
+            }
+            if let Some(before) = before {
+                before.wait_for_end(None);
+            }
+            let result = catch_unwind(AssertUnwindSafe(|| work(&report)));
+            report.end(last(result.map_err(|panic| JobError::Panicked {
+                name,
+                panic: message(panic.as_ref()),
+            })));
+        };
+        let thread = match thread::Builder::new().name(name.to_owned()).spawn(run) {
+            Ok(thread) => Some(thread),
+            Err(error) => {
+                let report = Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
+                report.end(last(Err(JobError::NoThread(error.to_string()))));
+                None
+            }
+        };
+        self.newest = Some(Piece {
+            mailbox,
+            thread,
+            is_abandoned: false,
+        });
+    }
+}
+
+impl<E> Job<E> {
+    /// The next event, if one has come.
+    pub(super) fn next_event(&self) -> Option<E> {
+        self.heard()?.next_event()
+    }
+
+    /// Whether an event is still to come.
+    pub(super) fn is_under_way(&self) -> bool {
+        self.heard().is_some_and(Mailbox::has_more)
+    }
+
+    /// Asks the work to end. What it still has to tell is heard.
+    pub(super) fn cancel(&self) {
+        if let Some(piece) = &self.newest {
+            piece.mailbox.cancel();
+        }
+    }
+
+    /// Asks the work to end. Nothing of it is heard any more.
+    pub(super) fn abandon(&mut self) {
+        self.cancel();
+        if let Some(piece) = &mut self.newest {
+            piece.is_abandoned = true;
+        }
+    }
+
+    /// Waits until the work has ended, at most this long.
+    pub(super) fn wait(&mut self, longest: Duration) {
+        let Some(piece) = &mut self.newest else { return };
+        if piece.mailbox.wait_for_end(Some(longest))
+            && let Some(thread) = piece.thread.take()
+        {
+            // Panics of the work were caught.
+            let _ = thread.join();
+        }
+    }
+
+    fn heard(&self) -> Option<&Mailbox<E>> {
+        let piece = self.newest.as_ref().filter(|piece| !piece.is_abandoned)?;
+        Some(&piece.mailbox)
+    }
+}
+
+impl<E> Drop for Job<E> {
+    fn drop(&mut self) {
+        self.cancel();
+        self.wait(LONGEST_WAIT);
+    }
+}
+
+impl<E> fmt::Debug for Job<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Job").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about fifteen times its
+/// share, and training is not starved by other programs.
+fn yield_to_window() {
+    /// Of 0 to 99, where about 50 is normal.
+    const BELOW_NORMAL: u8 = 18;
+    if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {
+        // Where the system refuses, the work merely competes with the window.
+        let _ = ThreadPriority::Crossplatform(priority).set_for_current();
+    }
+}
+
+/// The message that a panic was given.
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+    text.unwrap_or_else(|| "no reason is known".to_owned())
+}

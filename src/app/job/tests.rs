@@ -1,0 +1,229 @@
+use std::{
+    sync::{
+        Arc, Mutex,
+        mpsc::{Receiver, Sender, channel},
+    },
+    thread,
+    time::Duration,
+};
+
+use super::{Job, JobError, Report};
+
+/// Far longer than any of this takes.
+const LONG: Duration = Duration::from_secs(60);
+
+#[derive(Debug, PartialEq)]
+enum Event {
+    Said(&'static str),
+    /// The newest number, and the sum of all.
+    Counted(u64, u64),
+    Ended(Result<(), JobError>),
+}
+
+fn job() -> Job<Event> {
+    Job::new("test", Arc::new(|| ()))
+}
+
+/// Waits for the end and takes every event.
+fn all_of(job: &mut Job<Event>) -> Vec<Event> {
+    job.wait(LONG);
+    let events = std::iter::from_fn(|| job.next_event()).collect();
+    assert!(!job.is_under_way());
+    events
+}
+
+/// Work that says it has begun, waits until it is let go, and has more to say.
+fn gated(before: &'static str, after: &'static str) -> (impl FnOnce(&Report<Event>) + Send, Receiver<()>, Sender<()>) {
+    let (begun, has_begun) = channel();
+    let (gate, opened) = channel::<()>();
+    let work = move |report: &Report<Event>| {
+        report.send(Event::Said(before));
+        begun.send(()).unwrap();
+        let _ = opened.recv();
+        report.send(Event::Said(after));
+    };
+    (work, has_begun, gate)
+}
+
+fn spin_until_cancelled(report: &Report<Event>) {
+    while !report.is_cancelled() {
+        thread::yield_now();
+    }
+}
+
+#[test]
+fn events_come_in_order_and_the_result_last() {
+    let mut job = job();
+    assert!(job.next_event().is_none() && !job.is_under_way());
+    job.start(
+        |report| ["one", "two", "three"].map(|word| report.send(Event::Said(word))),
+        |ended| Event::Ended(ended.map(|_| ())),
+    );
+    assert!(job.is_under_way(), "the last event is still to be taken");
+    let words = ["one", "two", "three"].map(Event::Said).into_iter();
+    assert_eq!(
+        all_of(&mut job),
+        words.chain([Event::Ended(Ok(()))]).collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn nothing_of_older_work_is_seen_even_if_it_was_told_before_the_newer_began() {
+    let mut job = job();
+    let (work, has_begun, gate) = gated("old, before", "old, after");
+    job.start(work, Event::Ended);
+    has_begun.recv().unwrap();
+    job.start(|report| report.send(Event::Said("new")), Event::Ended);
+    gate.send(()).unwrap();
+    assert_eq!(all_of(&mut job), [Event::Said("new"), Event::Ended(Ok(()))]);
+}
+
+#[test]
+fn newer_work_begins_once_each_older_one_has_let_go() {
+    let log = Arc::new(Mutex::new(Vec::new()));
+    let mut job = job();
+    for number in 0..4 {
+        let log = Arc::clone(&log);
+        let work = move |report: &Report<Event>| {
+            log.lock().unwrap().push((number, "begins"));
+            if number < 3 {
+                spin_until_cancelled(report);
+            }
+            log.lock().unwrap().push((number, "ends"));
+        };
+        job.start(work, Event::Ended);
+    }
+    assert_eq!(all_of(&mut job), [Event::Ended(Ok(()))]);
+    let expected: Vec<_> = (0..4)
+        .flat_map(|number| [(number, "begins"), (number, "ends")])
+        .collect();
+    assert_eq!(*log.lock().unwrap(), expected);
+}
+
+#[test]
+fn progress_nobody_took_is_replaced_and_what_it_carried_is_kept() {
+    const STEPS: u64 = 10_000;
+    let add = |older: Event, newer: &mut Event| match (older, newer) {
+        (Event::Counted(_, before), Event::Counted(_, sum)) => *sum += before,
+        other => panic!("{other:?}"),
+    };
+    let mut job = job();
+    job.start(
+        move |report| {
+            for step in 1..=STEPS {
+                report.progress(Event::Counted(step, step), add);
+            }
+            report.send(Event::Said("half"));
+            for step in 1..=STEPS {
+                report.progress(Event::Counted(step, step), add);
+            }
+        },
+        Event::Ended,
+    );
+    let sum = STEPS * (STEPS + 1) / 2;
+    let expected = [
+        Event::Counted(STEPS, sum),
+        Event::Said("half"),
+        Event::Counted(STEPS, sum),
+        Event::Ended(Ok(())),
+    ];
+    assert_eq!(
+        all_of(&mut job),
+        expected,
+        "an event keeps its place between progresses"
+    );
+}
+
+#[test]
+fn progress_that_was_taken_is_not_added_again() {
+    let (woke, wakes) = channel();
+    let (go_on, may_go_on) = channel();
+    let mut job = Job::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    job.start(
+        move |report| {
+            for step in 1..=3 {
+                report.progress(Event::Counted(step, step), |_, newer| *newer = Event::Said("replaced"));
+                may_go_on.recv().unwrap();
+            }
+        },
+        Event::Ended,
+    );
+    for step in 1..=3 {
+        wakes.recv_timeout(LONG).unwrap();
+        assert_eq!(job.next_event(), Some(Event::Counted(step, step)));
+        go_on.send(()).unwrap();
+    }
+    assert_eq!(all_of(&mut job), [Event::Ended(Ok(()))]);
+}
+
+#[test]
+fn a_panic_is_told_with_its_message_and_the_window_is_woken() {
+    let expected = |panic: &str| {
+        Event::Ended(Err(JobError::Panicked {
+            name: "test",
+            panic: panic.to_owned(),
+        }))
+    };
+    let (woke, wakes) = channel();
+    let mut job = Job::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    job.start(|_| panic!("a plain reason"), Event::Ended);
+    wakes.recv_timeout(LONG).unwrap();
+    assert_eq!(all_of(&mut job), [expected("a plain reason")]);
+    let number = 7;
+    job.start(
+        move |report| {
+            report.send(Event::Said("before"));
+            panic!("a reason with the number {number}")
+        },
+        Event::Ended,
+    );
+    let events = all_of(&mut job);
+    assert_eq!(events, [Event::Said("before"), expected("a reason with the number 7")]);
+    job.start(|_| std::panic::panic_any(7_u8), Event::Ended);
+    assert_eq!(all_of(&mut job), [expected("no reason is known")]);
+    // And the job still works.
+    job.start(|_| (), Event::Ended);
+    assert_eq!(all_of(&mut job), [Event::Ended(Ok(()))]);
+}
+
+#[test]
+fn cancelled_work_ends_and_is_heard_unless_it_is_abandoned() {
+    let work = |report: &Report<Event>| {
+        spin_until_cancelled(report);
+        report.send(Event::Said("cancelled"));
+    };
+    let mut job = job();
+    job.start(work, Event::Ended);
+    job.cancel();
+    assert_eq!(all_of(&mut job), [Event::Said("cancelled"), Event::Ended(Ok(()))]);
+    job.start(work, Event::Ended);
+    job.abandon();
+    assert!(!job.is_under_way());
+    assert_eq!(all_of(&mut job), []);
+}
+
+#[test]
+fn a_dropped_job_has_cancelled_and_joined_its_thread() {
+    let held = Arc::new(());
+    let mut job = job();
+    let in_thread = Arc::clone(&held);
+    job.start(
+        move |report| {
+            spin_until_cancelled(report);
+            drop(in_thread);
+        },
+        Event::Ended,
+    );
+    drop(job);
+    assert_eq!(Arc::strong_count(&held), 1);
+}
+
+#[test]
+fn dropping_does_not_wait_for_ever() {
+    let (work, has_begun, gate) = gated("before", "after");
+    let mut job = job();
+    job.start(work, Event::Ended);
+    has_begun.recv().unwrap();
+    drop(job);
+    gate.send(()).expect("the work still waits here");
+}

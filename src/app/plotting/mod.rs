@@ -1,0 +1,16 @@
+//! Figures on the screen: each is the value that is also printed. It knows no view.
+
+mod colours;
+mod heat_map;
+mod legend;
+mod plot;
+mod plot_figure;
+mod strip;
+#[cfg(test)]
+mod tests;
+
+pub use colours::hue_colour;
+pub use heat_map::{CellPointed, heat_map_ui};
+pub use legend::{legend_ui, legend_width};
+pub use plot_figure::{Pointer, legend_behind_ui, plots_ui, titled_plots_ui};
+pub use strip::{StripChart, strip_ui};

@@ -1,0 +1,97 @@
+use eframe::egui::{Id, Pos2, Rect, RichText, Ui, UiBuilder, Vec2};
+use egui_plot::{PlotPoint as Place, PlotTransform};
+
+use super::{legend_ui, legend_width, plot::plot_ui};
+use crate::{
+    app::{
+        theme::{semibold, space, type_size},
+        widgets::dim_ui,
+    },
+    figure::{Key, Plot, PlotFigure},
+};
+
+/// What the pointer does in a plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pointer {
+    /// It moves and zooms, and shows the words of the point under it.
+    Moves,
+    /// What lies on the plot answers it.
+    Picks,
+}
+
+/// A plot as it stands on the screen.
+pub struct DrawnPlot<'a> {
+    /// What is drawn.
+    pub plot: &'a Plot,
+    transform: PlotTransform,
+}
+
+impl DrawnPlot<'_> {
+    /// Where a point stands; `None` if an axis has no place for it.
+    pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
+        let [x, y] = self.plot.place(x, y)?;
+        Some(self.transform.position_from_point(&Place::new(x, y)))
+    }
+}
+
+/// A title, the legend behind it or below where there is no room, and the plots.
+pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
+    let has_room = ui.horizontal(|ui| {
+        ui.label(RichText::new(title).font(semibold(type_size().title)));
+        legend_behind_ui(ui, &figure.keys)
+    });
+    if !has_room.inner {
+        legend_ui(ui, &figure.keys);
+    }
+    plots_ui(ui, title, figure, Pointer::Moves);
+}
+
+/// The legend at the right end of a row, if there is room for it; returns whether there is.
+pub fn legend_behind_ui(ui: &mut Ui, keys: &[Key]) -> bool {
+    let spare = ui.available_width() - ui.spacing().item_spacing.x - legend_width(ui, keys);
+    let has_room = spare >= space(3);
+    if has_room {
+        ui.add_space(spare);
+        legend_ui(ui, keys);
+    }
+    has_room
+}
+
+/// The plots side by side over the space that is left, and the notes: beside a square plot, else above.
+pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
+    let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
+    if !is_square {
+        notes_ui(ui, figure);
+    }
+    let whole = ui.available_rect_before_wrap();
+    let count = figure.plots.len().max(1) as f32;
+    let width = (whole.width() - (count - 1.0) * space(3)) / count;
+    // Square but for the numbers beside the axes.
+    let width = if is_square {
+        width.min(whole.height() + space(3))
+    } else {
+        width
+    };
+    let slot = |index: usize| {
+        let left = whole.left() + (width + space(3)) * index as f32;
+        Rect::from_min_size([left, whole.top()].into(), Vec2::new(width, whole.height()))
+    };
+    let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
+        let transform = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
+        DrawnPlot { plot, transform }
+    });
+    let plots = plots.collect();
+    if is_square {
+        let beside = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
+        notes_ui(&mut ui.new_child(UiBuilder::new().max_rect(beside)), figure);
+    }
+    ui.allocate_rect(whole, eframe::egui::Sense::hover());
+    plots
+}
+
+fn notes_ui(ui: &mut Ui, figure: &PlotFigure) {
+    for note in &figure.notes {
+        dim_ui(ui, note);
+    }
+}

@@ -1,0 +1,39 @@
+use super::{FileTask, Look, Notice};
+use crate::{evaluation::SimulatedSettings, training::TrainerState};
+
+/// What a view asks of the window, which does it in one place once everything is drawn.
+#[derive(Clone, Debug)]
+pub enum Effect {
+    /// Change the settings of the next training.
+    Configure(Box<SimulatedSettings>),
+    /// Show the view that trains.
+    ShowTraining,
+    /// Begin training.
+    Train,
+    /// Show the training that has these settings and whose starts stand so.
+    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
+    /// Hold the training.
+    Pause,
+    /// Go on with it.
+    Resume,
+    /// End it.
+    Stop,
+    /// Go on from the present weights with the method and the epochs of the settings.
+    Continue,
+    /// Look at all surfaces so.
+    Look(Look),
+    /// Ask for the path of a file.
+    ChooseFile(FileTask),
+    /// Ask for the path in the window itself.
+    TypePath(FileTask),
+    /// Call the kept run with this number so.
+    RenameRun(u64, String),
+    /// Show the kept run with this number in one of the two places, or nothing.
+    PinRun(usize, Option<u64>),
+    /// Keep the run with this number no longer.
+    RemoveRun(u64),
+    /// Tell the user.
+    Tell(Notice),
+    /// What the user was told has been dealt with.
+    DismissNotice,
+}

@@ -1,0 +1,25 @@
+//! What all views read: the settings, the training on show, the run list, and how surfaces are looked at; and what a view
+//! may ask for.
+
+mod effect;
+mod file_task;
+mod look;
+mod notice;
+mod picture_file;
+mod run_list;
+mod run_view;
+mod state;
+mod training_status;
+mod view;
+
+pub use super::training_worker::RunResult;
+pub use effect::Effect;
+pub use file_task::{FileTask, FileWords, Purpose};
+pub use look::{Look, RightCard};
+pub use notice::Notice;
+pub use picture_file::{CHART, SURFACES, export_pictures_ui};
+pub use run_list::{PLACES, RunList, RunsWorker};
+pub use run_view::RunView;
+pub use state::{Phase, Preview, Shared};
+use training_status::training_status_ui;
+pub use view::{Columns, View};

@@ -1,0 +1,9 @@
+//! Every finished training is kept, and all of them survive a restart. A thread of its own keeps their
+//! folder.
+
+mod news;
+mod state;
+mod worker;
+
+pub use state::{PLACES, RunList};
+pub use worker::RunsWorker;

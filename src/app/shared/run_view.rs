@@ -1,0 +1,91 @@
+use crate::{
+    app::{
+        test_view::TestView,
+        training_worker::{Began, Progress, RunId, RunResult, append_epochs},
+    },
+    evaluation::{Baselines, PublishedErrors, SimulatedSettings, StartRecord},
+    training::{EpochRecord, Stage, StopReason},
+};
+
+/// A training as far as the window knows it.
+#[derive(Debug)]
+pub struct RunView {
+    /// Which it is.
+    pub id: RunId,
+    /// What it is trained with.
+    pub settings: SimulatedSettings,
+    /// What stood on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
+    /// for from where it stood.
+    pub asked: SimulatedSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
+    /// Its test set.
+    pub test: TestView,
+    /// What stands beside the network.
+    pub baselines: Baselines,
+    /// What the paper reports for this configuration.
+    pub published: Option<PublishedErrors>,
+    /// Every epoch of the leader so far.
+    pub history: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stood when last looked at; empty where there is one only.
+    pub starts: Vec<StartRecord>,
+    /// What the best network makes of the test set, and what that is worth.
+    pub result: Option<RunResult>,
+    /// Why it ended, if it has.
+    pub stop_reason: Option<StopReason>,
+    /// Whether it stands as in the checkpoint that it was opened from.
+    pub is_saved: bool,
+}
+
+impl RunView {
+    /// A training that has just begun.
+    pub fn new(began: Began) -> Self {
+        let Began {
+            id,
+            settings,
+            weights,
+            test,
+            baselines,
+        } = began;
+        Self {
+            id,
+            published: settings.published(),
+            settings,
+            asked: settings,
+            weights,
+            test,
+            baselines,
+            history: Vec::new(),
+            stages: Vec::new(),
+            starts: Vec::new(),
+            result: None,
+            stop_reason: None,
+            is_saved: false,
+        }
+    }
+
+    /// Takes the worker's news.
+    pub fn progress(&mut self, progress: Progress) {
+        let Progress {
+            epochs,
+            stages,
+            starts,
+            result,
+            stop_reason,
+        } = progress;
+        self.stop_reason = stop_reason;
+        append_epochs(&mut self.history, epochs);
+        self.stages = stages;
+        if let Some(starts) = starts {
+            self.starts = starts;
+        }
+        self.result = Some(result);
+    }
+
+    /// The latest epoch.
+    pub fn latest(&self) -> Option<&EpochRecord> {
+        self.history.last()
+    }
+}

@@ -1,0 +1,61 @@
+use std::fmt::Debug;
+
+use eframe::egui::{Context, Ui};
+
+use super::{Effect, Shared, training_status_ui};
+use crate::app::theme::space;
+
+/// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
+/// window for everything else.
+pub trait View: Debug {
+    /// Its name in the top bar.
+    fn name(&self) -> &'static str;
+
+    /// It comes on show.
+    fn enter(&mut self, _shared: &Shared) {}
+
+    /// Takes what its threads have to tell and follows what is shared, also while another view is on show.
+    fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Whether its threads compute.
+    fn is_working(&self) -> bool {
+        false
+    }
+
+    /// Does what the keys of this frame mean.
+    fn take_shortcuts(&mut self, _ctx: &Context, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// How a window so many points wide is divided.
+    fn columns(&self, _window_width: f32) -> Columns {
+        Columns {
+            form_width: space(68),
+            has_report: false,
+        }
+    }
+
+    /// Its tools at the right of the top bar, from right to left.
+    fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Its column on the left.
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
+
+    /// Its column on the right, where [`Self::columns`] has one.
+    fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Its middle.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
+
+    /// What is going on, in the line at the bottom: the training, unless it has something of its own.
+    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
+        training_status_ui(ui, shared);
+    }
+}
+
+/// The columns beside the middle of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Columns {
+    /// Width of the one on the left, in points.
+    pub form_width: f32,
+    /// Whether there is one on the right.
+    pub has_report: bool,
+}

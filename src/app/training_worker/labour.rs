@@ -1,0 +1,276 @@
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+        mpsc::{Receiver, TryRecvError},
+    },
+    time::{Duration, Instant},
+};
+
+use super::{
+    Began, Event, Progress, Request, RunId, RunResult,
+    continuation::{continue_run, furthest_epoch},
+};
+use crate::{
+    app::{
+        job::Report,
+        test_view::{TestView, TestViewError},
+    },
+    evaluation::{Run, RunError, network_frame_time},
+    export::{CheckpointFile, NetworkFile},
+    training::TrainingSettings,
+};
+
+/// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
+/// between them in which the user is answered at once, also where frames are drawn without a graphics card.
+const REPORT_INTERVAL: Duration = Duration::from_millis(100);
+
+/// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
+const STARTS_INTERVAL: Duration = Duration::from_millis(500);
+
+/// The thread's own state.
+pub(super) struct Labour<'a> {
+    report: &'a Report<Event>,
+    /// The last preparation that is cancelled.
+    cancelled: &'a AtomicU64,
+    /// Preparations so far.
+    preparations: u64,
+    run: Option<Run>,
+    /// Which training `run` is.
+    id: Option<RunId>,
+    is_paused: bool,
+    /// Whether the window was told what is to be kept of the run.
+    is_kept: bool,
+    /// The start last reported, and how many of its epochs.
+    reported: (usize, usize),
+    next_report: Instant,
+    next_starts: Instant,
+}
+
+impl<'a> Labour<'a> {
+    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64) -> Self {
+        Self {
+            report,
+            cancelled,
+            preparations: 0,
+            run: None,
+            id: None,
+            is_paused: false,
+            is_kept: false,
+            reported: (0, 0),
+            next_report: Instant::now(),
+            next_starts: Instant::now(),
+        }
+    }
+
+    /// Answers requests and trains until there is no window.
+    pub(super) fn run(&mut self, requests: &Receiver<Request>) {
+        while !self.report.is_cancelled() {
+            let request = if self.is_training() {
+                requests.try_recv()
+            } else {
+                requests.recv().map_err(TryRecvError::from)
+            };
+            match request {
+                Ok(request) => self.answer(request),
+                Err(TryRecvError::Empty) => self.train_one_epoch(),
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn is_training(&self) -> bool {
+        let unfinished = self.run.as_ref().is_some_and(|run| run.stop_reason().is_none());
+        unfinished && !self.is_paused
+    }
+
+    fn answer(&mut self, request: Request) {
+        match request {
+            Request::Train(settings) => {
+                let prepared = self.prepare(|is_cancelled| Run::prepare_unless(*settings, is_cancelled));
+                self.begin(prepared, false, Event::Began);
+            }
+            Request::Open(path) => {
+                let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
+                let prepared = prepared.and_then(|file| {
+                    let prepared = self.prepare(|is_cancelled| file.resume_unless(is_cancelled));
+                    prepared.map_err(|error| format!("'{}': {error}", path.display()))
+                });
+                self.begin(prepared, true, Event::Opened);
+            }
+            Request::TakeUp(settings, states) => {
+                let prepared = self.prepare(|is_cancelled| Run::resume_unless(*settings, states, is_cancelled));
+                self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
+            }
+            Request::Continue(training) => self.go_on(training),
+            Request::Pause => {
+                self.is_paused = true;
+                self.report_progress();
+            }
+            Request::Resume => self.is_paused = false,
+            Request::Stop => {
+                if let Some(run) = self.run.as_mut().filter(|run| run.stop_reason().is_none()) {
+                    run.stop();
+                    self.report_progress();
+                }
+            }
+            Request::Export(id, write, path, answer) => {
+                let result = match &self.run {
+                    Some(run) if self.id == Some(id) => write(run, &path),
+                    Some(_) => Err(REPLACED.to_owned()),
+                    // The window offers no export before a training, so there was one.
+                    None => Err(LOST.to_owned()),
+                };
+                // Who asked waits for it.
+                let _ = answer.send(result);
+            }
+        }
+    }
+
+    /// Draws the sets of a run and starts its networks; `None` once that is cancelled.
+    fn prepare(
+        &mut self,
+        prepare: impl FnOnce(&dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
+    ) -> Result<Option<(Run, Box<Began>)>, TestViewError> {
+        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
+        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
+        let begun = prepare(&is_cancelled)?.map(begun).transpose()?;
+        Ok(begun.filter(|_| !is_cancelled()))
+    }
+
+    /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
+    fn begin<X>(
+        &mut self,
+        prepared: Result<Option<(Run, Box<Began>)>, X>,
+        is_paused: bool,
+        event: fn(Result<Box<Began>, X>) -> Event,
+    ) {
+        self.preparations += 1;
+        let (run, began) = match prepared {
+            Ok(Some(prepared)) => prepared,
+            Ok(None) => return self.report.send(Event::Abandoned),
+            Err(error) => return self.report.send(event(Err(error))),
+        };
+        // What had ended before it was saved was kept when it ended.
+        self.is_kept = run.stop_reason().is_some();
+        (self.run, self.id) = (Some(run), Some(began.id));
+        self.is_paused = is_paused;
+        self.reported = (0, 0);
+        self.next_starts = Instant::now();
+        self.report.send(event(Ok(began)));
+        self.report_progress();
+    }
+
+    fn go_on(&mut self, training: TrainingSettings) {
+        let continued = match &mut self.run {
+            Some(run) => continue_run(run, training)
+                .map_err(|error| error.to_string())
+                .and_then(|()| run.settings().simulated().ok_or_else(|| LOST.to_owned())),
+            None => Err(LOST.to_owned()),
+        };
+        let has_failed = continued.is_err();
+        self.report.send(Event::Continued(continued.map(Box::new)));
+        if !has_failed {
+            (self.is_paused, self.is_kept) = (false, false);
+            self.report_progress();
+        }
+    }
+
+    fn train_one_epoch(&mut self) {
+        let Some(run) = &mut self.run else { return };
+        let ended = run.step().is_some();
+        if ended || Instant::now() >= self.next_report {
+            self.report_progress();
+        }
+    }
+
+    fn report_progress(&mut self) {
+        let Some(run) = &self.run else { return };
+        let begun = Instant::now();
+        let number = run.leader_number();
+        let trainer = &run.trainers()[number];
+        let decoupled_mm = run.decouple_test();
+        // Every training of the window is simulated.
+        let Some(errors) = run.errors_of(&decoupled_mm) else {
+            return;
+        };
+        let cost = begun.elapsed();
+        let has_several = run.trainers().len() > 1;
+        let is_standing = self.is_paused || run.stop_reason().is_some();
+        let starts = (has_several && (is_standing || begun >= self.next_starts)).then(|| run.starts());
+        if starts.is_some() {
+            // At most a tenth of the time.
+            self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
+        }
+        let reported = match self.reported {
+            (leader, epochs) if leader == number => epochs,
+            _ => 0,
+        };
+        let progress = Box::new(Progress {
+            epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
+            stages: trainer.stages().to_vec(),
+            starts,
+            result: RunResult {
+                decoupled_mm: Arc::new(decoupled_mm),
+                errors,
+                best_epoch: trainer.best_epoch(),
+                flaw: run.flaw(),
+                epochs_run: furthest_epoch(run),
+                starts_ended: run
+                    .trainers()
+                    .iter()
+                    .filter(|start| start.stop_reason().is_some())
+                    .count(),
+                wall_time: run.wall_time(),
+                frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+                networks: is_standing.then(|| Arc::new(run.network())),
+            },
+            stop_reason: run.stop_reason(),
+        });
+        self.report.progress(Event::Progressed(progress), |older, newer| {
+            if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
+                newer.replace(*older);
+            }
+        });
+        self.reported = (number, trainer.history().len());
+        // A large test set takes long to decouple; let it take at most a fifth of the time.
+        self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
+        self.report_finished();
+    }
+
+    /// Hands over, once, what is to be kept of a run that has ended.
+    fn report_finished(&mut self) {
+        let Some(run) = self.run.as_ref().filter(|run| run.stop_reason().is_some()) else {
+            return;
+        };
+        if std::mem::replace(&mut self.is_kept, true) {
+            return;
+        }
+        let file = NetworkFile::from_run(run).map_err(|error| error.to_string());
+        let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
+        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {flaw}"));
+        self.report.send(Event::Finished(finished));
+    }
+}
+
+/// What the window says where the training it shows is not in the worker: only a worker that died lost it.
+pub const LOST: &str = "the network was lost when the training thread ended: train again";
+
+/// What the window says where a file was asked for before another training began.
+const REPLACED: &str = "another training has taken the place of the one this file was asked for: nothing is written; \
+                        finished trainings are in the run list of the Compare view";
+
+/// A run, and what the window is to know of it.
+fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
+    let simulated = run.settings().simulated().zip(run.baselines().copied());
+    let (settings, baselines) = simulated.ok_or(TestViewError::Measured)?;
+    let test = TestView::of(&settings, run.test().clone())?;
+    let began = Began {
+        id: RunId::new(),
+        settings,
+        weights: run.leader().weights(),
+        test,
+        baselines,
+    };
+    Ok((run, Box::new(began)))
+}

@@ -1,0 +1,193 @@
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+        mpsc::Sender,
+    },
+    time::Duration,
+};
+
+use ndarray::Array2;
+
+use crate::{
+    app::{
+        job::JobError,
+        test_view::{TestView, TestViewError},
+    },
+    evaluation::{Baselines, Errors, Run, RunFlaw, SimulatedSettings, StartRecord},
+    export::NetworkFile,
+    network::Networks,
+    training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
+};
+
+/// What the window asks of the worker.
+#[derive(Debug)]
+pub enum Request {
+    /// Begin a training; one in progress is dropped.
+    Train(Box<SimulatedSettings>),
+    /// Take up the training saved in this file and hold it; one in progress is dropped.
+    Open(PathBuf),
+    /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
+    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
+    /// Go on from the present weights with this method and this many epochs more.
+    Continue(TrainingSettings),
+    /// Step no further until told to resume.
+    Pause,
+    /// Go on.
+    Resume,
+    /// End the training; its network stays.
+    Stop,
+    /// Write a file about this training, so long as no other has taken its place, and tell here how that went.
+    Export(RunId, WriteRun, PathBuf, Sender<Result<(), String>>),
+}
+
+/// What the worker tells the window.
+#[derive(Debug)]
+pub enum Event {
+    /// A training has begun, or why it cannot.
+    Began(Result<Box<Began>, TestViewError>),
+    /// A saved training stands where it was saved, or why it cannot.
+    Opened(Result<Box<Began>, String>),
+    /// A training that was cancelled while it was prepared has not begun.
+    Abandoned,
+    /// The training goes on with these settings, or why it cannot.
+    Continued(Result<Box<SimulatedSettings>, String>),
+    /// News of the training.
+    Progressed(Box<Progress>),
+    /// The training on show has ended: what is to be kept of it, or why nothing can be.
+    Finished(Result<Box<NetworkFile>, String>),
+    /// The thread has ended, and why, unless it was to end.
+    Died(Option<JobError>),
+}
+
+/// Writes a file about a training, or says why not.
+pub type WriteRun = fn(&Run, &Path) -> Result<(), String>;
+
+/// Tells trainings apart, also those of a worker that died.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunId(u64);
+
+impl RunId {
+    /// That of no other training.
+    pub fn new() -> Self {
+        static BEGUN: AtomicU64 = AtomicU64::new(0);
+        Self(BEGUN.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+/// What is known when a training begins.
+#[derive(Debug)]
+pub struct Began {
+    /// Which it is.
+    pub id: RunId,
+    /// What was asked for.
+    pub settings: SimulatedSettings,
+    /// Weights and biases of the network.
+    pub weights: usize,
+    /// The test set.
+    pub test: TestView,
+    /// What stands beside the network.
+    pub baselines: Baselines,
+}
+
+/// How a training stands.
+#[derive(Debug)]
+pub struct Progress {
+    /// Epochs of the leader since the last report, or all where another start has taken the lead.
+    pub epochs: Vec<EpochRecord>,
+    /// The methods that the leader went through.
+    pub stages: Vec<Stage>,
+    /// How each start stands, where there are several; now and then only.
+    pub starts: Option<Vec<StartRecord>>,
+    /// What the training has come to.
+    pub result: RunResult,
+    /// Why the training has ended, if it has.
+    pub stop_reason: Option<StopReason>,
+}
+
+impl Progress {
+    /// Takes the place of an older one that nobody saw: its epochs, and how its starts stood, are not lost.
+    pub fn replace(&mut self, older: Self) {
+        let newer = std::mem::replace(&mut self.epochs, older.epochs);
+        append_epochs(&mut self.epochs, newer);
+        self.starts = self.starts.take().or(older.starts);
+    }
+}
+
+/// Adds newer epochs to a history, in the place of those that it had of another leader.
+pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
+    if let Some(first) = newer.first() {
+        history.retain(|record| record.epoch < first.epoch);
+    }
+    history.extend(newer);
+}
+
+/// What the best network so far makes of the test set, and what it cost.
+#[derive(Clone, Debug)]
+pub struct RunResult {
+    /// Coordinates: samples × 3·M2.
+    pub decoupled_mm: Arc<Array2<f64>>,
+    /// Their errors.
+    pub errors: Errors,
+    /// The epoch of the network.
+    pub best_epoch: usize,
+    /// Defect of its training, once that has ended.
+    pub flaw: Option<RunFlaw>,
+    /// Epochs run by the start that is furthest.
+    pub epochs_run: usize,
+    /// How many starts have ended.
+    pub starts_ended: usize,
+    /// Time of the training by the clock, all starts side by side, if it is known.
+    pub wall_time: Option<Duration>,
+    /// Time to decode one snapshot; measured when the training pauses or ends.
+    pub frame_time: Option<Duration>,
+    /// The networks; there when the training pauses or ends.
+    pub networks: Option<Arc<Networks>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Epochs of the start with this error.
+    fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {
+        let record = |epoch| EpochRecord {
+            epoch,
+            training_mse: start,
+            validation_mse: None,
+            test_mse: None,
+            gradient_norm: 0.0,
+            parameter: 0.0,
+            effective_parameters: None,
+            validation_failures: 0,
+        };
+        numbers.map(record).collect()
+    }
+
+    #[test]
+    fn no_epoch_is_lost_where_progress_replaces_progress() {
+        let [a, b] = [1.0, 2.0];
+        let cases = [
+            ("the leader goes on", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
+            ("nothing is new", epochs(a, 0..3), epochs(a, 3..3), epochs(a, 0..3)),
+            ("another start leads", epochs(a, 0..3), epochs(b, 0..5), epochs(b, 0..5)),
+            (
+                "it has run fewer epochs",
+                epochs(a, 0..5),
+                epochs(b, 0..3),
+                epochs(b, 0..3),
+            ),
+            (
+                "the older starts later",
+                epochs(a, 7..9),
+                epochs(a, 9..12),
+                epochs(a, 7..12),
+            ),
+        ];
+        for (sentence, mut older, newer, expected) in cases {
+            append_epochs(&mut older, newer);
+            assert_eq!(older, expected, "{sentence}");
+        }
+    }
+}

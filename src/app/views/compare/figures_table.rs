@@ -1,0 +1,79 @@
+use std::time::Duration;
+
+use eframe::egui::Ui;
+
+use super::scene_words::{inputs_words, loading_words, movement_words, noise_words, rows_words};
+use crate::{
+    app::{
+        shared::RunList,
+        theme::Theme,
+        widgets::{Column, Row, table_ui},
+    },
+    export::{KeptRun, format_duration, format_number},
+};
+
+const COLUMNS: [Column; 2] = [
+    Column {
+        heading: "A",
+        meaning: "The run chosen as A",
+    },
+    Column {
+        heading: "B",
+        meaning: "The run chosen as B",
+    },
+];
+
+/// A figure of a run, in words.
+type FigureOf = fn(&KeptRun) -> String;
+
+const FIGURES: [(&str, FigureOf); 18] = [
+    ("Z error, %", |run| format_number(run.file.errors.z_percent)),
+    ("X error, %", |run| format_number(run.file.errors.x_percent)),
+    ("Y error, %", |run| format_number(run.file.errors.y_percent)),
+    ("Z error, mm", |run| format_number(run.file.errors.z_mm)),
+    ("Z error, % of the stroke", |run| {
+        format_number(run.file.errors.z_full_scale_percent)
+    }),
+    ("worst node, mm", |run| format_number(run.file.errors.worst_mm)),
+    ("linear map, Z %", |run| {
+        format_number(run.file.baselines.linear.z_percent)
+    }),
+    ("training mean, Z %", |run| {
+        format_number(run.file.baselines.mean.z_percent)
+    }),
+    ("array", |run| run.file.settings.source.sensor.scale.to_string()),
+    ("rows", |run| rows_words(run.file.settings.source.scene.rows)),
+    ("axes", |run| movement_words(run.file.settings.source.scene.movement)),
+    ("loading", |run| loading_words(&run.file.settings.source.scene)),
+    ("noise", |run| noise_words(&run.file.settings.source.scene.noise)),
+    ("inputs", |run| inputs_words(run.file.settings.inputs)),
+    ("hidden nodes", |run| run.file.settings.hidden.to_string()),
+    ("method", |run| {
+        run.file.settings.training.method.short_name().to_owned()
+    }),
+    ("best epoch of all", |run| {
+        let training = &run.file.training;
+        let epochs = training.history.last().map_or(0, |epoch| epoch.epoch);
+        format!("{} of {epochs}", training.best_epoch)
+    }),
+    ("training time, one thread", |run| {
+        let time = Duration::try_from_secs_f64(run.file.training.seconds);
+        time.map_or_else(|_| format_number(None), format_duration)
+    }),
+];
+
+/// Errors, configuration and cost of both runs.
+pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
+    let colour = Theme::of(ui).palette.text;
+    let row = |(name, figure): &(&'static str, FigureOf)| Row {
+        name,
+        meaning: "",
+        cells: (0..2)
+            .map(|place| runs.pinned(place).map_or_else(|| format_number(None), figure))
+            .collect(),
+        colour,
+        is_strong: false,
+    };
+    let rows: Vec<Row> = FIGURES.iter().map(row).collect();
+    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+}

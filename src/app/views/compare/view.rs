@@ -1,0 +1,179 @@
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
+
+use super::{CompareView, Compared, figures_table::figures_ui, list::run_list_ui};
+use crate::{
+    app::{
+        plotting::titled_plots_ui,
+        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_pictures_ui},
+        surface_view::{ColourBar, SurfaceView},
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
+    },
+    figure::{
+        Figure, PlotFigure, compared_losses_figure,
+        surface::{Surface, SurfaceFigure, ViewMode},
+    },
+};
+
+impl View for CompareView {
+    fn name(&self) -> &'static str {
+        "Compare"
+    }
+
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.follow(&shared.runs, effects);
+    }
+
+    fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, self.snapshots()) {
+            self.show_snapshot(snapshot);
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        run_list_ui(ui, shared, &mut self.removing, effects);
+    }
+
+    /// The surfaces of both runs above, their curves and figures below.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        let whole = ui.available_rect_before_wrap();
+        let gap = space(2);
+        let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        let upper = upper.with_max_y(upper.max.y - gap);
+        let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
+        let width = 0.5 * (cards.width() - gap);
+        let figure = self.figure(shared);
+        let mut surfaces = figure.surfaces.iter();
+        for place in 0..2 {
+            let surface = self.places[place].compared.as_ref().and_then(|_| surfaces.next());
+            let left = cards.left() + (width + gap) * place as f32;
+            let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
+            card_ui(ui, card, |ui| self.side_ui(ui, shared, place, surface, effects));
+        }
+        if let [colours, ..] = &figure.scales()[..] {
+            let (slot, theme) = (scale.shrink2(Vec2::new(0.0, space(4))), Theme::of(ui));
+            let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+            let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
+            bar.on_hover_text(figure.note());
+        }
+        let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
+        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+        let losses = losses(&shared.runs);
+        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| match &losses {
+            Some(losses) => titled_plots_ui(ui, "Loss", losses),
+            None => placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart."),
+        });
+        card_ui(ui, right, |ui| {
+            scrolled_ui(ui, "compared figures", |ui| {
+                section_heading_ui(ui, "Errors on the test sets");
+                figures_ui(ui, &shared.runs);
+                let surfaces = (!figure.surfaces.is_empty()).then(|| figure.into());
+                let losses = losses.map(Figure::from);
+                export_pictures_ui(
+                    ui,
+                    (surfaces, "compared-surfaces.png"),
+                    (losses, "compared-loss.png"),
+                    effects,
+                );
+            });
+        });
+        ui.allocate_rect(whole, Sense::hover());
+    }
+}
+
+impl CompareView {
+    /// The surfaces of the runs that are prepared, with one scale.
+    fn figure(&self, shared: &Shared) -> SurfaceFigure {
+        let look = shared.look;
+        let surface = |place: usize| {
+            let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
+            let [_, decoupled, error] = frames;
+            let name = shared.runs.pinned(place).map_or("", |run| &run.name);
+            let (letter, mode) = (PLACES[place], look.mode);
+            Some(match self.card {
+                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, mode),
+                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, mode),
+            })
+        };
+        SurfaceFigure {
+            surfaces: (0..self.places.len()).filter_map(surface).collect(),
+            camera: look.camera,
+            marked_node: None,
+        }
+        .with_common_scales()
+    }
+
+    fn side_ui(
+        &mut self,
+        ui: &mut Ui,
+        shared: &Shared,
+        place: usize,
+        surface: Option<&Surface>,
+        effects: &mut Vec<Effect>,
+    ) {
+        let theme = Theme::of(ui);
+        let (runs, look) = (&shared.runs, shared.look);
+        ui.horizontal(|ui| {
+            ui.set_min_height(space(7));
+            let colour = [theme.palette.accent, theme.palette.warning][place];
+            ui.label(
+                RichText::new(PLACES[place])
+                    .font(semibold(type_size().title))
+                    .color(colour),
+            );
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                // What holds for both is asked for once.
+                match place {
+                    0 => {
+                        let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+                        let picked = segmented_ui(ui, "How surfaces are drawn", &modes, look.mode, false);
+                        effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+                    }
+                    _ => {
+                        let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
+                        let picked = segmented_ui(ui, "What the cards show", &cards, self.card, false);
+                        self.card = picked.unwrap_or(self.card);
+                    }
+                }
+                if let Some(run) = runs.pinned(place) {
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                        let name = RichText::new(&run.name).font(semibold(type_size().title));
+                        ui.add(eframe::egui::Label::new(name).truncate());
+                    });
+                }
+            });
+        });
+        match surface {
+            Some(surface) => surface_ui(ui, place, surface, look, effects),
+            None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
+            None => {
+                let text = format!("Press {} at a run of the list to show it here.", PLACES[place]);
+                placeholder_ui(ui, &text);
+            }
+        }
+    }
+}
+
+fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, look: Look, effects: &mut Vec<Effect>) {
+    let view = SurfaceView {
+        label: ["Surface of A", "Surface of B"][place],
+        surface,
+        marked_node: None,
+        theme: Theme::of(ui),
+    };
+    let camera = view.show(ui, look.camera).camera;
+    if camera != look.camera {
+        effects.push(Effect::Look(Look { camera, ..look }));
+    }
+}
+
+/// The errors of each epoch of the runs that are chosen.
+fn losses(runs: &RunList) -> Option<PlotFigure> {
+    let [a, b] = [0, 1].map(|place| {
+        let run = runs.pinned(place)?;
+        Some((format!("{}: {}", PLACES[place], run.name), &*run.file.training.history))
+    });
+    let runs = [&a, &b].map(|run| run.as_ref().map(|(name, history)| (&**name, *history)));
+    (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
+}

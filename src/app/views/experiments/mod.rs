@@ -1,0 +1,20 @@
+//! The Experiments view: the paper's tables redone and sweeps of one's own, run on threads of their own while the
+//! window stays free.
+
+mod axis_form;
+mod file;
+mod form;
+mod heat_map;
+mod open_cell;
+mod panel;
+mod results_card;
+mod state;
+mod status;
+mod table;
+mod verdict_list;
+mod view;
+mod worker;
+
+pub use axis_form::{AxisForm, AxisKind, ListError};
+pub use form::Form;
+pub use state::{Ending, ExperimentLook, ExperimentsView, Outcome, Running, SortBy, Topic};

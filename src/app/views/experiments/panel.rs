@@ -1,0 +1,242 @@
+use eframe::egui::{Button, ComboBox, DragValue, TextEdit, Ui, vec2};
+
+use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic};
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::space,
+        widgets::{
+            dim_ui,
+            fields::{count_ui, field_ui},
+            ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        },
+    },
+    dataset::FoldUnit,
+    evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable},
+    export::format_duration,
+    training::StoppingRules,
+};
+
+/// The most seeds or repeats.
+const MOST_TRIALS: usize = 1000;
+
+/// What is run: the choice, its lists and numbers, Run and Cancel.
+pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, effects: &mut Vec<Effect>) {
+    scrolled_ui(ui, "experiment form", |ui| {
+        section_heading_ui(ui, "Experiment");
+        let options = Topic::ALL.map(|topic| (topic, topic.name()));
+        if let Some(topic) = segmented_ui(ui, "Experiment", &options, experiments.topic, true) {
+            experiments.choose(topic);
+        }
+        dim_ui(ui, what_it_does(experiments.topic));
+        let mut form = experiments.form().clone();
+        let is_idle = experiments.running.is_none();
+        ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, &shared.draft));
+        match experiments.checked() {
+            Ok(trials) => {
+                dim_ui(ui, &how_much(&form, *trials));
+            }
+            Err(problem) => {
+                ui.add_space(space(1));
+                note_ui(ui, problem);
+            }
+        }
+        ui.add_space(space(2));
+        run_buttons_ui(ui, experiments, effects);
+        if let Some(running) = &experiments.running {
+            progress_ui(ui, running);
+        }
+        ui.add_space(space(2));
+        let paper = Form::new(experiments.topic);
+        let text = match experiments.topic {
+            Topic::Table(_) => "Back to the paper's values",
+            Topic::Sweep => "Back to the first sweep",
+        };
+        let can_reset = is_idle && form == *experiments.form() && form != paper;
+        if ui.add_enabled(can_reset, Button::new(text)).clicked() {
+            form = paper;
+        }
+        if form != *experiments.form() {
+            experiments.edit(form);
+        }
+        ui.add_space(space(4));
+    });
+}
+
+fn what_it_does(topic: Topic) -> &'static str {
+    match topic {
+        Topic::Table(PaperTable::HiddenNodes) => {
+            "Errors of networks with different numbers of hidden nodes on the paper's array."
+        }
+        Topic::Table(PaperTable::CrossValidation) => {
+            "Cross-validation of a large and a small dataset, dealt anew in each repeat, and the scatter of Fig. 5."
+        }
+        Topic::Table(PaperTable::ArrayScales) => "Errors on arrays of different scales, with 12 hidden nodes.",
+        Topic::Sweep => "Any two settings against each other, all others held.",
+    }
+}
+
+fn how_much(form: &Form, trials: usize) -> String {
+    let folds = form.template.cross_validation.map_or(1, |validation| validation.folds);
+    let networks = trials.saturating_mul(folds).saturating_mul(form.template.base.starts);
+    let plural = if networks == 1 { "" } else { "s" };
+    format!(
+        "{networks} training{plural} of at most {} epochs",
+        form.template.base.training.stopping.epochs
+    )
+}
+
+fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettings) {
+    section_heading_ui(ui, "Values");
+    match topic {
+        Topic::Table(_) => form
+            .axes
+            .iter_mut()
+            .for_each(|axis| list_ui(ui, axis.kind.name(), axis)),
+        Topic::Sweep => {
+            for (number, axis) in form.axes.iter_mut().enumerate() {
+                axis_ui(ui, number, axis);
+            }
+        }
+    }
+    if form.template.cross_validation.is_some() {
+        cross_validation_ui(ui, form);
+    }
+    section_heading_ui(ui, "Training");
+    if topic == Topic::Sweep {
+        base_ui(ui, form, draft);
+    }
+    let template = &mut form.template;
+    let hint = "How many seeds in succession each cell is tried with: the spread of the results.";
+    count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MOST_TRIALS);
+    let hint = "The first of the seeds; the same seeds give the same figures.";
+    field_ui(ui, "First seed", hint, |ui| {
+        let drag = DragValue::new(&mut template.base.seed.0)
+            .speed(0.1)
+            .update_while_editing(false);
+        ui.add_sized([space(16), space(6)], drag)
+    });
+    let hint = "The most epochs of a training. The paper does not say how long it trained.";
+    let epochs = &mut template.base.training.stopping.epochs;
+    count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MOST_EPOCHS);
+    let hint = "Trainings from different random weights, of which the best by validation error counts.";
+    count_ui(ui, "Starts", hint, &mut template.base.starts, 1..=MOST_STARTS);
+}
+
+fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
+    let Some(validation) = &mut form.template.cross_validation else {
+        return;
+    };
+    section_heading_ui(ui, "Cross-validation");
+    count_ui(
+        ui,
+        "Folds",
+        "k: into how many parts the samples are dealt.",
+        &mut validation.folds,
+        2..=MOST_TRIALS,
+    );
+    let hint = "How often the samples are dealt anew, for each seed.";
+    count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MOST_TRIALS);
+    let units = [(FoldUnit::Sample, "By sample"), (FoldUnit::Snapshot, "By snapshot")];
+    if let Some(unit) = segmented_ui(ui, "What is dealt", &units, validation.unit, true) {
+        validation.unit = unit;
+    }
+    dim_ui(
+        ui,
+        match validation.unit {
+            FoldUnit::Sample => "As the paper: rows of one snapshot stand on both sides.",
+            FoldUnit::Snapshot => "Whole snapshots: nothing of a test sample's moment is known.",
+        },
+    );
+}
+
+/// A list of values, written freely.
+fn list_ui(ui: &mut Ui, name: &str, axis: &mut AxisForm) {
+    let label = ui.label(name);
+    let hint = "Values separated by commas";
+    let edit = TextEdit::multiline(&mut axis.values)
+        .desired_rows(1)
+        .desired_width(f32::INFINITY)
+        .hint_text(axis.kind.example())
+        .margin(vec2(space(2), space(1)));
+    ui.add(edit).labelled_by(label.id).on_hover_text(hint);
+}
+
+fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
+    let (name, values) = [("Across", "Values across"), ("Down", "Values down")][number.min(1)];
+    let label = ui.label(name);
+    let combo = ComboBox::from_id_salt(("sweep axis", number))
+        .selected_text(axis.kind.name())
+        .width(ui.available_width());
+    let shown = combo.show_ui(ui, |ui| {
+        for kind in AxisKind::ALL {
+            if ui.selectable_label(kind == axis.kind, kind.name()).clicked() && kind != axis.kind {
+                *axis = AxisForm::new(kind);
+            }
+        }
+    });
+    shown.response.labelled_by(label.id);
+    list_ui(ui, values, axis);
+    ui.add_space(space(1));
+}
+
+/// What a sweep holds, and where it may come from.
+fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
+    let base = &form.template.base;
+    let text = format!(
+        "{}, {} hidden nodes, {} samples, {}, where no axis says otherwise",
+        base.source.sensor.scale,
+        base.hidden,
+        base.source.samples,
+        base.training.method.name()
+    );
+    dim_ui(ui, &text);
+    let button = ui.add_enabled(base != draft, Button::new("Take the settings of the Train view"));
+    if button
+        .on_hover_text("Sensor, scene, network and training as they are set there")
+        .clicked()
+    {
+        form.template.base = *draft;
+    }
+}
+
+fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut Vec<Effect>) {
+    let half = ((ui.available_width() - space(2)) / 2.0).floor();
+    ui.horizontal(|ui| {
+        let size = vec2(half, space(7));
+        let run = ui.add_enabled(experiments.can_run(), primary_button("▶ Run").min_size(size));
+        if run
+            .on_hover_text("Run all trainings in the background (Ctrl+Enter)")
+            .clicked()
+        {
+            experiments.run(effects);
+        }
+        let can_cancel = experiments.running.is_some();
+        let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
+        if cancel
+            .on_hover_text("End it; what is finished stays (Ctrl+.)")
+            .clicked()
+        {
+            experiments.cancel();
+        }
+    });
+}
+
+fn progress_ui(ui: &mut Ui, running: &Running) {
+    ui.add_space(space(1));
+    let share = running.done as f32 / running.trials.max(1) as f32;
+    progress_bar_ui(ui, "Experiment", share);
+    let left = match running.time_left {
+        Some(time) => format!("about {} left", format_duration(time)),
+        None => "time left not known yet".to_owned(),
+    };
+    dim_ui(
+        ui,
+        &format!(
+            "{}: {} of {} trials, {left}",
+            running.topic.name(),
+            running.done,
+            running.trials
+        ),
+    );
+}

@@ -1,0 +1,103 @@
+use std::sync::Arc;
+
+use eframe::egui::{
+    Align, FontId, Label, Layout, RichText, TextWrapMode, Ui, Vec2, containers::menu::MenuButton, vec2,
+};
+
+use super::{ExperimentLook, Outcome, Topic, file::ExperimentFile, open_cell::open_cell, table::table_ui};
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::{Theme, semibold, space, type_size},
+        widgets::ghost_button,
+    },
+    export::{ExperimentTable, describe_conditions},
+};
+
+/// Margins of a card, both sides together.
+const MARGINS: f32 = 24.0;
+
+/// Title, how it was made, files, and the table.
+pub fn results_card_ui(
+    ui: &mut Ui,
+    (topic, outcome): (Topic, &Outcome),
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            export_ui(ui, topic, outcome, effects);
+            open_ui(ui, outcome, look.marked, shared, effects);
+            let heading = RichText::new(topic.heading()).font(semibold(type_size().title));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(Label::new(heading).truncate());
+            });
+        });
+    });
+    let conditions = RichText::new(describe_conditions(&outcome.results.experiment));
+    ui.label(conditions.size(type_size().note).color(dim));
+    let note_height = note_size(ui, ui.available_width()).y + space(1);
+    let table = vec2(ui.available_width(), ui.available_height() - note_height);
+    ui.allocate_ui(table, |ui| table_ui(ui, outcome, look, shared, effects));
+    let note = RichText::new(ExperimentTable::NOTE).size(type_size().small);
+    ui.label(note.color(dim));
+}
+
+/// What the card needs to show every row in a card of such a width.
+pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
+    let width = width - MARGINS;
+    let conditions = describe_conditions(&outcome.results.experiment);
+    let texts = text_size(ui, conditions, type_size().note, width).y + note_size(ui, width).y;
+    let title = space(7);
+    let rows = space(6) * (outcome.table.rows.len() as f32 + 1.0);
+    // Gaps between the four.
+    (MARGINS + title + texts + rows + space(5)).ceil()
+}
+
+fn note_size(ui: &Ui, width: f32) -> Vec2 {
+    text_size(ui, ExperimentTable::NOTE.to_owned(), type_size().small, width)
+}
+
+fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
+    let colour = Theme::of(ui).palette.dim;
+    ui.painter()
+        .layout(text, FontId::proportional(size), colour, width)
+        .size()
+}
+
+fn export_ui(ui: &mut Ui, topic: Topic, outcome: &Outcome, effects: &mut Vec<Effect>) {
+    let has_figures = outcome.trials().0 > 0;
+    ui.add_enabled_ui(has_figures, |ui| {
+        let button = MenuButton::from_button(ghost_button("Export"));
+        let (button, _) = button.ui(ui, |ui| {
+            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+            for file in ExperimentFile::ALL {
+                let words = file.words();
+                if ui.button(words.name).on_hover_text(words.description).clicked() {
+                    let results = Arc::clone(&outcome.results);
+                    effects.push(Effect::ChooseFile(file.task(topic, results)));
+                }
+            }
+        });
+        button.on_disabled_hover_text("There is nothing to export before the first trial is finished");
+    });
+}
+
+/// Takes the marked cell to the Train view.
+fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Shared, effects: &mut Vec<Effect>) {
+    let can_open = marked.is_some() && !shared.phase.is_busy();
+    let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
+    let why_not = if marked.is_some() {
+        "A training is under way there: its settings cannot change now"
+    } else {
+        "Click a cell of the table or the picture first"
+    };
+    let button = button
+        .on_hover_text("Show the network of the marked cell, that of its median trial, with its settings and surfaces")
+        .on_disabled_hover_text(why_not);
+    if let (true, Some(cell)) = (button.clicked(), marked) {
+        open_cell(shared, outcome, cell, effects);
+    }
+}

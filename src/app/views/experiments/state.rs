@@ -1,0 +1,325 @@
+use std::{
+    collections::HashMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use super::{
+    Form,
+    worker::{self, ExperimentEvent},
+};
+use crate::{
+    app::{
+        job::{Job, Wake},
+        shared::Effect,
+    },
+    evaluation::{
+        SimulatedSettings,
+        experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
+    },
+    export::ExperimentTable,
+    figure::{Figure, experiment_figure},
+    training::EpochRecord,
+};
+
+/// What the Experiments view is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// A table of the paper.
+    Table(PaperTable),
+    /// Two axes of one's own.
+    Sweep,
+}
+
+impl Topic {
+    /// In the order offered.
+    pub const ALL: [Self; 4] = [
+        Self::Table(PaperTable::HiddenNodes),
+        Self::Table(PaperTable::CrossValidation),
+        Self::Table(PaperTable::ArrayScales),
+        Self::Sweep,
+    ];
+
+    /// In a word or two.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table(PaperTable::HiddenNodes) => "Table 1",
+            Self::Table(PaperTable::CrossValidation) => "Table 2",
+            Self::Table(PaperTable::ArrayScales) => "Table 3",
+            Self::Sweep => "Sweep",
+        }
+    }
+
+    /// The title of its results.
+    pub fn heading(self) -> String {
+        match self {
+            Self::Table(table) => table.heading(),
+            Self::Sweep => "Sweep over two axes".to_owned(),
+        }
+    }
+}
+
+/// The Experiments view.
+#[derive(Debug)]
+pub struct ExperimentsView {
+    /// What is looked at.
+    pub topic: Topic,
+    /// How it is looked at.
+    pub look: ExperimentLook,
+    /// What runs.
+    pub running: Option<Running>,
+    pub(super) job: Job<ExperimentEvent>,
+    forms: HashMap<Topic, CheckedForm>,
+    outcomes: HashMap<Topic, Outcome>,
+}
+
+/// How an experiment is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExperimentLook {
+    /// The cell marked in table and picture.
+    pub marked: Option<usize>,
+    /// The order of the table.
+    pub sort: SortBy,
+}
+
+#[derive(Debug)]
+struct CheckedForm {
+    form: Form,
+    /// How many trials it has, or why it is no experiment.
+    checked: Result<usize, String>,
+    /// What it would fill in, with the published figures.
+    preview: Option<Outcome>,
+}
+
+/// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
+/// are trained again when they are to be seen.
+const MOST_KEPT_BYTES: usize = 400_000_000;
+
+/// The order of a table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SortBy {
+    /// By this column; none for the order of the cells.
+    pub column: Option<usize>,
+    /// The largest first.
+    pub is_descending: bool,
+}
+
+/// An experiment under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Running {
+    /// Which.
+    pub topic: Topic,
+    /// Trials finished.
+    pub done: usize,
+    /// Trials there are.
+    pub trials: usize,
+    /// How long the others take, once that can be told.
+    pub time_left: Option<Duration>,
+    /// When it began.
+    pub begun: Instant,
+}
+
+/// How an experiment ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Every trial has come to something.
+    Complete,
+    /// By the user, or by an accident that was told.
+    Cut,
+}
+
+/// What is known of an experiment, as it is shown.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Everything; shared with a file being written.
+    pub results: Arc<ExperimentResults>,
+    /// For reading.
+    pub table: ExperimentTable,
+    /// For looking at.
+    pub figure: Figure,
+    /// The figures behind it.
+    pub summaries: Vec<CellSummary>,
+    /// What they say about the paper's claims.
+    pub verdicts: Vec<Verdict>,
+    /// Whether it has ended, and how.
+    pub ending: Option<Ending>,
+    /// How long it took, once it has ended.
+    pub took: Option<Duration>,
+    kept_bytes: usize,
+}
+
+impl Outcome {
+    fn new(experiment: Experiment) -> Self {
+        let results = ExperimentResults::new(experiment);
+        Self {
+            table: ExperimentTable::new(&results),
+            figure: experiment_figure(&results),
+            summaries: results.summaries(),
+            verdicts: Vec::new(),
+            results: Arc::new(results),
+            ending: None,
+            took: None,
+            kept_bytes: 0,
+        }
+    }
+
+    /// Trials finished and trials asked for.
+    pub fn trials(&self) -> (usize, usize) {
+        let cells = self.results.cells.iter();
+        cells.fold((0, 0), |(done, all), cell| {
+            (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
+        })
+    }
+
+    fn record(&mut self, finished: Finished) {
+        let results = Arc::make_mut(&mut self.results);
+        let settings = results.cells[finished.cell].cell.settings;
+        let outcome = finished.outcome.map(|mut trial| {
+            let bytes = bytes_of(&trial, &settings);
+            if self.kept_bytes + bytes > MOST_KEPT_BYTES {
+                trial.states = Vec::new();
+            } else {
+                self.kept_bytes += bytes;
+            }
+            trial
+        });
+        results.record(finished.cell, outcome);
+    }
+
+    fn refresh(&mut self) {
+        self.table = ExperimentTable::new(&self.results);
+        self.figure = experiment_figure(&self.results);
+        self.summaries = self.results.summaries();
+        self.verdicts = verdicts(&self.results);
+    }
+}
+
+impl ExperimentsView {
+    /// Every form as the paper has it, nothing run. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        let mut state = Self {
+            topic: Topic::ALL[0],
+            look: ExperimentLook::default(),
+            running: None,
+            job: Job::new("experiments", wake),
+            forms: HashMap::new(),
+            outcomes: HashMap::new(),
+        };
+        for topic in Topic::ALL {
+            state.topic = topic;
+            state.edit(Form::new(topic));
+        }
+        state.topic = Topic::ALL[0];
+        state
+    }
+
+    /// Looks at another experiment.
+    pub fn choose(&mut self, topic: Topic) {
+        self.topic = topic;
+        self.look = ExperimentLook::default();
+    }
+
+    /// The form of what is looked at.
+    pub fn form(&self) -> &Form {
+        &self.forms[&self.topic].form
+    }
+
+    /// How many trials the form has, or why it cannot be run.
+    pub fn checked(&self) -> &Result<usize, String> {
+        &self.forms[&self.topic].checked
+    }
+
+    /// Takes a changed form of what is looked at.
+    pub fn edit(&mut self, form: Form) {
+        let preview = form.experiment().map(Outcome::new);
+        let (checked, preview) = match preview {
+            Ok(preview) => (Ok(preview.trials().1), Some(preview)),
+            Err(error) => (Err(error.to_string()), None),
+        };
+        let checked = CheckedForm { form, checked, preview };
+        self.forms.insert(self.topic, checked);
+    }
+
+    /// Whether what is looked at can be run now.
+    pub fn can_run(&self) -> bool {
+        self.running.is_none() && self.checked().is_ok()
+    }
+
+    /// Runs what is looked at.
+    pub(super) fn run(&mut self, effects: &mut Vec<Effect>) {
+        let Ok(experiment) = self.form().experiment() else {
+            return;
+        };
+        effects.push(Effect::DismissNotice);
+        self.begin(experiment.clone());
+        worker::run(&mut self.job, experiment);
+    }
+
+    /// Ends the one that runs; what is finished stays.
+    pub(super) fn cancel(&mut self) {
+        self.job.abandon();
+        self.end(Instant::now());
+    }
+
+    /// Makes room for the results of `experiment`.
+    fn begin(&mut self, experiment: Experiment) {
+        let outcome = Outcome::new(experiment);
+        self.running = Some(Running {
+            topic: self.topic,
+            done: 0,
+            trials: outcome.trials().1,
+            time_left: None,
+            begun: Instant::now(),
+        });
+        self.look = ExperimentLook::default();
+        self.outcomes.insert(self.topic, outcome);
+    }
+
+    /// Adds trials that have come to something.
+    pub fn record(&mut self, finished: Vec<Finished>) {
+        let Some(running) = &mut self.running else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        for finished in finished {
+            running.done = finished.done;
+            running.time_left = finished.time_left;
+            outcome.record(finished);
+        }
+        outcome.refresh();
+    }
+
+    /// The one that ran has ended.
+    pub fn end(&mut self, at: Instant) {
+        let Some(running) = self.running.take() else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        outcome.refresh();
+        outcome.took = Some(at - running.begun);
+        outcome.ending = Some(if outcome.results.is_complete() {
+            Ending::Complete
+        } else {
+            Ending::Cut
+        });
+    }
+
+    /// What is known of the experiment looked at.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcomes.get(&self.topic)
+    }
+
+    /// What is to be shown of it: what is known or, before anything is run, the published figures.
+    pub fn shown(&self) -> Option<&Outcome> {
+        self.outcome().or(self.forms[&self.topic].preview.as_ref())
+    }
+}
+
+/// About how much memory the finished training of a trial takes.
+fn bytes_of(trial: &Trial, settings: &SimulatedSettings) -> usize {
+    let scale = settings.source.sensor.scale;
+    let weights = settings.hidden * (scale.columns() + 1) + (settings.hidden + 1) * scale.coordinates_per_row();
+    // The present and the best weights, and up to as many numbers of the method's own.
+    let of_start = 4 * weights * size_of::<f64>();
+    trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
+}

@@ -1,0 +1,31 @@
+use eframe::egui::Ui;
+
+use super::{Ending, ExperimentsView};
+use crate::{
+    app::{theme::Theme, widgets::state_ui},
+    export::format_duration,
+};
+
+/// What is going on, in the line at the bottom.
+pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
+    let palette = Theme::of(ui).palette;
+    let (colour, text) = match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),
+        (None, Some(outcome)) => {
+            let (done, all) = outcome.trials();
+            let took = outcome
+                .took
+                .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
+            let name = experiments.topic.name();
+            match outcome.ending {
+                Some(Ending::Complete) => (palette.good, format!("{name} finished: {all} trials{took}")),
+                _ => (
+                    palette.warning,
+                    format!("{name} ended early: {done} of {all} trials{took}"),
+                ),
+            }
+        }
+        (None, None) => (palette.dim, "Ready: press Run".to_owned()),
+    };
+    ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+}

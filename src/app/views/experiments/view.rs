@@ -1,0 +1,126 @@
+use std::time::Instant;
+
+use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
+
+use super::{
+    ExperimentLook, ExperimentsView, Outcome, Topic,
+    heat_map::sweep_ui,
+    panel,
+    results_card::{results_card_height, results_card_ui},
+    status,
+    verdict_list::verdicts_ui,
+    worker::ExperimentEvent,
+};
+use crate::{
+    app::{
+        plotting::{Pointer, legend_ui, plots_ui},
+        shared::{Effect, Notice, Shared, View},
+        theme::space,
+        widgets::{card_ui, placeholder_ui, pressed, scrolled_ui, section_heading_ui},
+    },
+    figure::Figure,
+};
+
+impl View for ExperimentsView {
+    fn name(&self) -> &'static str {
+        "Experiments"
+    }
+
+    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+        let mut finished = Vec::new();
+        while let Some(event) = self.job.next_event() {
+            match event {
+                ExperimentEvent::Finished(trial) => finished.push(*trial),
+                ExperimentEvent::Ended(result) => {
+                    self.record(std::mem::take(&mut finished));
+                    self.end(Instant::now());
+                    effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
+                }
+            }
+        }
+        if !finished.is_empty() {
+            self.record(finished);
+        }
+    }
+
+    fn is_working(&self) -> bool {
+        self.running.is_some()
+    }
+
+    fn take_shortcuts(&mut self, ctx: &Context, _shared: &Shared, effects: &mut Vec<Effect>) {
+        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && self.can_run() {
+            self.run(effects);
+        }
+        if pressed(ctx, Modifiers::COMMAND, Key::Period) && self.running.is_some() {
+            self.cancel();
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        panel::form_ui(ui, self, shared, effects);
+    }
+
+    /// The table above, picture and verdicts below.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        let whole = ui.available_rect_before_wrap();
+        let mut look = self.look;
+        let Some(outcome) = self.shown() else {
+            card_ui(ui, whole, |ui| {
+                placeholder_ui(ui, "The values on the left cannot be run yet: the note there says why.");
+            });
+            return;
+        };
+        let gap = space(2);
+        let height = results_card_height(ui, outcome, whole.width()).min((0.53 * whole.height()).round());
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height);
+        card_ui(ui, upper, |ui| {
+            results_card_ui(ui, (self.topic, outcome), &mut look, shared, effects);
+        });
+        let lower = lower.with_min_y(lower.min.y + gap);
+        let (left, right) = lower.split_left_right_at_x(lower.left() + (0.6 * lower.width()).round());
+        card_ui(ui, left, |ui| {
+            picture_ui(ui, (self.topic, outcome), &mut look, shared, effects);
+        });
+        card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
+            if outcome.trials().0 == 0 {
+                placeholder_ui(ui, hint(self));
+                return;
+            }
+            section_heading_ui(ui, "What this run says");
+            scrolled_ui(ui, "verdicts", |ui| verdicts_ui(ui, outcome));
+        });
+        ui.allocate_rect(whole, Sense::hover());
+        self.look = look;
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status::status_ui(ui, self);
+    }
+}
+
+/// Why there is no figure yet.
+fn hint(experiments: &ExperimentsView) -> &'static str {
+    match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) if running.topic == experiments.topic => "The figures appear as the trials finish.",
+        (_, Some(_)) => "It ended before the first trial was finished.",
+        _ => "Press Run: our figures appear beside the published ones as they come.",
+    }
+}
+
+fn picture_ui(
+    ui: &mut Ui,
+    (topic, outcome): (Topic, &Outcome),
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    match &outcome.figure {
+        Figure::HeatMap(map) => sweep_ui(ui, (outcome, &**map), look, shared, effects),
+        Figure::Plots(plots) => {
+            legend_ui(ui, &plots.keys);
+            plots_ui(ui, topic.name(), plots, Pointer::Moves);
+        }
+        // No experiment has any.
+        Figure::Surfaces(_) => {}
+    }
+}

@@ -1,0 +1,173 @@
+use std::ops::RangeInclusive;
+
+use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeric};
+
+use super::{IdentifiabilityView, Question};
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::space,
+        widgets::{
+            dim_ui,
+            fields::{count_ui, quantity_ui},
+            primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style,
+        },
+    },
+    scene::{Movement, RowModel, Rows},
+    sensor::{ArrayScale, LARGEST_COUNT},
+};
+
+/// Array, geometry and scene to be tried, and the way back to the Train view.
+pub fn form_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let mut question = view.question;
+    let mut is_taken = false;
+    scrolled_ui(ui, "identifiability form", |ui| {
+        section_heading_ui(ui, "Geometry");
+        geometry_ui(ui, &mut question);
+        section_heading_ui(ui, "Array");
+        array_ui(ui, &mut question.sensor.scale);
+        section_heading_ui(ui, "Scene");
+        scene_ui(ui, &mut question);
+        ui.add_space(space(3));
+        is_taken = buttons_ui(ui, view, shared, effects);
+        ui.add_space(space(4));
+    });
+    if question != view.question {
+        view.question = question;
+        view.ask();
+    } else if is_taken {
+        view.take(&shared.draft);
+        view.ask();
+    }
+}
+
+fn geometry_ui(ui: &mut Ui, question: &mut Question) {
+    let geometry = &mut question.sensor.geometry;
+    let lengths = [
+        (
+            "Height",
+            "Row-wires above column-wires, undeformed.",
+            &mut geometry.height_mm,
+            0.5..=15.0,
+        ),
+        (
+            "Node pitch",
+            "Between nodes on a row-wire.",
+            &mut geometry.node_pitch_mm,
+            0.2..=8.0,
+        ),
+        ("Row pitch", "Between row-wires.", &mut geometry.row_pitch_mm, 0.2..=8.0),
+        (
+            "Column pitch",
+            "Between column-wires.",
+            &mut geometry.column_pitch_mm,
+            0.2..=8.0,
+        ),
+        (
+            "Column node pitch",
+            "Between nodes on a column-wire.",
+            &mut geometry.column_node_pitch_mm,
+            0.5..=15.0,
+        ),
+    ];
+    for (name, hint, value, range) in lengths {
+        quantity_ui(ui, name, hint, value, 1e-6..=1e6, "mm");
+        slider_ui(ui, name, value, range, 0.05);
+    }
+    let hint = "x of the first node on each column-wire. Shifting it breaks the symmetry that makes rows read alike.";
+    let name = "First column node at x";
+    let value = &mut geometry.column_node_x0_mm;
+    quantity_ui(ui, name, hint, value, -1e6..=1e6, "mm");
+    slider_ui(ui, name, value, -10.0..=40.0, 0.05);
+}
+
+fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
+    let (mut columns, mut nodes) = (scale.columns(), scale.nodes_per_column());
+    let hint = "Each gives every row one reading more.";
+    count_ui(ui, "Column-wires", hint, &mut columns, 1..=LARGEST_COUNT);
+    slider_ui(ui, "Column-wires", &mut columns, 1..=100, 1.0);
+    let hint = "All nodes of a column-wire are read together.";
+    count_ui(ui, "Nodes on each column", hint, &mut nodes, 1..=LARGEST_COUNT);
+    slider_ui(ui, "Nodes on each column", &mut nodes, 1..=20, 1.0);
+    if let Ok(changed) = ArrayScale::new(scale.rows(), scale.nodes_per_row(), nodes, columns) {
+        *scale = changed;
+    }
+    dim_ui(
+        ui,
+        &format!("{scale}: {} row-wires of {} nodes", scale.rows(), scale.nodes_per_row()),
+    );
+}
+
+fn scene_ui(ui: &mut Ui, question: &mut Question) {
+    let scene = &mut question.scene;
+    let known = [(RowModel::Shared, "Row unknown"), (RowModel::Each, "Row known")];
+    if let Some(model) = segmented_ui(ui, "Whether the row is known", &known, scene.rows.model(), true) {
+        scene.rows = match model {
+            RowModel::Shared => Rows::All,
+            RowModel::Each => Rows::Known,
+        };
+    }
+    let is_sideways = scene.movement != Movement::Z;
+    let movements = [(false, "Nodes move in z"), (true, "In x, y and z")];
+    if let Some(is_sideways) = segmented_ui(ui, "How nodes move", &movements, is_sideways, true) {
+        scene.movement = if is_sideways { Movement::SIDEWAYS } else { Movement::Z };
+    }
+    let hint = "Standard deviation of a reading in proportion to it.";
+    let noise = &mut scene.noise.relative;
+    quantity_ui(ui, "Relative noise", hint, noise, 0.0..=1.0, "");
+    let present = *noise;
+    let slider = Slider::new(noise, 0.0..=1.0).logarithmic(true).smallest_positive(1e-6);
+    add_slider(ui, "Relative noise", present, slider);
+    let hint = "How far all nodes are pressed where the sensor is looked at, up to what the scene presses.";
+    let mut percent = 100.0 * question.compression;
+    let most = 100.0 * scene.largest_compression;
+    quantity_ui(ui, "Compression", hint, &mut percent, 0.0..=most, "%");
+    slider_ui(ui, "Compression", &mut percent, 0.0..=most, 0.5);
+    // Only what was changed, lest rounding change it.
+    if percent != 100.0 * question.compression {
+        question.compression = percent / 100.0;
+    }
+}
+
+fn slider_ui<N: Numeric>(ui: &mut Ui, name: &str, value: &mut N, range: RangeInclusive<N>, step: f64) {
+    let present = value.to_f64();
+    add_slider(ui, name, present, Slider::new(value, range).step_by(step));
+}
+
+/// A value beyond the slider's ends stays as it is until the slider is moved.
+fn add_slider(ui: &mut Ui, name: &str, present: f64, slider: Slider<'_>) {
+    ui.scope(|ui| {
+        slider_style(ui);
+        ui.spacing_mut().slider_width = ui.available_width();
+        let response = ui.add(slider.show_value(false).clamping(SliderClamping::Never));
+        response.widget_info(|| WidgetInfo::slider(true, present, format!("{name} slider")));
+    });
+}
+
+/// Returns whether the question is to be that of the Train view again.
+fn buttons_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) -> bool {
+    let question = view.question;
+    let mut is_taken = false;
+    let can_use = !shared.phase.is_busy() && question.sensor != shared.draft.source.sensor;
+    let why_not = if shared.phase.is_busy() {
+        "A training is under way there: its settings cannot change now"
+    } else {
+        "It is the sensor of the Train view"
+    };
+    let can_reset = question != Question::of(&shared.draft);
+    ui.vertical_centered_justified(|ui| {
+        let button = primary_button("Use this sensor in the Train view");
+        let button = ui.add_enabled(can_use, button);
+        if button
+            .on_hover_text("Takes the array and its geometry over into the Train view; the scene there stays")
+            .on_disabled_hover_text(why_not)
+            .clicked()
+        {
+            let settings = view.hand_over(&shared.draft);
+            effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
+        }
+        let reset = ui.add_enabled(can_reset, Button::new("Back to the Train view's"));
+        is_taken = reset.on_hover_text("Its sensor and its scene again").clicked();
+    });
+    is_taken
+}

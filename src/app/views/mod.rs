@@ -1,0 +1,64 @@
+//! The views, one room each; none knows another.
+//!
+//! A new view is a room of its own whose main type is a [`View`], and a field and a line in [`Views`] below. What it asks
+//! of the window is an [`Effect`](crate::app::shared::Effect); only if it needs what no view has asked for yet,
+//! `shared/effect.rs` gets a variant, and `window/applying.rs` says what it does.
+
+mod compare;
+mod experiments;
+mod identifiability;
+mod trade_off;
+mod train;
+
+use std::sync::Arc;
+
+use super::{job::Wake, shared::View};
+
+pub use identifiability::{Analysis, Question};
+pub use trade_off::{TradeEnding, TradePlan};
+pub use train::{BottomTab, DecoderResult};
+
+use self::{
+    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, trade_off::TradeOffView,
+    train::TrainView,
+};
+pub(super) use train::ExportKind;
+
+/// All views.
+#[derive(Debug)]
+pub struct Views {
+    /// One training and what it makes of the sensor.
+    pub train: TrainView,
+    /// The paper's tables and sweeps.
+    pub experiments: ExperimentsView,
+    /// Two finished trainings side by side.
+    pub compare: CompareView,
+    /// What readings can tell at all.
+    pub identifiability: IdentifiabilityView,
+    /// What each way of decoding costs and gains.
+    pub trade_off: TradeOffView,
+}
+
+impl Views {
+    /// As the window opens. `wake` is called whenever a view has news.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            train: TrainView::new(Arc::clone(wake)),
+            experiments: ExperimentsView::new(Arc::clone(wake)),
+            compare: CompareView::new(Arc::clone(wake)),
+            identifiability: IdentifiabilityView::new(Arc::clone(wake)),
+            trade_off: TradeOffView::new(Arc::clone(wake)),
+        }
+    }
+
+    /// In the order of the top bar. The first is the one that trains.
+    pub fn all(&mut self) -> [&mut dyn View; 5] {
+        [
+            &mut self.train,
+            &mut self.experiments,
+            &mut self.compare,
+            &mut self.identifiability,
+            &mut self.trade_off,
+        ]
+    }
+}

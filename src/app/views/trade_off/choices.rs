@@ -1,0 +1,109 @@
+//! The two questions and their answers, and the point that is marked.
+
+use eframe::egui::{Align, Label, Layout, RichText, Ui};
+
+use super::TradeLook;
+use crate::{
+    app::{
+        theme::{Theme, semibold, space, type_size},
+        widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
+    },
+    evaluation::{TradeLevel, TradePoint},
+    export::format_percent,
+    figure::trade_words::{frame_time, point_facts, point_name},
+};
+
+/// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
+/// so.
+pub fn choices_ui(ui: &mut Ui, level: &TradeLevel, look: &mut TradeLook, can_load: bool) -> Option<usize> {
+    let [fastest, most_accurate] = level.answers(&look.limits);
+    section_heading_ui(ui, "Which one to take");
+    let hint = "The least time for a frame with at most this error of z.";
+    quantity_ui(ui, "Fastest under", hint, &mut look.limits.percent, 1e-15..=1e6, "%");
+    let none = "Nothing measured here is as accurate.";
+    answer_ui(ui, &mut look.marked, level, "Fastest", fastest, none);
+    ui.add_space(space(1));
+    let hint = "The least error of z among those that decode a frame within this time.";
+    quantity_ui(
+        ui,
+        "Most accurate under",
+        hint,
+        &mut look.limits.microseconds,
+        1e-6..=1e12,
+        "µs",
+    );
+    let none = "Nothing measured here is as fast.";
+    answer_ui(ui, &mut look.marked, level, "Most accurate", most_accurate, none);
+    section_heading_ui(ui, "Marked point");
+    match look.marked.and_then(|marked| Some((marked, level.points.get(marked)?))) {
+        Some((marked, point)) => marked_ui(ui, point, can_load).then_some(marked),
+        None => {
+            dim_ui(
+                ui,
+                "Click a row of the table to mark its point, or a point of a chart to load it.",
+            );
+            None
+        }
+    }
+}
+
+/// The configuration that answers a question; a click marks it.
+fn answer_ui(
+    ui: &mut Ui,
+    marked: &mut Option<usize>,
+    level: &TradeLevel,
+    question: &str,
+    chosen: Option<usize>,
+    none: &str,
+) {
+    let Some((number, point)) = chosen.and_then(|number| Some((number, level.points.get(number)?))) else {
+        dim_ui(ui, none);
+        return;
+    };
+    let text = format!(
+        "{}: {}, {}",
+        point_name(point),
+        format_percent(point.report.errors.z_percent),
+        frame_time(point.report.cost.frame_us)
+    );
+    let accent = Theme::of(ui).palette.accent;
+    let response = ui.selectable_label(
+        *marked == Some(number),
+        RichText::new(&text).size(type_size().note).color(accent),
+    );
+    let response = response.on_hover_text("Click to mark it in the charts and the table");
+    response.widget_info(|| {
+        let label = format!("{question}: {text}");
+        eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::Button, true, label)
+    });
+    if response.clicked() {
+        *marked = Some(number);
+    }
+}
+
+/// Returns whether the point is to be loaded.
+fn marked_ui(ui: &mut Ui, point: &TradePoint, can_load: bool) -> bool {
+    let mut is_loaded = false;
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
+            is_loaded = load
+                .on_hover_text("Take its sensor, scene and network settings for the next training")
+                .on_disabled_hover_text("A training is under way there: its settings cannot change now")
+                .clicked();
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let name = RichText::new(point_name(point)).font(semibold(type_size().note));
+                ui.add(Label::new(name).truncate());
+            });
+        });
+    });
+    dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
+    dim_ui(
+        ui,
+        &format!(
+            "{} training samples, {} epochs at most.",
+            point.settings.source.samples, point.settings.training.stopping.epochs
+        ),
+    );
+    is_loaded
+}

@@ -1,0 +1,18 @@
+//! The Trade-off view: every way of decoding measured on this machine, its error against its time, at several levels of
+//! noise. A thread of its own measures while the window stays free.
+
+mod chart;
+mod choices;
+mod file;
+mod form;
+mod names;
+mod panel;
+mod plan;
+mod state;
+mod table;
+mod view;
+mod worker;
+
+pub use form::{Thoroughness, TradeForm, TradeFormError, WhichPresets};
+pub use plan::TradePlan;
+pub use state::{TradeEnding, TradeLook, TradeOffView, TradeOutcome};

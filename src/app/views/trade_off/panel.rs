@@ -1,0 +1,148 @@
+use eframe::egui::{TextEdit, Ui, vec2};
+
+use super::{Thoroughness, TradeForm, TradeOffView, WhichPresets, names::noise_name};
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::space,
+        widgets::{
+            dim_ui, fields::count_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui,
+            section_heading_ui, segmented_ui,
+        },
+    },
+    dataset::LARGEST_SAMPLES,
+    decoupling::{DecoderKind, Precision},
+    evaluation::Preset,
+    training::StoppingRules,
+};
+
+/// What is measured: lists, presets, decoders, Measure and Cancel.
+pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
+    scrolled_ui(ui, "trade form", |ui| {
+        section_heading_ui(ui, "What is measured");
+        let draft = &shared.draft;
+        let text = format!(
+            "{} in the scene of the Train view, seed {}.",
+            draft.source.sensor.scale, draft.seed
+        );
+        dim_ui(ui, &text);
+        ui.add_enabled_ui(trade.running.is_none(), |ui| fields_ui(ui, &mut trade.form));
+        ui.add_space(space(1));
+        match trade.plan(draft) {
+            Ok(plan) => {
+                dim_ui(ui, &format!("{} points", plan.points()));
+            }
+            Err(problem) => {
+                note_ui(ui, &problem.to_string());
+            }
+        }
+        buttons_ui(ui, trade, shared, effects);
+        progress_ui(ui, trade, shared);
+        ui.add_space(space(4));
+    });
+}
+
+fn fields_ui(ui: &mut Ui, form: &mut TradeForm) {
+    let hint = "Relative errors of a reading (standard deviation), separated by commas.";
+    list_ui(ui, "Noise levels", hint, &mut form.noises);
+    let hint = "Sizes of the networks, separated by commas.";
+    list_ui(ui, "Hidden nodes", hint, &mut form.hidden);
+    section_heading_ui(ui, "Presets");
+    let presets = [
+        (WhichPresets::Both, "Both"),
+        (WhichPresets::Only(Preset::Paper), "Paper"),
+        (WhichPresets::Only(Preset::Best), "Best"),
+    ];
+    form.presets = segmented_ui(ui, "Presets", &presets, form.presets, true).unwrap_or(form.presets);
+    section_heading_ui(ui, "Decoders");
+    for (kind, is_chosen) in DecoderKind::ALL.into_iter().zip(&mut form.decoders) {
+        ui.checkbox(is_chosen, kind.name(Precision::Double))
+            .on_hover_text(kind.meaning());
+    }
+    section_heading_ui(ui, "Training");
+    let options = [
+        (Thoroughness::Quick, "Quick look"),
+        (Thoroughness::Full, "Full presets"),
+    ];
+    let picked = segmented_ui(ui, "How long networks are trained", &options, form.thoroughness, true);
+    form.thoroughness = picked.unwrap_or(form.thoroughness);
+    match form.thoroughness {
+        Thoroughness::Quick => {
+            let hint = "The most training samples of a network; a preset with fewer keeps its own.";
+            count_ui(ui, "Samples at most", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
+            let hint = "The most epochs of a training.";
+            count_ui(
+                ui,
+                "Epochs at most",
+                hint,
+                &mut form.epochs,
+                1..=StoppingRules::MOST_EPOCHS,
+            );
+        }
+        Thoroughness::Full => {
+            dim_ui(
+                ui,
+                "As many samples and epochs as the presets say: best networks, some minutes for each.",
+            );
+        }
+    }
+    let hint = "Samples that errors are measured on.";
+    count_ui(ui, "Test samples", hint, &mut form.test_samples, 1..=LARGEST_SAMPLES);
+}
+
+fn list_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
+    let label = ui.label(name).on_hover_text(hint);
+    let edit = TextEdit::singleline(text)
+        .desired_width(f32::INFINITY)
+        .margin(vec2(space(2), space(1)));
+    ui.add(edit).labelled_by(label.id).on_hover_text(hint);
+}
+
+fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let half = ((ui.available_width() - space(2)) / 2.0).floor();
+    ui.horizontal(|ui| {
+        let size = vec2(half, space(7));
+        let measure = primary_button("▶ Measure").min_size(size);
+        let measure = ui.add_enabled(trade.can_measure(shared), measure);
+        let why_not = if !trade.is_quiet(shared) {
+            "A training or an experiment is under way: it would disturb the times"
+        } else if trade.running.is_some() {
+            "One measurement at a time"
+        } else {
+            "The note above says what to change"
+        };
+        if measure
+            .on_hover_text("Train, fit and time every decoder in the background (Ctrl+Enter)")
+            .on_disabled_hover_text(why_not)
+            .clicked()
+        {
+            trade.measure(shared, effects);
+        }
+        let cancel = ghost_button("■ Cancel").min_size(size);
+        let cancel = ui.add_enabled(trade.running.is_some(), cancel);
+        if cancel
+            .on_hover_text("End it; what is measured stays (Ctrl+.)")
+            .clicked()
+        {
+            trade.cancel();
+        }
+    });
+}
+
+fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
+    let (Some(_), Some(outcome)) = (&trade.running, &trade.outcome) else {
+        return;
+    };
+    ui.add_space(space(1));
+    let (done, all) = outcome.points();
+    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32);
+    let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
+    let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
+    dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
+    if !trade.is_quiet(shared) {
+        note_ui(
+            ui,
+            "A training or an experiment is under way: it makes these times longer.",
+        );
+    }
+}

@@ -1,0 +1,205 @@
+use std::time::Instant;
+
+use eframe::egui::{
+    Align, ComboBox, Context, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, containers::menu::MenuButton,
+};
+
+use super::{
+    TradeEnding, TradeLook, TradeOffView, TradeOutcome, chart::charts_ui, choices::choices_ui, file::TradeFile,
+    names::noise_name, panel, table::table_ui, worker::TradeEvent,
+};
+use crate::{
+    app::{
+        plotting::legend_ui,
+        shared::{Effect, Notice, Shared, View},
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui, state_ui},
+    },
+    export::format_duration,
+    figure::trade_off_figure,
+};
+
+impl View for TradeOffView {
+    fn name(&self) -> &'static str {
+        "Trade-off"
+    }
+
+    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+        while let Some(event) = self.job.next_event() {
+            match event {
+                TradeEvent::Measured(level, point) => self.record(level, *point),
+                TradeEvent::Ended(result) => {
+                    self.end(Instant::now());
+                    effects.extend(result.err().map(|reason| Effect::Tell(Notice::Failed(reason))));
+                }
+            }
+        }
+    }
+
+    fn is_working(&self) -> bool {
+        self.running.is_some()
+    }
+
+    fn take_shortcuts(&mut self, ctx: &Context, shared: &Shared, effects: &mut Vec<Effect>) {
+        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && self.can_measure(shared) {
+            self.measure(shared, effects);
+        }
+        if pressed(ctx, Modifiers::COMMAND, Key::Period) && self.running.is_some() {
+            self.cancel();
+        }
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        panel::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        trade_ui(ui, self, !shared.phase.is_busy(), effects);
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Both charts above, the table and the choices below.
+fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut Vec<Effect>) {
+    let whole = ui.available_rect_before_wrap();
+    let (Some(outcome), Some(level)) = (&trade.outcome, trade.shown()) else {
+        card_ui(ui, whole, |ui| {
+            placeholder_ui(
+                ui,
+                "Press Measure: every decoder appears here with its error, its time for a frame and its training time, \
+                 at several levels of noise.",
+            );
+        });
+        return;
+    };
+    let mut look = trade.look;
+    let mut loaded = None;
+    let gap = space(2);
+    let lower_height = (0.38 * whole.height()).clamp(space(50), space(85));
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+    card_ui(ui, upper.with_max_y(upper.max.y - gap), |ui| {
+        head_ui(ui, outcome, &mut look, effects);
+        if level.points.is_empty() {
+            placeholder_ui(ui, waiting(trade.running.is_some()));
+            return;
+        }
+        let figure = trade_off_figure(level, &look.limits);
+        legend_ui(ui, &figure.keys);
+        if let Some(clicked) = charts_ui(ui, (level, &figure), look.marked, can_load) {
+            look.marked = Some(clicked);
+            loaded = can_load.then_some(clicked);
+        }
+    });
+    let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
+    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
+        table_ui(ui, level, &mut look.marked);
+    });
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "trade choices", |ui| {
+            loaded = loaded.or(choices_ui(ui, level, &mut look, can_load));
+        });
+    });
+    ui.allocate_rect(whole, Sense::hover());
+    let settings = loaded.and_then(|point| Some(level.points.get(point)?.settings));
+    trade.look = look;
+    if let Some(settings) = settings {
+        effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
+    }
+}
+
+fn head_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook, effects: &mut Vec<Effect>) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            export_ui(ui, outcome, look, effects);
+            level_ui(ui, outcome, look);
+        });
+    });
+}
+
+/// Few levels stand side by side, many in a list.
+fn level_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &mut TradeLook) {
+    let names: Vec<String> = outcome.plan.noises.iter().map(|&noise| noise_name(noise)).collect();
+    let picked = if names.len() <= 5 {
+        let options: Vec<_> = names
+            .iter()
+            .enumerate()
+            .map(|(level, name)| (level, name.as_str()))
+            .collect();
+        segmented_ui(ui, "Noise on show", &options, look.level, false)
+    } else {
+        let mut picked = None;
+        let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
+        combo.show_ui(ui, |ui| {
+            for (level, name) in names.iter().enumerate() {
+                if ui.selectable_label(level == look.level, name).clicked() {
+                    picked = Some(level);
+                }
+            }
+        });
+        picked
+    };
+    if let Some(level) = picked {
+        (look.level, look.marked) = (level, None);
+    }
+    dim_ui(ui, "Noise");
+}
+
+fn export_ui(ui: &mut Ui, outcome: &TradeOutcome, look: &TradeLook, effects: &mut Vec<Effect>) {
+    ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
+        let button = MenuButton::from_button(ghost_button("Export"));
+        let (button, _) = button.ui(ui, |ui| {
+            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+            for file in TradeFile::ALL {
+                let words = file.words();
+                if ui.button(words.name).on_hover_text(words.description).clicked() {
+                    effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), look)));
+                }
+            }
+        });
+        button.on_disabled_hover_text("There is nothing to export before the first point is measured");
+    });
+}
+
+/// Why a level of noise has no points.
+fn waiting(is_running: bool) -> &'static str {
+    if is_running {
+        "The points of this noise appear as they are measured."
+    } else {
+        "The measurement ended before this noise."
+    }
+}
+
+/// What is going on, in the line at the bottom.
+fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
+    let palette = Theme::of(ui).palette;
+    let (colour, text) = match (&trade.running, &trade.outcome) {
+        (Some(_), Some(outcome)) => {
+            let (done, all) = outcome.points();
+            (palette.accent, format!("Measuring: {done} of {all} points"))
+        }
+        (_, Some(outcome)) => {
+            let (done, all) = outcome.points();
+            let took = outcome
+                .took
+                .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
+            match outcome.ending {
+                Some(TradeEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
+                _ => (palette.warning, format!("Ended early: {done} of {all} points{took}")),
+            }
+        }
+        (_, None) => (palette.dim, "Ready: press Measure".to_owned()),
+    };
+    ui.horizontal_centered(|ui| {
+        state_ui(ui, colour, &text);
+        if let Some(outcome) = &trade.outcome {
+            let text = format!("{}, one thread, median of many", outcome.plan.base.source.sensor.scale);
+            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+        }
+    });
+}

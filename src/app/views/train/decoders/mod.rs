@@ -1,0 +1,12 @@
+//! What other decoders make of the test set: measured on a thread of their own once a training stands still and the
+//! user has unfolded their table, and shown as they come.
+
+mod measuring;
+mod state;
+mod table;
+
+pub use state::{DecoderResult, DecodersState};
+pub use {
+    measuring::DecoderMeasuring,
+    table::{REFERENCE, decoders_ui},
+};

@@ -1,0 +1,171 @@
+use std::{cell::OnceCell, sync::Arc};
+
+use ndarray::Array2;
+
+use crate::{
+    app::{
+        shared::Shared,
+        test_view::{Frame, TestView},
+    },
+    dataset::Dataset,
+    evaluation::node_rms_mm,
+    figure::z_pairs_mm,
+};
+
+/// What is drawn of the test set on show. It is made anew only when that, the result or the snapshot changes.
+#[derive(Debug, Default)]
+pub struct Drawn {
+    /// The snapshot on show.
+    pub frames: Frames,
+    of: Option<Of>,
+    snapshot: usize,
+    spread_mm: OnceCell<Vec<f64>>,
+    pairs_mm: OnceCell<Vec<(f64, f64)>>,
+}
+
+/// The snapshot being drawn.
+#[derive(Debug, Default)]
+pub struct Frames {
+    /// As it is.
+    pub actual: Frame,
+    /// As the network finds it, and the difference (decoupled − actual).
+    pub decoupled: Option<(Frame, Frame)>,
+}
+
+/// A test set and what the network makes of it.
+#[derive(Debug)]
+struct Of {
+    test: Arc<Dataset>,
+    decoupled_mm: Option<Arc<Array2<f64>>>,
+}
+
+impl Of {
+    fn is(&self, test: &TestView, decoupled_mm: Option<&Arc<Array2<f64>>>) -> bool {
+        let is_same_result = match (&self.decoupled_mm, decoupled_mm) {
+            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        is_same_result && Arc::ptr_eq(&self.test, &test.set)
+    }
+}
+
+impl Drawn {
+    /// Follows what is on show, at the snapshot nearest to the one wished for. Returns that one.
+    pub(super) fn follow(&mut self, shared: &Shared, snapshot: usize) -> usize {
+        let Some(test) = shared.test() else { return snapshot };
+        let snapshot = test.nearest_snapshot(snapshot);
+        let decoupled_mm = shared.result().map(|result| &result.decoupled_mm);
+        let is_same = self.of.as_ref().is_some_and(|of| of.is(test, decoupled_mm));
+        if is_same && self.snapshot == snapshot {
+            return snapshot;
+        }
+        if !is_same {
+            *self = Self {
+                of: Some(Of {
+                    test: Arc::clone(&test.set),
+                    decoupled_mm: decoupled_mm.cloned(),
+                }),
+                ..Self::default()
+            };
+        }
+        self.snapshot = snapshot;
+        let actual = test.frame(test.set.targets(), snapshot);
+        let decoupled = decoupled_mm.map(|decoupled_mm| test.frame(decoupled_mm.view(), snapshot));
+        self.frames = Frames {
+            decoupled: decoupled.map(|decoupled| {
+                let error = actual.error_of(&decoupled);
+                (decoupled, error)
+            }),
+            actual,
+        };
+        snapshot
+    }
+
+    fn result(&self) -> Option<(&Dataset, &Array2<f64>)> {
+        let of = self.of.as_ref()?;
+        Some((&of.test, of.decoupled_mm.as_ref()?))
+    }
+
+    /// How far each node is off in general, once there is a result: [`node_rms_mm`].
+    pub(super) fn spread_mm(&self) -> Option<&[f64]> {
+        let (test, decoupled_mm) = self.result()?;
+        Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoupled_mm)))
+    }
+
+    /// Actual and decoupled z of the nodes of the test set, in millimetres, once there is a result.
+    pub(super) fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
+        let (test, decoupled_mm) = self.result()?;
+        Some(self.pairs_mm.get_or_init(|| z_pairs_mm(test, decoupled_mm)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        app::{
+            shared::{RunResult, RunView},
+            training_worker::{Began, RunId},
+        },
+        evaluation::{Run, SimulatedSettings},
+    };
+
+    fn result(run: &Run) -> RunResult {
+        let decoupled_mm = run.decouple_test();
+        RunResult {
+            errors: run.errors_of(&decoupled_mm).unwrap(),
+            decoupled_mm: Arc::new(decoupled_mm),
+            best_epoch: 0,
+            flaw: None,
+            epochs_run: 0,
+            starts_ended: 0,
+            wall_time: None,
+            frame_time: None,
+            networks: None,
+        }
+    }
+
+    #[test]
+    fn what_the_whole_test_set_is_looked_at_for_is_made_once_for_each_result() {
+        let mut settings = SimulatedSettings {
+            hidden: 2,
+            ..SimulatedSettings::default()
+        };
+        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+        (settings.source.samples, settings.source.test_samples) = (20, 8);
+        let mut run = Run::prepare(settings).unwrap();
+        let mut shared = Shared::new(true);
+        shared.run = Some(RunView::new(Began {
+            id: RunId::new(),
+            settings,
+            weights: 0,
+            test: TestView::of(&settings, Arc::clone(run.test())).unwrap(),
+            baselines: *run.baselines().unwrap(),
+        }));
+        let mut drawn = Drawn::default();
+        drawn.follow(&shared, 0);
+        assert!(drawn.pairs_mm().is_none() && drawn.frames.decoupled.is_none());
+
+        shared.run.as_mut().unwrap().result = Some(result(&run));
+        assert_eq!(drawn.follow(&shared, 0), 0);
+        let first = z_pairs_mm(run.test(), &run.decouple_test());
+        assert_eq!(drawn.pairs_mm(), Some(&first[..]));
+        let (pairs, spread) = (drawn.pairs_mm().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
+        let actual = drawn.frames.actual.nodes_mm.clone();
+        assert_eq!(drawn.follow(&shared, 1_000_000), 3, "the last of four snapshots");
+        assert_ne!(drawn.frames.actual.nodes_mm, actual);
+        assert_eq!(
+            drawn.pairs_mm().unwrap().as_ptr(),
+            pairs,
+            "not made again for a snapshot"
+        );
+        assert_eq!(drawn.spread_mm().unwrap().as_ptr(), spread);
+
+        run.step();
+        shared.run.as_mut().unwrap().result = Some(result(&run));
+        drawn.follow(&shared, 3);
+        let next = z_pairs_mm(run.test(), &run.decouple_test());
+        assert_ne!(next, first);
+        assert_eq!(drawn.pairs_mm(), Some(&next[..]));
+    }
+}

@@ -1,0 +1,305 @@
+use std::time::Duration;
+
+use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+
+use super::{conditioning::conditioning_ui, spread::spread_ui};
+use crate::{
+    app::{
+        shared::{Effect, FileTask, FileWords, Phase, Purpose, RunResult, RunView, Shared},
+        theme::{Theme, space, type_size},
+        views::train::{
+            decoders::{REFERENCE, decoders_ui},
+            export_kind::{ExportKind, OPEN_CHECKPOINT, file_name},
+            shown_figure::ShownPicture,
+            state::TrainView,
+        },
+        widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+    },
+    evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
+    export::{format_duration, format_number},
+};
+
+/// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
+pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    scrolled_ui(ui, "report", |ui| {
+        section_heading_ui(ui, "Errors on the test set");
+        let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+        if let Some((run, result)) = shown {
+            let baselines = &run.baselines;
+            error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
+            verdict_ui(ui, shared, run, result);
+            conditioning_ui(ui, &run.test);
+            if let Some(note) = ReferenceNote::of(baselines) {
+                note_ui(ui, &note.to_string());
+            }
+            if let Some(worst) = worst_node_ui(ui, result) {
+                view.go_to(worst, shared);
+            }
+            decoders_ui(ui, &mut view.decoders, shared.phase, baselines.reference.as_ref());
+            effective_parameters_ui(ui, run, result);
+            spread_ui(ui, &run.starts);
+        } else {
+            expectation_ui(ui, shared);
+        }
+        section_heading_ui(ui, "Export");
+        for kind in ExportKind::ALL {
+            // A training under way is held first.
+            let is_standing = kind != ExportKind::Checkpoint || matches!(shared.phase, Phase::Paused | Phase::Ended(_));
+            let run = shown.map(|(run, _)| run).filter(|_| is_standing);
+            ui.add_enabled_ui(run.is_some(), |ui| {
+                file_ui(ui, kind.words(), false, || run.map(|run| kind.task(run)), effects);
+            });
+        }
+        for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
+            ui.add_enabled_ui(shown.is_some(), |ui| {
+                file_ui(ui, picture.words(), false, || picture.task(view, shared), effects);
+            });
+        }
+        section_heading_ui(ui, "Open");
+        let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        ui.add_enabled_ui(can_open, |ui| {
+            let task = || {
+                let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
+                Some(FileTask {
+                    words: OPEN_CHECKPOINT,
+                    suggestion: file_name("training", OPEN_CHECKPOINT, settings),
+                    purpose: Purpose::Open,
+                })
+            };
+            file_ui(ui, OPEN_CHECKPOINT, true, task, effects);
+        });
+        if let Some((run, result)) = shown {
+            section_heading_ui(ui, "Cost");
+            cost_ui(ui, run, result);
+        }
+    });
+}
+
+/// The table with the network's row still empty.
+fn expectation_ui(ui: &mut Ui, shared: &Shared) {
+    let known = shared.preview.as_ref();
+    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
+        let published = shared.draft.published();
+        let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
+        for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
+            *row = ErrorRow {
+                name: NETWORK,
+                z_percent: None,
+                x_percent: None,
+                y_percent: None,
+                z_mm: None,
+                z_full_scale_percent: None,
+                worst_mm: None,
+            };
+        }
+        error_table_ui(ui, &rows);
+        conditioning_ui(ui, &preview.test);
+        ui.add_space(space(2));
+    }
+    let text = "Press Train to fill in the network's row.";
+    if shared.draft.is_papers_scene() {
+        dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
+    } else {
+        dim_ui(ui, text);
+    }
+}
+
+/// The name of the network's row.
+const NETWORK: &str = "network";
+
+/// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
+const COLUMNS: [Column; 5] = [
+    Column {
+        heading: "Z %",
+        meaning: "AveZerr of the paper: mean |error| of z in percent of the coordinate z",
+    },
+    Column {
+        heading: "X %",
+        meaning: "AveXerr: mean |error| of x in percent of the coordinate x",
+    },
+    Column {
+        heading: "Y %",
+        meaning: "AveYerr: mean |error| of y in percent of the coordinate y",
+    },
+    Column {
+        heading: "mm",
+        meaning: "Mean |error| of z in millimetres",
+    },
+    Column {
+        heading: "stroke %",
+        meaning: "Mean |error| of z in percent of the full scale, the distance a node can travel",
+    },
+];
+
+fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
+    let palette = Theme::of(ui).palette;
+    let row = |row: &ErrorRow| Row {
+        name: row.name,
+        meaning: match row.name {
+            "training mean" => "Always the mean of the training set",
+            "linear map" => "The best affine map on resistance",
+            NETWORK => "The network with the lowest validation error so far",
+            "reference" => REFERENCE,
+            "published" => "What the paper reports for this array, hidden nodes and samples",
+            _ => "",
+        },
+        cells: row.values()[..COLUMNS.len()]
+            .iter()
+            .map(|value| format_number(*value))
+            .collect(),
+        colour: match row.name {
+            NETWORK => palette.accent,
+            "published" | "reference" => palette.dim,
+            _ => palette.text,
+        },
+        is_strong: row.name == NETWORK,
+    };
+    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.iter().map(row).collect::<Vec<_>>()));
+}
+
+/// Says plainly where the network loses, and what would help; or by how much it wins. Nothing while it still learns.
+fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
+    let Some(reason) = run.stop_reason else { return };
+    ui.add_space(space(2));
+    let baselines = &run.baselines;
+    let remarks = error_remarks(&run.settings, &result.errors, baselines, Some(reason));
+    let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
+    let fault = if let Some(flaw) = &result.flaw {
+        Some(sentence(&flaw.to_string()))
+    } else if let Some((row, remark)) = of_network {
+        Some(sentence(&format!("{row}: {remark}")))
+    } else if result.errors.z_mm > baselines.linear.z_mm {
+        let remedy = reason.remedy(&run.settings.training.method);
+        Some(sentence(&format!(
+            "a linear map of the resistances is better on z than this network: {remedy}"
+        )))
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        note_ui(ui, &fault);
+    } else if result.errors.z_mm > 0.0 {
+        let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
+        let to_limit = baselines.reference.and_then(|limit| result.errors.times(&limit));
+        let text = match to_limit.map(format_number) {
+            None => format!("On z {times} times as accurate as the linear map."),
+            Some(ratio) => {
+                format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
+            }
+        };
+        dim_ui(ui, &text);
+    }
+    if run.asked != shared.draft {
+        dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+/// The text with a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).chain(['.']).collect()
+}
+
+/// Returns the worst node, if the user wants to see it.
+fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
+    let mut is_wanted = false;
+    let worst = result.errors.worst_node;
+    ui.add_space(space(1));
+    ui.horizontal(|ui| {
+        let text = format!("Worst node {} mm", format_number(result.errors.worst_mm));
+        ui.label(RichText::new(text).size(type_size().note));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let place = format!(
+                "snapshot {}, row {}, node {}",
+                worst.snapshot + 1,
+                worst.row + 1,
+                worst.node + 1
+            );
+            let show = ui.small_button("Show").on_hover_text(format!("Go to {place}"));
+            is_wanted = show.clicked();
+        });
+    });
+    is_wanted.then_some(worst)
+}
+
+/// How many weights the data determine, where the method estimates it.
+fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let best = run.history.get(result.best_epoch);
+    let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
+        return;
+    };
+    let text = format!(
+        "Effective parameters {} of {} weights",
+        format_number(effective),
+        run.weights
+    );
+    ui.label(RichText::new(text).size(type_size().note)).on_hover_text(
+        "How many weights the data determine, as Bayesian regularisation estimates it. Near the number of weights: more \
+         hidden nodes may help; far below: fewer would do.",
+    );
+}
+
+fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let epochs = result.epochs_run;
+    let training = if run.settings.starts > 1 {
+        "Training, all starts"
+    } else {
+        "Training"
+    };
+    let told = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
+    let mut rows = vec![(training, told(result.wall_time))];
+    if epochs > 0 {
+        let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
+        rows.push(("An epoch", told(an_epoch)));
+    }
+    rows.push(("Best epoch", result.best_epoch.to_string()));
+    if let Some(time) = result.frame_time {
+        rows.push(("Decoding a snapshot", format_short_time(time)));
+    }
+    for (name, value) in rows {
+        ui.horizontal(|ui| {
+            ui.label(name);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
+        });
+    }
+}
+
+/// As [`format_duration`], with microseconds below a millisecond.
+fn format_short_time(time: Duration) -> String {
+    if time < Duration::from_millis(1) {
+        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
+    } else {
+        format_duration(time)
+    }
+}
+
+const PATH_BUTTON_WIDTH: f32 = space(24);
+
+/// Two buttons that ask for the path of a file; `task` tells what is to be done with it then.
+fn file_ui(
+    ui: &mut Ui,
+    words: FileWords,
+    is_read: bool,
+    task: impl Fn() -> Option<FileTask>,
+    effects: &mut Vec<Effect>,
+) {
+    ui.horizontal(|ui| {
+        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
+        let button = ghost_button(words.name).min_size([width, space(7)].into());
+        if ui.add(button).on_hover_text(words.description).clicked() {
+            effects.extend(task().map(Effect::ChooseFile));
+        }
+        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let is_enabled = path.enabled();
+        let verb = if is_read {
+            "Type the path of a"
+        } else {
+            "Type a path for the"
+        };
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, format!("{verb} {}", words.kind)));
+        if path.on_hover_text("Type the path instead of choosing it").clicked() {
+            effects.extend(task().map(Effect::TypePath));
+        }
+    });
+}

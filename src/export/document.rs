@@ -1,0 +1,195 @@
+use std::{
+    fmt, io,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::{
+    WriteError,
+    heading::{Heading, NoHeading},
+    limited::read_limited,
+};
+use crate::dataset::system_cause;
+
+pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+
+/// Kinds of JSON files that the program writes and reads again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DocumentKind {
+    /// A trained network with its record: [`super::NetworkFile`].
+    Network,
+    /// A training to be resumed: [`super::CheckpointFile`].
+    Checkpoint,
+    /// A name or choice of the run list: [`super::RunFolder`].
+    RunList,
+}
+
+impl DocumentKind {
+    /// Text of the field "format".
+    pub(super) fn format(self) -> &'static str {
+        match self {
+            Self::Network => "decoupler network",
+            Self::Checkpoint => "decoupler checkpoint",
+            Self::RunList => "decoupler run list",
+        }
+    }
+
+    /// Versions that can be read, of which the last is written.
+    pub(super) fn versions(self) -> RangeInclusive<u64> {
+        match self {
+            // Version 1 had one network and the paper's scene only, version 3 has a checksum and the ranges of the
+            // readings in training.
+            Self::Network => 1..=3,
+            // Version 1 had the paper's scene only, version 3 has the wall time.
+            Self::Checkpoint => 1..=3,
+            Self::RunList => 1..=1,
+        }
+    }
+
+    fn cure(self) -> &'static str {
+        match self {
+            Self::Network => "copy or save it again",
+            Self::Checkpoint => "copy it again, or start a new training",
+            Self::RunList => "name the run or choose A and B again",
+        }
+    }
+
+    /// Reads the file of this kind at `path`, as far as its heading.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is of another kind or a newer version.
+    pub(super) fn read(self, path: &Path) -> Result<(Heading, Vec<u8>), DocumentError> {
+        let bytes = read_limited(path).map_err(|source| DocumentError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok((self.heading(path, &bytes)?, bytes))
+    }
+
+    /// Reads the heading of the file at `path` from its `bytes`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(super) fn heading(self, path: &Path, bytes: &[u8]) -> Result<Heading, DocumentError> {
+        let path = || path.to_owned();
+        let other = |reason| DocumentError::Other {
+            path: path(),
+            kind: self,
+            reason,
+        };
+        let beginning = format!("{{\"format\":\"{}\",", self.format());
+        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
+            NoHeading::NotJson(flaw) if bytes.starts_with(beginning.as_bytes()) => self.damaged(&path(), flaw),
+            NoHeading::NotJson(reason) => other(reason),
+            NoHeading::CutOff { line, column } => DocumentError::CutOff {
+                path: path(),
+                kind: self,
+                line,
+                column,
+            },
+            NoHeading::Other => other(format!("it has no field \"format\": \"{}\"", self.format())),
+        })?;
+        if heading.format != self.format() {
+            return Err(other(format!("its format is {}", heading.format)));
+        }
+        match heading.newer_than(*self.versions().end()) {
+            Some(version) => Err(DocumentError::Version {
+                path: path(),
+                kind: self,
+                version,
+                program: heading.program(),
+            }),
+            None => Ok(heading),
+        }
+    }
+
+    pub(super) fn damaged(self, path: &Path, flaw: String) -> DocumentError {
+        let path = path.to_owned();
+        DocumentError::Damaged { path, kind: self, flaw }
+    }
+}
+
+impl fmt::Display for DocumentKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Network => "network file",
+            Self::Checkpoint => "checkpoint",
+            Self::RunList => "part of a run list",
+        })
+    }
+}
+
+/// Errors of reading or writing a network file, a checkpoint or a run list.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DocumentError {
+    /// The operating system refuses to read it.
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+    /// Not JSON, or JSON of another kind.
+    #[error("'{}' is not a {kind}: {reason}; choose one that Decoupler saved", .path.display())]
+    Other {
+        /// The file.
+        path: PathBuf,
+        /// Kind that it should have.
+        kind: DocumentKind,
+        /// Description of the file as found.
+        reason: String,
+    },
+    /// JSON that ends too early.
+    #[error("'{}' is cut off at line {line}, column {column}; {}", .path.display(), .kind.cure())]
+    CutOff {
+        /// The file.
+        path: PathBuf,
+        /// Kind of the file.
+        kind: DocumentKind,
+        /// Line of the end, counted from 1.
+        line: usize,
+        /// Column of the end, counted from 1.
+        column: usize,
+    },
+    /// Written in a format unknown to this version.
+    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads versions {} to {}: install a newer one", .path.display(), .kind.versions().start(), .kind.versions().end())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Kind of the file.
+        kind: DocumentKind,
+        /// Version of the file.
+        version: String,
+        /// Program that wrote the file.
+        program: String,
+    },
+    /// The checksum does not match, or a field is missing, of the wrong kind, or does not fit the others.
+    #[error("'{}' is damaged: {flaw}; {}", .path.display(), .kind.cure())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Kind of the file.
+        kind: DocumentKind,
+        /// Description of the defect, with the field or with line and column.
+        flaw: String,
+    },
+    /// A run on measured samples: the file tells of a simulated sensor, from which samples are drawn again.
+    #[error("a run on measured samples has no {0}; keep its networks or states, and its samples, yourself")]
+    Measured(DocumentKind),
+    /// The run has values that could not be read back.
+    #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
+    Unsound {
+        /// The file.
+        path: PathBuf,
+        /// Description of the defect, with the field.
+        flaw: String,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

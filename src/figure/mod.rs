@@ -1,0 +1,64 @@
+//! Figures as values: what a picture says, not how it is drawn.
+//!
+//! A [`Figure`] is described once by a function that knows the data, such as [`loss_figure`]. The window draws it with its
+//! theme and shows the same words under the pointer; [`crate::export::figures`] draws it as SVG and PNG. Values that are
+//! not finite are left out.
+
+mod axis;
+mod colour_map;
+mod heat_map;
+mod look;
+mod of_epochs;
+mod of_experiment;
+mod of_nodes;
+mod of_rows;
+mod of_trade_off;
+mod plot;
+mod plot_figure;
+pub mod surface;
+pub(crate) mod ticks;
+pub(crate) mod trade_words;
+
+pub(crate) use axis::share;
+pub use axis::{AxisScale, PlotAxis, TickRule, Ticks};
+pub use colour_map::{ColourMap, Rgb, is_light};
+pub use heat_map::HeatMap;
+pub use look::{Hue, Key, LineStyle, Look, Marker};
+pub use of_epochs::{compared_losses_figure, loss_figure, training_state_figure};
+pub use of_experiment::experiment_figure;
+pub use of_nodes::{error_histogram_figure, node_figure, regression_figure, z_pairs_mm};
+pub use of_rows::singular_values_figure;
+pub use of_trade_off::trade_off_figure;
+pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
+pub use plot_figure::PlotFigure;
+
+use surface::SurfaceFigure;
+
+/// Any picture.
+#[derive(Clone, Debug)]
+pub enum Figure {
+    /// Plots side by side.
+    Plots(PlotFigure),
+    /// Values over two axes.
+    HeatMap(Box<HeatMap>),
+    /// Surfaces side by side.
+    Surfaces(SurfaceFigure),
+}
+
+impl From<PlotFigure> for Figure {
+    fn from(plots: PlotFigure) -> Self {
+        Self::Plots(plots)
+    }
+}
+
+impl From<HeatMap> for Figure {
+    fn from(map: HeatMap) -> Self {
+        Self::HeatMap(Box::new(map))
+    }
+}
+
+impl From<SurfaceFigure> for Figure {
+    fn from(surfaces: SurfaceFigure) -> Self {
+        Self::Surfaces(surfaces)
+    }
+}

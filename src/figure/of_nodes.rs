@@ -1,0 +1,245 @@
+//! Figures of decoupled nodes beside the actual ones.
+
+use glam::DVec3;
+use ndarray::Array2;
+
+use super::{
+    axis::{PlotAxis, TickRule},
+    look::{Hue, Key, LineStyle, Look, Marker},
+    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
+    plot_figure::{PlotFigure, thinned},
+};
+use crate::{dataset::Dataset, evaluation::format::format_number};
+
+/// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
+const MOST_PAIRS: usize = 20_000;
+const BINS: usize = 41;
+
+/// Returns actual and decoupled z of the nodes of a test set, in millimetres. `decoupled_mm` has the shape of its
+/// targets.
+pub fn z_pairs_mm(test: &Dataset, decoupled_mm: &Array2<f64>) -> Vec<(f64, f64)> {
+    let actual = test.targets();
+    let every_z = actual.iter().zip(decoupled_mm).skip(2).step_by(3);
+    let stride = (actual.len() / 3).div_ceil(MOST_PAIRS).max(1);
+    every_z
+        .step_by(stride)
+        .map(|(actual, decoupled)| (*actual, *decoupled))
+        .collect()
+}
+
+/// Distribution of the errors of z (decoupled − actual).
+pub fn error_histogram_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
+    let errors: Vec<f64> = pairs_mm.iter().map(|(actual, decoupled)| decoupled - actual).collect();
+    let (counts, width) = histogram(&errors);
+    let bars = counts.iter().enumerate().map(|(bin, &count)| {
+        let centre = width * (bin as f64 - (BINS / 2) as f64);
+        [centre, count as f64]
+    });
+    let bars = Series {
+        bar_width: Some(0.92 * width),
+        ..Series::new("nodes", Look::area(Hue::Blue), bars)
+    };
+    let plot = Plot::new(
+        PlotAxis::linear("error of z (mm), decoupled − actual"),
+        PlotAxis::linear("nodes of the test set").including([0.0]),
+        vec![bars],
+    );
+    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
+    PlotFigure {
+        keys: vec![Key::new("no error", Look::line(no_error.hue, no_error.style))],
+        plots: vec![Plot {
+            lines: vec![no_error],
+            ..plot
+        }],
+        notes: Vec::new(),
+    }
+}
+
+/// Counts in [`BINS`] bins symmetric about 0, and the width of a bin.
+fn histogram(errors: &[f64]) -> ([usize; BINS], f64) {
+    let finite = || errors.iter().copied().filter(|error| error.is_finite());
+    let largest = finite()
+        .fold(0.0_f64, |largest, error| largest.max(error.abs()))
+        .max(1e-12);
+    let half = (BINS / 2) as f64;
+    let width = largest / half;
+    let mut counts = [0; BINS];
+    for error in finite() {
+        counts[((error / width).round() + half) as usize] += 1;
+    }
+    (counts, width)
+}
+
+/// Decoupled against actual z, with the line on which they would be equal and the line fitted to them.
+pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
+    let dots = thinned(pairs_mm).map(|(actual, decoupled)| [actual, decoupled]);
+    let actual = || pairs_mm.iter().map(|pair| pair.0).filter(|z| z.is_finite());
+    let ends = [actual().reduce(f64::min), actual().reduce(f64::max)];
+    let line = |name: &str, look: Look, of: &dyn Fn(f64) -> f64| {
+        Series::new(
+            name,
+            look,
+            ends.into_iter().flatten().map(|actual| [actual, of(actual)]),
+        )
+    };
+    let mut series = vec![
+        Series::new("nodes of the test set", Look::marker(Hue::Blue, Marker::Dot), dots),
+        line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual),
+    ];
+    let mut notes = Vec::new();
+    if let Some(fit) = Fit::new(pairs_mm) {
+        let look = Look::line(Hue::Orange, LineStyle::Solid);
+        series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset_mm));
+        let sign = if fit.offset_mm < 0.0 { '−' } else { '+' };
+        let [slope, offset] = [fit.slope, fit.offset_mm.abs()].map(format_number);
+        notes = vec![
+            format!("Correlation R = {}", format_number(fit.correlation)),
+            format!("Fitted line: decoupled = {slope} · actual {sign} {offset} mm"),
+        ];
+    }
+    PlotFigure {
+        keys: series
+            .iter()
+            .map(|series| Key::new(&series.name, series.look))
+            .collect(),
+        plots: vec![Plot {
+            has_equal_scales: true,
+            ..Plot::new(
+                PlotAxis::linear("actual z (mm)"),
+                PlotAxis::linear("decoupled z (mm)"),
+                series,
+            )
+        }],
+        notes,
+    }
+}
+
+/// The least-squares line through pairs of actual and decoupled values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fit {
+    /// Pearson's.
+    correlation: f64,
+    slope: f64,
+    offset_mm: f64,
+}
+
+impl Fit {
+    /// `None` where one side does not vary.
+    fn new(pairs_mm: &[(f64, f64)]) -> Option<Self> {
+        let count = pairs_mm.len() as f64;
+        let mean = |pick: fn(&(f64, f64)) -> f64| pairs_mm.iter().map(pick).sum::<f64>() / count;
+        let (mean_a, mean_d) = (mean(|pair| pair.0), mean(|pair| pair.1));
+        let (mut aa, mut dd, mut ad) = (0.0, 0.0, 0.0);
+        for (a, d) in pairs_mm {
+            aa += (a - mean_a).powi(2);
+            dd += (d - mean_d).powi(2);
+            ad += (a - mean_a) * (d - mean_d);
+        }
+        let slope = ad / aa;
+        let fit = Self {
+            correlation: ad / (aa * dd).sqrt(),
+            slope,
+            offset_mm: mean_d - slope * mean_a,
+        };
+        let is_finite = fit.correlation.is_finite() && fit.offset_mm.is_finite();
+        is_finite.then_some(fit)
+    }
+}
+
+/// The paper's Fig. 6: z of the nodes at these positions, row by row; actual as squares, decoupled as discs, each with a
+/// bar of ± `spread_mm` if that is given.
+pub fn node_figure(
+    actual_mm: &[DVec3],
+    decoupled_mm: Option<&[DVec3]>,
+    spread_mm: Option<&[f64]>,
+    nodes_per_row: usize,
+) -> PlotFigure {
+    let numbered = |nodes_mm: &[DVec3]| -> Vec<[f64; 2]> {
+        let numbered = nodes_mm.iter().enumerate();
+        numbered
+            .map(|(node, position)| [(node + 1) as f64, position.z])
+            .collect()
+    };
+    let actual = Series::new("actual", Look::marker(Hue::Grey, Marker::Square), numbered(actual_mm));
+    let decoupled = decoupled_mm.map(|decoupled_mm| {
+        let look = Look::marker(Hue::Blue, Marker::Disc);
+        let mut series = Series::new("decoupled", look, numbered(decoupled_mm));
+        for (point, spread) in series.points.iter_mut().zip(spread_mm.unwrap_or_default()) {
+            point.bar = Some([point.y - spread, point.y + spread]);
+        }
+        series
+    });
+    let mut series = vec![actual];
+    series.extend(decoupled);
+    for series in &mut series {
+        for (node, point) in series.points.iter_mut().enumerate() {
+            point.note = Some(node_words(&series.name, point, node, nodes_per_row.max(1)));
+        }
+    }
+    // A tick at the last node of a row.
+    let x = PlotAxis::linear("node, row by row").ticked(TickRule::Every(nodes_per_row.max(1) as f64));
+    PlotFigure {
+        keys: series
+            .iter()
+            .map(|series| Key::new(&series.name, series.look))
+            .collect(),
+        plots: vec![Plot::new(x, PlotAxis::linear("z (mm)"), series)],
+        notes: Vec::new(),
+    }
+}
+
+fn node_words(name: &str, point: &PlotPoint, node: usize, nodes_per_row: usize) -> String {
+    let (row, of_row) = (node / nodes_per_row + 1, node % nodes_per_row + 1);
+    let mut words = format!("Row {row}, node {of_row}\n{name} z: {} mm", format_number(point.y));
+    if let Some([low, high]) = point.bar {
+        words += &format!(" ± {} mm", format_number(0.5 * (high - low)));
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finite_error_is_counted_once_and_zero_stands_in_the_middle() {
+        let (counts, width) = histogram(&[0.0, 0.0, 1.0, -1.0, 0.5, f64::NAN]);
+        assert_eq!(counts.iter().sum::<usize>(), 5);
+        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 2, 1));
+        assert!((width - 0.05).abs() < 1e-15);
+        assert_eq!(histogram(&[]).0, [0; BINS]);
+        assert_eq!(histogram(&[0.0; 3]).0[BINS / 2], 3);
+    }
+
+    #[test]
+    fn the_fit_finds_a_line_and_none_without_variation() {
+        let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 * f64::from(i) - 1.0)).collect();
+        let fit = Fit::new(&line).unwrap();
+        assert!((fit.correlation - 1.0).abs() < 1e-15);
+        assert!((fit.slope - 3.0).abs() < 1e-14 && (fit.offset_mm + 1.0).abs() < 1e-13);
+        assert_eq!(Fit::new(&[(1.0, 2.0), (1.0, 3.0)]), None);
+        assert_eq!(Fit::new(&[]), None);
+        assert_eq!(
+            regression_figure(&[(1.0, 2.0), (1.0, 3.0)]).keys.len(),
+            2,
+            "no fitted line"
+        );
+    }
+
+    #[test]
+    fn a_node_is_named_by_its_row() {
+        let nodes = |z_mm: [f64; 3]| z_mm.map(|z| DVec3::new(1.0, 2.0, z));
+        let (actual, decoupled) = (nodes([4.0, 4.5, 5.0]), nodes([4.1, 4.4, 5.0]));
+        let figure = node_figure(&actual, Some(&decoupled), Some(&[0.1, 0.2, 0.3]), 2);
+        let decoupled = &figure.plots[0].series[1];
+        assert_eq!(
+            decoupled.points[2].note.as_deref(),
+            Some("Row 2, node 1\ndecoupled z: 5.00 mm ± 0.300 mm")
+        );
+        assert_eq!(
+            node_figure(&actual, None, None, 1).keys.len(),
+            1,
+            "nothing decoupled yet"
+        );
+    }
+}

@@ -1,0 +1,41 @@
+use super::{look::Key, plot::Plot};
+
+/// Plots side by side with one legend.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlotFigure {
+    /// From left to right.
+    pub plots: Vec<Plot>,
+    /// The legend, above the plots.
+    pub keys: Vec<Key>,
+    /// Sentences about the figure, below the legend.
+    pub notes: Vec<String>,
+}
+
+/// Largest number of points drawn of one curve; more would not be seen.
+const MOST_POINTS: usize = 2000;
+
+/// Every so many items, so that at most [`MOST_POINTS`] and the last one remain.
+pub(super) fn thinned<T: Copy>(items: &[T]) -> impl Iterator<Item = T> + '_ {
+    let stride = items.len().div_ceil(MOST_POINTS).max(1);
+    let is_last_extra = !items.is_empty() && !(items.len() - 1).is_multiple_of(stride);
+    items
+        .iter()
+        .step_by(stride)
+        .chain(items.last().filter(|_| is_last_extra))
+        .copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_both_ends() {
+        let many: Vec<usize> = (0..12_345).collect();
+        let thin: Vec<usize> = thinned(&many).collect();
+        assert!(thin.len() <= MOST_POINTS + 1);
+        assert_eq!((thin[0], thin[thin.len() - 1]), (0, 12_344));
+        assert_eq!(thinned(&[7]).collect::<Vec<_>>(), [7]);
+        assert_eq!(thinned::<u8>(&[]).count(), 0);
+    }
+}

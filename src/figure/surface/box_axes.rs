@@ -1,0 +1,210 @@
+//! The box around a surface in space: back walls, ticks, numbers and names.
+
+use std::ops::RangeInclusive;
+
+use glam::{DVec3, Vec2};
+
+use super::{
+    camera::OrbitCamera,
+    edge::{Edge, GAP, SHORTEST_AXIS, TICK},
+    labels::Labels,
+    projection::{PlotBox, Projection},
+    shapes::{Bounds, Ink, Line},
+};
+use crate::figure::ticks::tick_text;
+
+/// A laid-out box.
+pub(super) struct BoxAxes<'a> {
+    pub(super) projection: Projection,
+    pub(super) labels: Labels<'a>,
+    edges: [Edge; 3],
+    back: [usize; 2],
+}
+
+impl<'a> BoxAxes<'a> {
+    /// Fits the box and its labels into `card`; `z_range` is what the z axis counts, which the box surpasses a little.
+    pub(super) fn new(
+        measure: &'a dyn Fn(&str) -> Vec2,
+        card: Bounds,
+        plot_box: PlotBox,
+        camera: OrbitCamera,
+        z_range: &RangeInclusive<f64>,
+        names: [&str; 3],
+    ) -> Self {
+        let build = |camera, target| Self::lay_out(measure, plot_box, camera, target, z_range, names);
+        // The labels' room depends on where the box is and the other way round; a few rounds settle it. The last ones
+        // only give more room, for labels come and go with the scale.
+        let (mut target, mut before, mut after) = (card.grown(-32.0), Vec2::ZERO, Vec2::ZERO);
+        for round in 0..6 {
+            let axes = build(camera.centred(), target);
+            let (labels, inner) = (axes.labels.bounds(), axes.projection.bounds());
+            let least = if round < 3 {
+                [Vec2::splat(2.0); 2]
+            } else {
+                [before, after]
+            };
+            before = (inner.min - labels.min).max(least[0]);
+            after = (labels.max - inner.max).max(least[1]);
+            target = Bounds {
+                min: card.min + before,
+                max: card.max - after,
+            };
+            if target.size().min_element() < 20.0 {
+                target = Bounds::centred(card.middle(), target.size().max(Vec2::splat(20.0)));
+            }
+        }
+        build(camera, target)
+    }
+
+    fn lay_out(
+        measure: &'a dyn Fn(&str) -> Vec2,
+        plot_box: PlotBox,
+        camera: OrbitCamera,
+        target: Bounds,
+        z_range: &RangeInclusive<f64>,
+        names: [&str; 3],
+    ) -> Self {
+        let projection = Projection::fit(plot_box, camera, target);
+        let near = [usize::from(projection.eye.x > 0.0), usize::from(projection.eye.y > 0.0)];
+        let back = [1 - near[0], 1 - near[1]];
+        // The z axis stands on the left of the two upright edges of the outline.
+        let outline = [[near[0], back[1]], [back[0], near[1]]];
+        let screen_x = |corner: [usize; 2]| projection.point(plot_box.corner_mm(corner[0], corner[1], 0)).x;
+        let upright = if screen_x(outline[0]) < screen_x(outline[1]) {
+            outline[0]
+        } else {
+            outline[1]
+        };
+        let starts = [
+            plot_box.corner_mm(0, near[1], 0),
+            plot_box.corner_mm(near[0], 0, 0),
+            plot_box.corner_mm(upright[0], upright[1], 0),
+        ];
+
+        let mut labels = Labels::new(measure);
+        let mut reaches = [0.0_f32; 3];
+        let edges = [0, 1, 2].map(|axis| {
+            let range = if axis == 2 {
+                z_range.clone()
+            } else {
+                plot_box.min_mm[axis]..=plot_box.max_mm[axis]
+            };
+            let mut edge = Edge::new(&projection, axis, starts[axis], range, &labels);
+            for &value in &edge.ticks {
+                let text = tick_text(value, edge.step);
+                if labels.beside(edge.point(&projection, value), edge.away, TICK + GAP, 0.0, &text) {
+                    let reach = edge.away.abs().dot(labels.size(&text));
+                    reaches[axis] = reaches[axis].max(reach);
+                }
+            }
+            if edge.length(&projection) < SHORTEST_AXIS {
+                edge.ticks.clear();
+            }
+            edge
+        });
+        // Names come last: they find room beyond the numbers.
+        for edge in edges.iter().filter(|edge| !edge.ticks.is_empty()) {
+            if edge.axis == 2 {
+                let top = edge.point(&projection, plot_box.max_mm.z);
+                labels.beside(top, Vec2::NEG_Y, GAP + 1.0, 40.0, names[2]);
+            } else {
+                let middle = 0.5 * (plot_box.min_mm[edge.axis] + plot_box.max_mm[edge.axis]);
+                let gap = TICK + 2.0 * GAP + reaches[edge.axis];
+                labels.beside(edge.point(&projection, middle), edge.away, gap, 40.0, names[edge.axis]);
+            }
+        }
+        Self {
+            projection,
+            labels,
+            edges,
+            back,
+        }
+    }
+
+    /// Everything that lies behind the surface.
+    pub(super) fn lines(&self) -> Vec<Line> {
+        let plot_box = self.projection.plot_box;
+        let mut lines = Vec::new();
+        let mut segment = |from: DVec3, to: DVec3, ink: Ink| {
+            let [from, to] = [from, to].map(|place| self.projection.point(place));
+            lines.push(Line { from, to, ink });
+        };
+        let (low, high) = (plot_box.min_mm, plot_box.max_mm);
+        let back = plot_box.corner_mm(self.back[0], self.back[1], 0);
+        // A line across the floor and one up a back wall at each tick; of z, one across each wall.
+        for (axis, edge) in self.edges.iter().enumerate() {
+            let other = [[1, 2], [0, 2], [0, 1]][axis];
+            for &value in &edge.ticks {
+                for (along, fixed) in [(other[0], other[1]), (other[1], other[0])] {
+                    let mut from = low;
+                    from[axis] = value;
+                    from[fixed] = back[fixed];
+                    let mut to = from;
+                    to[along] = high[along];
+                    segment(from, to, Ink::Grid);
+                }
+            }
+        }
+        // Outline of the floor and of both back walls.
+        let corner = |x: usize, y: usize, z: usize| plot_box.corner_mm(x, y, z);
+        let [back_x, back_y] = self.back;
+        for end in 0..2 {
+            segment(corner(0, end, 0), corner(1, end, 0), Ink::Edge);
+            segment(corner(end, 0, 0), corner(end, 1, 0), Ink::Edge);
+            segment(corner(end, back_y, 0), corner(end, back_y, 1), Ink::Edge);
+        }
+        segment(corner(0, back_y, 1), corner(1, back_y, 1), Ink::Edge);
+        segment(corner(back_x, 0, 1), corner(back_x, 1, 1), Ink::Edge);
+        segment(corner(back_x, 1 - back_y, 0), corner(back_x, 1 - back_y, 1), Ink::Edge);
+        for edge in &self.edges {
+            for &value in &edge.ticks {
+                let from = edge.point(&self.projection, value);
+                let to = from + edge.away * TICK;
+                lines.push(Line {
+                    from,
+                    to,
+                    ink: Ink::Edge,
+                });
+            }
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::figure::surface::shapes::Text;
+
+    #[test]
+    fn labels_neither_overlap_nor_leave_the_card() {
+        let measure = |text: &str| Vec2::new(6.0 * text.chars().count() as f32, 14.0);
+        let card_sizes = [(350.0, 540.0), (480.0, 420.0), (260.0, 240.0), (210.0, 240.0)];
+        let boxes = [(10.0, 20.0), (10.0, 6.0), (1.0, 1.0), (40.0, 80.0), (1.0, 40.0)];
+        for size in card_sizes.map(Vec2::from) {
+            for (wide, deep) in boxes {
+                for step in 0..40 {
+                    let camera = OrbitCamera::default().dragged(21.0 * step as f32, 7.0 * step as f32 - 80.0);
+                    let card = Bounds {
+                        min: Vec2::splat(10.0),
+                        max: Vec2::splat(10.0) + size,
+                    };
+                    let low = DVec3::new(7.5, 5.5, 3.92);
+                    let plot_box = PlotBox::new(low, low + DVec3::new(wide, deep, 1.16), size.y / size.x);
+                    let names = ["x (mm)", "y (mm)", "error (mm)"];
+                    let axes = BoxAxes::new(&measure, card, plot_box, camera, &(4.0..=5.0), names);
+                    let covered = axes.projection.bounds().size() / size;
+                    let texts = axes.labels.into_texts();
+                    assert!(texts.len() >= 5, "{camera:?}");
+                    for (index, Text { bounds, .. }) in texts.iter().enumerate() {
+                        let beyond = (card.min - bounds.min).max(bounds.max - card.max).max_element();
+                        assert!(beyond < 4.0, "{bounds:?} of {card:?}, {camera:?}");
+                        let overlaps = |other: &Text| other.bounds.intersects(bounds);
+                        assert!(!texts[..index].iter().any(overlaps), "{camera:?}");
+                    }
+                    assert!(covered.max_element() > 0.5, "{covered} of {size:?}");
+                }
+            }
+        }
+    }
+}

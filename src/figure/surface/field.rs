@@ -1,0 +1,90 @@
+//! The height field as it is drawn: its points, its values, and what the box around it has room for.
+
+use std::ops::RangeInclusive;
+
+use glam::DVec3;
+
+use super::surface_figure::Surface;
+use crate::surface::Grid;
+
+/// Room for overshoots of the surface above and below the range, as a part of it.
+const HEADROOM: f64 = 0.08;
+
+/// A surface on its grid.
+pub(super) struct Field<'a> {
+    pub(super) grid: &'a Grid,
+    /// `x points × y points`; NaN leaves a gap. Empty if there are not as many as grid points.
+    pub(super) values: &'a [f64],
+    /// Values at the ends of the colours and of the value axis.
+    pub(super) range: RangeInclusive<f64>,
+    /// Values that the box has room for.
+    shown: RangeInclusive<f64>,
+}
+
+impl<'a> Field<'a> {
+    pub(super) fn new(surface: &'a Surface) -> Self {
+        let (grid, range) = (surface.map.grid(), usable_range(&surface.range));
+        let headroom = HEADROOM * (range.end() - range.start());
+        let values = Some(&*surface.values).filter(|values| values.len() == grid.len());
+        Self {
+            grid,
+            values: values.unwrap_or_default(),
+            shown: range.start() - headroom..=range.end() + headroom,
+            range,
+        }
+    }
+
+    /// Two corners of the box: the grid, and the values that it has room for.
+    pub(super) fn box_mm(&self) -> (DVec3, DVec3) {
+        let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
+        let ((x0, x1), (y0, y1)) = (ends(self.grid.x_mm()), ends(self.grid.y_mm()));
+        (
+            DVec3::new(x0, y0, *self.shown.start()),
+            DVec3::new(x1, y1, *self.shown.end()),
+        )
+    }
+
+    /// Position of a value on the scale of colours.
+    pub(super) fn share(&self, value: f64) -> f32 {
+        ((value - self.range.start()) / (self.range.end() - self.range.start())) as f32
+    }
+
+    /// 0 within the nodes' rectangle, 1 at the rim of the extrapolated margin.
+    pub(super) fn beyond(&self, ix: usize, iy: usize) -> f32 {
+        let outside = |index: usize, inside: &RangeInclusive<usize>, count: usize| {
+            if index < *inside.start() {
+                (inside.start() - index) as f32 / *inside.start() as f32
+            } else {
+                index.saturating_sub(*inside.end()) as f32 / (count - 1 - inside.end()).max(1) as f32
+            }
+        };
+        let along_x = outside(ix, &self.grid.inside_x(), self.grid.x_mm().len());
+        let along_y = outside(iy, &self.grid.inside_y(), self.grid.y_mm().len());
+        along_x.max(along_y)
+    }
+
+    /// Corners of the cell at `(ix, iy)`, going round it.
+    fn corners(&self, ix: usize, iy: usize) -> [usize; 4] {
+        [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)].map(|(ix, iy)| self.grid.index(ix, iy))
+    }
+
+    /// Whether a cell has values; in the margin also whether they stay in the box, for extrapolation knows no bounds.
+    pub(super) fn is_drawn(&self, ix: usize, iy: usize) -> bool {
+        let is_inside = self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
+        let is_shown = |value: f64| value.is_finite() && (is_inside || self.shown.contains(&value));
+        let corners = self.corners(ix, iy);
+        corners.iter().all(|&corner| is_shown(self.values[corner]))
+    }
+}
+
+/// A range that can be divided by, whatever was given.
+fn usable_range(range: &RangeInclusive<f64>) -> RangeInclusive<f64> {
+    let (low, high) = (*range.start(), *range.end());
+    if !(low.is_finite() && high.is_finite()) {
+        0.0..=1.0
+    } else if high - low > 1e-9 * low.abs().max(1e-3) {
+        low..=high
+    } else {
+        low - 0.5..=low + 0.5
+    }
+}

@@ -1,0 +1,328 @@
+//! The height field as one mesh, painted from far to near so that what is near hides what is far.
+
+use std::ops::{Range, RangeInclusive};
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::{contour::cross_cell, field::Field, light::Shade, plan_axes::PlanAxes, projection::Projection};
+use crate::figure::{
+    colour_map::{ColourMap, Rgb, is_light},
+    ticks::{multiples, step_for},
+};
+
+/// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
+const MARGIN_OPACITY: f32 = 0.6;
+const CONTOUR_LEVELS: usize = 10;
+const CONTOUR_OPACITY: f32 = 0.34;
+
+/// How places become points.
+pub(super) enum Stage<'a> {
+    /// In space, lit.
+    Space(&'a Projection),
+    /// From above.
+    Plan(&'a PlanAxes<'a>),
+}
+
+impl Stage<'_> {
+    /// Where a place with a value is on the screen.
+    pub(super) fn point(&self, place: DVec3) -> Vec2 {
+        match self {
+            Self::Space(projection) => projection.point(place),
+            Self::Plan(plan) => plan.point(place.truncate()),
+        }
+    }
+
+    fn eye_mm(&self) -> Option<DVec3> {
+        match self {
+            Self::Space(projection) => Some(projection.plot_box.place_mm(projection.eye)),
+            Self::Plan(_) => None,
+        }
+    }
+}
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// Where it is.
+    pub at: Vec2,
+    /// Its colour under the light.
+    pub colour: Rgb,
+    /// 1 within the nodes' rectangle; fades towards the rim of the extrapolated margin.
+    pub opacity: f32,
+}
+
+/// A piece of a contour line, about one point wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourLine {
+    /// Where it begins.
+    pub from: Vec2,
+    /// Where it ends.
+    pub to: Vec2,
+    /// Black on light colours, white on dark ones.
+    pub is_black: bool,
+    /// 1 hides what lies behind it.
+    pub opacity: f32,
+}
+
+/// The surface with its contour lines.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// The grid points, `x points × y points`.
+    pub vertices: Vec<Vertex>,
+    /// Number of points along y.
+    across: usize,
+    /// Cells by their first corner, in the order of painting.
+    cells: Vec<u32>,
+    /// Contour lines in the order of painting.
+    lines: Vec<ContourLine>,
+    /// Where each strip of cells and its lines end.
+    strips: Vec<[usize; 2]>,
+}
+
+impl Mesh {
+    /// The surface in the colours of `map`.
+    pub(super) fn new(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Self {
+        let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+        let mut mesh = Self {
+            vertices: vertices(field, stage, map),
+            across: y_mm.len(),
+            cells: Vec::with_capacity(x_mm.len() * y_mm.len()),
+            ..Self::default()
+        };
+        if mesh.vertices.is_empty() {
+            return mesh;
+        }
+        let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
+        let rows = far_to_near(y_mm, eye_mm.y);
+        let levels = contour_levels(&field.range);
+        let inks: Vec<bool> = levels
+            .iter()
+            .map(|level| is_light(map.at(field.share(*level))))
+            .collect();
+        let mut lineless = 0..0;
+        for ix in far_to_near(x_mm, eye_mm.x) {
+            let drawn = rows.iter().filter(|&&iy| field.is_drawn(ix, iy));
+            mesh.cells.extend(drawn.map(|&iy| field.grid.index(ix, iy) as u32));
+            // Lines lag one strip behind, or the next strip would cover half of their width.
+            let strip = lineless.end..mesh.cells.len();
+            mesh.end_strip(lineless, field, &levels, &inks);
+            lineless = strip;
+        }
+        mesh.end_strip(lineless, field, &levels, &inks);
+        mesh
+    }
+
+    /// Appends the contour lines in `cells` and ends the strip.
+    fn end_strip(&mut self, cells: Range<usize>, field: &Field<'_>, levels: &[f64], inks: &[bool]) {
+        for at in cells {
+            let corners = self.corners(self.cells[at]);
+            let values = corners.map(|corner| field.values[corner]);
+            let (low, high) = values
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+            if high <= low {
+                continue;
+            }
+            let [a, b, c, d] = corners.map(|corner| self.vertices[corner]);
+            let places = [a.at, b.at, c.at, d.at];
+            let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
+            for (&level, &is_black) in levels.iter().zip(inks).filter(|(level, _)| (low..high).contains(level)) {
+                cross_cell(values, level, |ends| {
+                    let [from, to] = ends.map(|(a, b, part)| places[a].lerp(places[b], part));
+                    self.lines.push(ContourLine {
+                        from,
+                        to,
+                        is_black,
+                        opacity,
+                    });
+                });
+            }
+        }
+        self.strips.push([self.cells.len(), self.lines.len()]);
+    }
+
+    /// Indices of the corners of a cell, going round it.
+    pub fn corners(&self, cell: u32) -> [usize; 4] {
+        let (a, b) = (cell as usize, cell as usize + self.across);
+        [a, b, b + 1, a + 1]
+    }
+
+    /// Cells and contour lines from far to near: each slice of cells is followed by the lines drawn after it.
+    pub fn strips(&self) -> impl Iterator<Item = (&[u32], &[ContourLine])> {
+        let starts = std::iter::once(&[0, 0]).chain(&self.strips);
+        starts
+            .zip(&self.strips)
+            .map(|(start, end)| (&self.cells[start[0]..end[0]], &self.lines[start[1]..end[1]]))
+    }
+
+    /// Number of cells and of contour lines.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.cells.len(), self.lines.len()]
+    }
+}
+
+/// One vertex for every grid point, in their order.
+fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Vec<Vertex> {
+    let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+    let across = y_mm.len();
+    let places = field.values.iter().enumerate().map(|(index, &value)| {
+        let (ix, iy) = (index / across, index % across);
+        (ix, iy, DVec3::new(x_mm[ix], y_mm[iy], value))
+    });
+    let vertex = |ix: usize, iy: usize, at: Vec2, value: f64, light: f32| {
+        let beyond = field.beyond(ix, iy);
+        Vertex {
+            at,
+            colour: map.at(field.share(value)).map(|part| (f32::from(part) * light) as u8),
+            opacity: if beyond > 0.0 {
+                MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3)
+            } else {
+                1.0
+            },
+        }
+    };
+    match stage {
+        Stage::Plan(plan) => places
+            .map(|(ix, iy, place)| vertex(ix, iy, plan.point(place.truncate()), place.z, 1.0))
+            .collect(),
+        Stage::Space(projection) => {
+            let plot_box = projection.plot_box;
+            let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
+            let in_box = |place: DVec3| plot_box.unit(place.with_z(place.z.clamp(low, high)));
+            let units: Vec<Vec3> = places.clone().map(|(_, _, place)| in_box(place)).collect();
+            let shade = Shade::new(&units, across, projection.eye);
+            let lit = places.zip(&units).map(|((ix, iy, place), unit)| {
+                vertex(ix, iy, projection.point_of_unit(*unit), place.z, shade.at(ix, iy))
+            });
+            lit.collect()
+        }
+    }
+}
+/// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
+/// micrometre would draw lines all over it.
+fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
+    let step = step_for(range, CONTOUR_LEVELS);
+    let is_within = |level: &f64| level - range.start() > 1e-3 * step && range.end() - level > 1e-3 * step;
+    multiples(range, step).into_iter().filter(is_within).collect()
+}
+
+/// Cells of an axis, farthest first: from both ends towards the eye.
+fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
+    let cells = points_mm.len() - 1;
+    let before = (0..cells).take_while(|&cell| points_mm[cell + 1] <= eye_mm).count();
+    (0..before).chain((before..cells).rev()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        figure::surface::{Bounds, OrbitCamera, Quantity, Surface, ViewMode, projection::PlotBox},
+        surface::SurfaceMap,
+    };
+
+    /// How far from the eye a triangle is at a place on the screen; `None` beside it.
+    fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
+        let [a, b, c] = corners.map(|(at, _)| at);
+        let whole = (b - a).perp_dot(c - a);
+        let parts = [(b, c), (c, a), (a, b)].map(|(from, to)| (to - from).perp_dot(place - from) / whole);
+        let mean = || {
+            parts
+                .iter()
+                .zip(&corners)
+                .map(|(part, (_, distance))| part * distance)
+                .sum()
+        };
+        parts.iter().all(|part| *part > 0.0).then(mean)
+    }
+
+    #[test]
+    fn what_is_near_is_painted_over_what_is_far() {
+        let places: Vec<f64> = (0..6).map(f64::from).collect();
+        let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
+        let values = map.evaluate(
+            &(0..36)
+                .map(|node| 4.5 + 0.5 * (1.9 * f64::from(node)).sin())
+                .collect::<Vec<_>>(),
+        );
+        let surface = Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: Arc::new([]),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode: ViewMode::ThreeD,
+        };
+        let field = Field::new(&surface);
+        let (min_mm, max_mm) = field.box_mm();
+        let plot_box = PlotBox::new(min_mm, max_mm, 1.0);
+        let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
+        let mut hidden = 0;
+        for turn in 0..6 {
+            let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
+            let projection = Projection::fit(plot_box, camera, screen);
+            let mesh = Mesh::new(&field, &Stage::Space(&projection), ColourMap::viridis());
+            let distance = |index: usize| {
+                let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+                let z = field.values[index].clamp(min_mm.z, max_mm.z);
+                let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
+                plot_box.unit(place).distance(projection.eye)
+            };
+            let corners: Vec<(Vec2, f32)> = (0..mesh.vertices.len())
+                .map(|index| (mesh.vertices[index].at, distance(index)))
+                .collect();
+            for probe in 0..100 {
+                let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
+                let cells = mesh.strips().flat_map(|(cells, _)| cells);
+                let painted = cells.flat_map(|&cell| {
+                    let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
+                    [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .filter_map(|corners| distance_at(place, corners))
+                });
+                let painted: Vec<f32> = painted.collect();
+                hidden += painted.len().saturating_sub(1);
+                let nearest = painted.iter().copied().fold(f32::INFINITY, f32::min);
+                // Neighbouring cells may meet here.
+                assert!(painted.last().is_none_or(|last| *last < nearest + 0.03), "{painted:?}");
+            }
+        }
+        assert!(hidden > 100, "{hidden}: there is something to hide");
+    }
+
+    #[test]
+    fn contour_lines_lie_between_the_ends_of_the_range() {
+        let near = |levels: Vec<f64>, expected: &[f64]| {
+            assert_eq!(levels.len(), expected.len(), "{levels:?}");
+            let pairs = levels.iter().zip(expected);
+            pairs.for_each(|(level, expected)| assert!((level - expected).abs() < 1e-12, "{levels:?}"));
+        };
+        near(
+            contour_levels(&(4.0..=5.0)),
+            &[4.1, 4.2, 4.3, 4.4, 4.5, 4.6, 4.7, 4.8, 4.9],
+        );
+        near(
+            contour_levels(&(-0.25..=0.25)),
+            &[-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2],
+        );
+        near(
+            contour_levels(&(3.95..=4.05)),
+            &[3.96, 3.97, 3.98, 3.99, 4.0, 4.01, 4.02, 4.03, 4.04],
+        );
+    }
+
+    #[test]
+    fn cells_are_drawn_towards_the_eye() {
+        let points = [0.0, 1.0, 2.0, 3.0, 4.0];
+        for (eye, order, sentence) in [
+            (9.0, [0, 1, 2, 3], "the eye beyond the far end"),
+            (-9.0, [3, 2, 1, 0], "the eye before the near end"),
+            (2.5, [0, 1, 3, 2], "the eye over a cell, which comes last"),
+        ] {
+            assert_eq!(far_to_near(&points, eye), order, "{sentence}");
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Surfaces in space or from above.
+//!
+//! A [`SurfaceFigure`] is all that a picture of surfaces says. Each [`Surface`] of it lays itself out in a [`Card`] as a
+//! [`Drawing`]: lines, texts, discs and a mesh in the order of painting, with colours by role ([`Ink`]). What is left to
+//! a renderer is to paint them.
+//!
+//! `camera` and `projection` say where things lie; `box_axes` and `plan_axes` lay out the frame with its ticks, for which
+//! `labels` finds room; `mesh` is the height field with its contour lines from far to near; `nodes` are the dots on it.
+
+mod box_axes;
+mod camera;
+mod colour_scale;
+mod contour;
+mod drawing;
+mod edge;
+mod field;
+mod labels;
+mod light;
+mod mesh;
+mod nodes;
+mod plan_axes;
+mod projection;
+mod quantity;
+mod shapes;
+mod surface_figure;
+
+pub use camera::OrbitCamera;
+pub use colour_scale::{ColourScale, ScaleDrawing};
+pub use drawing::{Card, Drawing};
+pub use mesh::{ContourLine, Mesh, Vertex};
+pub use nodes::Dots;
+pub use quantity::Quantity;
+pub use shapes::{Bounds, Disc, Ink, Line, Text};
+pub use surface_figure::{Surface, SurfaceFigure, ViewMode};

@@ -1,0 +1,48 @@
+//! A point of the trade-off in words.
+
+use std::time::Duration;
+
+use crate::evaluation::{
+    TradePoint,
+    format::{format_duration, format_number, format_percent},
+};
+
+/// `Network f32, best preset, 12 hidden`.
+pub fn point_name(point: &TradePoint) -> String {
+    let mut name = point.report.kind.name(point.report.precision).to_owned();
+    name += &format!(", {} preset", point.preset);
+    if let Some(hidden) = point.hidden() {
+        name += &format!(", {hidden} hidden");
+    }
+    name
+}
+
+/// `3.59 µs`, `1.94 ms`.
+pub fn frame_time(microseconds: f64) -> String {
+    match microseconds {
+        time if time < 1e3 => format!("{} µs", format_number(time)),
+        time if time < 1e6 => format!("{} ms", format_number(1e-3 * time)),
+        time => format!("{} s", format_number(1e-6 * time)),
+    }
+}
+
+/// A time of training.
+pub fn training_time(seconds: f64) -> String {
+    Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)
+}
+
+/// What a point gains and costs, line by line.
+pub fn point_facts(point: &TradePoint) -> Vec<String> {
+    let mut facts = vec![format!(
+        "Z error {}, {} mm",
+        format_percent(point.report.errors.z_percent),
+        format_number(point.report.errors.z_mm)
+    )];
+    if let Some(ratio) = point.to_reference() {
+        facts.push(format!("{} times the Bayesian reference", format_number(ratio)));
+    }
+    facts.push(format!("{} a frame", frame_time(point.report.cost.frame_us)));
+    facts.push(format!("{} of training", training_time(point.training_seconds)));
+    facts.extend(point.report.remarks.iter().map(ToString::to_string));
+    facts
+}

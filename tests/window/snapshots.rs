@@ -1,0 +1,154 @@
+//! The committed look of every view in both themes. What the eye would notice fails a test; the new picture and one of
+//! the differences are left beside the committed one. `UPDATE_SNAPSHOTS=1 cargo test --test window snapshots` takes
+//! what is drawn now for right, after a look at it.
+//!
+//! Times differ from run to run and from machine to machine: they are covered, wherever they stand.
+
+use eframe::egui::{Rect, vec2};
+use egui_kittest::{SnapshotOptions, SnapshotResults, image_snapshot_options, try_image_snapshot_options};
+use image::{Rgba, RgbaImage};
+
+use crate::driver::Driver;
+
+/// Whether a text tells a time: "12 ms", "0.8 µs", "3 min 5 s".
+fn tells_a_time(text: &str) -> bool {
+    let words: Vec<&str> = text
+        .split(|c: char| c.is_whitespace() || "(),;·×".contains(c))
+        .collect();
+    let is_number = |word: &str| word.starts_with(|c: char| c.is_ascii_digit());
+    let is_unit = |word: &str| ["µs", "ms", "s", "min", "h"].contains(&word.trim_end_matches('.'));
+    words.windows(2).any(|pair| is_number(pair[0]) && is_unit(pair[1]))
+}
+
+/// Covers the line in which a time stands, on its side of the window: the next words move with its length.
+fn cover_line(picture: &mut RgbaImage, place: Rect) {
+    let width = picture.width();
+    let left = if place.left() < 0.45 * width as f32 {
+        0
+    } else {
+        width * 45 / 100
+    };
+    let bottom = (place.bottom() as u32 + 1).min(picture.height());
+    for y in place.top().max(0.0) as u32..bottom {
+        for x in left..width {
+            picture.put_pixel(x, y, Rgba([128, 128, 128, 255]));
+        }
+    }
+}
+
+fn compare(driver: &mut Driver, name: &str, results: &mut SnapshotResults) {
+    let options = SnapshotOptions::new().output_path("tests/window/snapshots");
+    for theme in ["dark", "light"] {
+        let mut picture = driver.harness().render().unwrap();
+        for (text, place) in driver.places() {
+            if tells_a_time(&text) && place.is_positive() {
+                cover_line(&mut picture, place);
+            }
+        }
+        results.add(try_image_snapshot_options(
+            &picture,
+            format!("{name}-{theme}"),
+            &options,
+        ));
+        driver.click_button(if theme == "dark" { "Light" } else { "Dark" });
+        driver.settle();
+    }
+}
+
+fn looks_as_before(driver: &mut Driver, name: &str) {
+    let mut results = SnapshotResults::new();
+    compare(driver, name, &mut results);
+    results.unwrap();
+}
+
+fn open() -> Driver {
+    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
+    driver.wait("the baselines", |driver| !driver.table().is_empty());
+    driver.settle();
+    driver
+}
+
+fn open_view(view: &str) -> Driver {
+    let mut driver = open();
+    driver.click_button(view);
+    driver.settle();
+    driver
+}
+
+#[test]
+fn train_view_before_and_after_a_training() {
+    let mut driver = open();
+    let mut results = SnapshotResults::new();
+    compare(&mut driver, "train-opened", &mut results);
+    driver.configure_small();
+    driver.train();
+    driver.click_button("Error");
+    driver.settle();
+    compare(&mut driver, "train-trained", &mut results);
+    results.unwrap();
+}
+
+#[test]
+fn experiments_view() {
+    looks_as_before(&mut open_view("Experiments"), "experiments");
+}
+
+#[test]
+fn compare_view_with_two_runs() {
+    let mut driver = open();
+    driver.configure_small();
+    driver.train();
+    driver.enter("Hidden nodes", "4");
+    driver.train();
+    driver.click_button("Compare");
+    driver.wait("both runs", |driver| driver.has("10×6_3×18 h4 lm as B"));
+    driver.click("10×6_3×18 h6 lm as A");
+    driver.click("10×6_3×18 h4 lm as B");
+    driver.wait("both surfaces", |driver| {
+        driver.has("Surface of A") && driver.has("Surface of B")
+    });
+    driver.settle();
+    looks_as_before(&mut driver, "compare");
+}
+
+#[test]
+fn identifiability_view() {
+    let mut driver = open_view("Identifiability");
+    driver.wait("the answer", |driver| driver.says("Condition number: "));
+    driver.settle();
+    looks_as_before(&mut driver, "identifiability");
+}
+
+#[test]
+fn trade_off_view() {
+    looks_as_before(&mut open_view("Trade-off"), "trade-off");
+}
+
+#[test]
+fn a_shifted_button_is_a_failure() {
+    let picture = RgbaImage::from_fn(64, 64, |x, y| {
+        let is_inside = (10..40).contains(&x) && (20..40).contains(&y);
+        Rgba(if is_inside {
+            [200, 60, 40, 255]
+        } else {
+            [20, 20, 24, 255]
+        })
+    });
+    // Then nothing is.
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let options = SnapshotOptions::new().output_path(folder.path());
+    picture.save(folder.path().join("button.png")).unwrap();
+    image_snapshot_options(&picture, "button", &options);
+    let mut shifted = RgbaImage::from_pixel(64, 64, Rgba([20, 20, 24, 255]));
+    image::imageops::replace(
+        &mut shifted,
+        &image::imageops::crop_imm(&picture, 0, 0, 63, 64).to_image(),
+        1,
+        0,
+    );
+    assert!(try_image_snapshot_options(&shifted, "button", &options).is_err());
+    assert!(folder.path().join("button.new.png").exists() && folder.path().join("button.diff.png").exists());
+}
