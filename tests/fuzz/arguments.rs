@@ -2,9 +2,12 @@
 
 #![cfg(feature = "cli")]
 
-use std::process::Command;
+use std::{path::Path, process::Command};
 
-use crate::mutation::{for_each_seed, mutated};
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated},
+};
 
 const CALLS: [&str; 4] = [
     "simulate --array 1x1_1x3 --samples 2 --seed 17 --noise 1e-3 --noise-ohm 0.5 --adc-bits 12 --drift 1e-4",
@@ -14,6 +17,42 @@ const CALLS: [&str; 4] = [
     "train --array 1x1_1x3 --samples 6 --validation-samples 0 --test-samples 2 --hidden 1 --epochs 2 --decoder mean \
      --method scg --set sigma=1e-5 --inputs log --scaling whiten --seed 3",
 ];
+
+/// True if the call is accepted; else it says why.
+fn check(arguments: &[String], folder: &Path) -> bool {
+    let output = Command::new(env!("CARGO_BIN_EXE_decoupler"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!message.contains("panicked"), "{arguments:?}: {message}");
+    match output.status.code() {
+        Some(0) => return true,
+        Some(1 | 2) => {
+            assert!(message.starts_with("error: "), "{arguments:?}: {message}");
+            assert!(message.len() < 2000, "{arguments:?}: {message}");
+        }
+        other => panic!("{arguments:?}: {other:?} {message}"),
+    }
+    false
+}
+
+#[test]
+fn any_input() {
+    let folder = tempfile::tempdir().unwrap();
+    replay!(|bytes: &[u8]| {
+        let text = String::from_utf8_lossy(bytes).replace('\0', "");
+        let arguments = Vec::from_iter(text.split_whitespace().map(str::to_owned));
+        // Without a command the program would open its window.
+        if arguments
+            .first()
+            .is_some_and(|first| first == "simulate" || first == "train")
+        {
+            check(&arguments, folder.path());
+        }
+    });
+}
 
 #[test]
 fn every_call_ends_with_a_status_and_a_reason() {
@@ -31,21 +70,7 @@ fn every_call_ends_with_a_status_and_a_reason() {
                 return;
             }
             let old = std::mem::replace(&mut arguments[place], changed);
-            let output = Command::new(env!("CARGO_BIN_EXE_decoupler"))
-                .args(&arguments)
-                .current_dir(folder.path())
-                .output()
-                .unwrap();
-            let message = String::from_utf8_lossy(&output.stderr);
-            match output.status.code() {
-                Some(0) => accepted += 1,
-                Some(1 | 2) => {
-                    assert!(message.starts_with("error: "), "{arguments:?}: {message}");
-                    assert!(message.len() < 2000, "{arguments:?}: {message}");
-                }
-                other => panic!("{arguments:?}: {other:?} {message}"),
-            }
-            assert!(!message.contains("panicked"), "{arguments:?}: {message}");
+            accepted += usize::from(check(&arguments, folder.path()));
             arguments[place] = old;
         });
     }

@@ -3,6 +3,7 @@ use std::fs;
 use decoupler::export::CheckpointFile;
 
 use crate::{
+    corpus::replay,
     mutation::{for_each_seed, mutated},
     sealing::resealed,
     trained::trained,
@@ -35,4 +36,30 @@ fn damage_is_noticed_and_impossible_states_are_refused() {
             }
         });
     }
+}
+
+#[test]
+fn any_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    let small = trained().map(|run| run.settings().simulated().unwrap().source);
+    replay!(|bytes: &[u8]| {
+        for bytes in [Some(bytes.to_vec()), resealed(bytes)].into_iter().flatten() {
+            fs::write(&path, bytes).unwrap();
+            match CheckpointFile::load(&path) {
+                // Others may ask for a million samples.
+                Ok(file) if small.contains(&file.settings.source) => {
+                    if let Ok(mut resumed) = file.resume() {
+                        resumed.step();
+                        assert!(resumed.node_scores().is_some());
+                    }
+                }
+                Ok(_) => {}
+                Err(error) => {
+                    let message = error.to_string();
+                    assert!(message.len() < 2000 && !message.contains('\n'), "{message}");
+                }
+            }
+        }
+    });
 }

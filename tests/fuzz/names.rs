@@ -10,24 +10,47 @@ use decoupler::{
     sensor::ArrayScale,
 };
 
-use crate::mutation::{for_each_seed, mutated};
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated},
+};
 
 fn check<T: FromStr<Err: Display> + Display + PartialEq>(words: &[&str]) {
     for word in words {
         assert!(word.parse::<T>().is_ok(), "{word}");
         for_each_seed(300, |rng| {
             let bytes = mutated(word.as_bytes(), rng);
-            let text = String::from_utf8_lossy(&bytes);
-            match text.parse::<T>() {
-                Ok(value) => {
-                    let printed = value.to_string();
-                    let again = printed.parse::<T>();
-                    assert!(again.is_ok_and(|again| again == value), "{text}: {printed}");
-                }
-                Err(error) => assert!(!error.to_string().is_empty()),
-            }
+            check_word::<T>(&String::from_utf8_lossy(&bytes));
         });
     }
+}
+
+fn check_word<T: FromStr<Err: Display> + Display + PartialEq>(text: &str) {
+    match text.parse::<T>() {
+        Ok(value) => {
+            let printed = value.to_string();
+            let again = printed.parse::<T>();
+            assert!(again.is_ok_and(|again| again == value), "{text}: {printed}");
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// Every word is given to every parser.
+#[test]
+fn any_input() {
+    replay!(|bytes: &[u8]| {
+        for text in String::from_utf8_lossy(bytes).lines() {
+            check_word::<ArrayScale>(text);
+            check_word::<Rows>(text);
+            check_word::<Loading>(text);
+            check_word::<Movement>(text);
+            check_word::<Quantity>(text);
+            check_word::<ScalingChoice>(text);
+            check_word::<DecoderKind>(text);
+            check_word::<Preset>(text);
+        }
+    });
 }
 
 #[test]

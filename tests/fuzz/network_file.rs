@@ -4,6 +4,7 @@ use decoupler::{export::NetworkFile, network::DecouplingNetwork};
 use rand::RngExt;
 
 use crate::{
+    corpus::replay,
     mutation::{for_each_seed, mutated},
     sealing::resealed,
     trained::trained,
@@ -53,21 +54,40 @@ fn what_is_accepted_answers_in_numbers_or_is_flagged() {
             let Some(damaged) = resealed(&mutated(&valid, rng)) else {
                 return;
             };
-            let Some(file) = loaded(&path, &damaged) else { return };
-            accepted += 1;
-            let height_mm = file.settings.source.sensor.geometry.height_mm;
-            for network in file.network.values() {
-                let readings: Vec<f64> = (0..network.inputs().channels())
-                    .map(|_| 10_f64.powf(rng.random_range(-3.0..4.0)))
-                    .collect();
-                check_answer(network, &readings, height_mm);
-            }
-            file.save(&path).unwrap();
-            let again = NetworkFile::load(&path).unwrap();
-            assert_eq!((again.settings, again.network), (file.settings, file.network));
+            accepted += usize::from(check(&path, &damaged, rng));
         });
     }
     assert!(accepted > 20, "only {accepted} files reach the network");
+}
+
+/// True if the file is accepted; then it answers soundly, and is what it is when saved and loaded again.
+fn check(path: &Path, bytes: &[u8], rng: &mut impl RngExt) -> bool {
+    let Some(file) = loaded(path, bytes) else { return false };
+    let height_mm = file.settings.source.sensor.geometry.height_mm;
+    for network in file.network.values() {
+        let readings: Vec<f64> = (0..network.inputs().channels())
+            .map(|_| 10_f64.powf(rng.random_range(-3.0..4.0)))
+            .collect();
+        check_answer(network, &readings, height_mm);
+    }
+    file.save(path).unwrap();
+    let again = NetworkFile::load(path).unwrap();
+    assert_eq!((again.settings, again.network), (file.settings, file.network));
+    true
+}
+
+#[test]
+fn any_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    replay!(|bytes: &[u8]| {
+        for_each_seed(1, |rng| {
+            check(&path, bytes, rng);
+            if let Some(sealed) = resealed(bytes) {
+                check(&path, &sealed, rng);
+            }
+        });
+    });
 }
 
 /// An answer is flagged, refused as not finite, or within a stroke of where nodes are.

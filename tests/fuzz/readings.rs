@@ -1,9 +1,10 @@
-use std::fs;
-
 use decoupler::dataset::ResistanceReader;
 use rand::RngExt;
 
-use crate::mutation::{for_each_seed, mutated};
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated},
+};
 
 const CHANNELS: usize = 3;
 
@@ -26,19 +27,17 @@ fn check(bytes: &[u8], most: usize) {
 }
 
 #[test]
-fn only_resistances_come_out_of_any_file() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fuzz/corpus/readings");
-    let mut corpus: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
-    corpus.sort();
-    assert!(corpus.len() > 3);
-    for path in corpus {
-        let valid = fs::read(&path).unwrap();
-        check(&valid, 2);
-        for_each_seed(300, |rng| check(&mutated(&valid, rng), rng.random_range(1..5)));
-    }
+fn any_input() {
+    replay!(|bytes: &[u8]| {
+        for most in [1, 2, 100] {
+            check(bytes, most);
+        }
+        for_each_seed(100, |rng| check(&mutated(bytes, rng), rng.random_range(1..5)));
+    });
+}
+
+#[test]
+fn only_resistances_come_out_of_noise() {
     for_each_seed(300, |rng| {
         let length = rng.random_range(0..200);
         let bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();

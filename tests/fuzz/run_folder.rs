@@ -3,6 +3,7 @@ use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
 use decoupler::export::{KeptRun, NetworkFile, RunFolder};
 
 use crate::{
+    corpus::replay,
     mutation::{for_each_seed, mutated},
     trained::trained,
 };
@@ -46,4 +47,34 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
     }
     let (found, problems) = RunFolder::open(folder.path()).unwrap();
     assert_eq!((found.runs(), problems), (kept.runs(), Vec::new()));
+}
+
+/// As a run, as what is pinned, as a name, and as the single file in which earlier versions kept all runs.
+#[test]
+fn any_input() {
+    replay!(|bytes: &[u8]| {
+        for name in [
+            "runs/run-1.json",
+            "runs/run-1.name.json",
+            "runs/pinned.json",
+            "workspace.json",
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            fs::create_dir(folder.path().join("runs")).unwrap();
+            let file = folder.path().join(name);
+            fs::write(&file, bytes).unwrap();
+            let Ok((found, problems)) = RunFolder::open(&folder.path().join("runs")) else {
+                continue;
+            };
+            assert!(
+                problems
+                    .iter()
+                    .all(|problem| problem.len() < 2000 && !problem.contains('\n')),
+                "{problems:?}"
+            );
+            assert_eq!(fs::read(&file).unwrap(), bytes, "{name} stays as it is");
+            let (again, _) = RunFolder::open(&folder.path().join("runs")).unwrap();
+            assert_eq!(again.runs(), found.runs(), "{name}");
+        }
+    });
 }
