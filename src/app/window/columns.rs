@@ -18,7 +18,7 @@ const REPORT_POINTS: f32 = space(96);
 const REPORT_LIMITS_POINTS: RangeInclusive<f32> = space(82)..=space(140);
 
 /// What columns drawn wider leave to the middle at least.
-const LEAST_MIDDLE_POINTS: f32 = space(150);
+const LEAST_MIDDLE_POINTS: f32 = space(176);
 
 /// Widths of the columns in this window: those that the user has drawn, as far as the middle allows.
 pub(super) fn widths_points(columns: &Columns, remembered: &Remembered, window: f32) -> [f32; 2] {
