@@ -14,7 +14,7 @@ const MOST_GROWTH: f64 = 1e3;
 /// Learning rates, dampings and scales beyond these are drawn at the edge.
 const PARAMETERS: std::ops::RangeInclusive<f64> = 1e-20..=1e12;
 
-const MSE: &str = "mean squared error (scaled)";
+const MSE: &str = "mse (scaled)";
 
 /// Picks one of an epoch's quantities.
 type OfEpoch = fn(&EpochRecord) -> Option<f64>;

@@ -215,10 +215,10 @@ fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6)).unwrap();
-    let mut driver = Driver::open();
     for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();
+        let mut driver = Driver::open();
         give_path(&mut driver, OPEN, &path);
         driver.wait("the training", |driver| {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());

@@ -20,17 +20,18 @@ fn tells_a_time(text: &str) -> bool {
     words.windows(2).any(|pair| is_number(pair[0]) && is_unit(pair[1]))
 }
 
-/// Covers the line in which a time stands, on its side of the window: the next words move with its length.
+/// Covers the line in which a time stands, in the left column or right of the middle: the next words move with its length.
 fn cover_line(picture: &mut RgbaImage, place: Rect) {
     let width = picture.width();
-    let left = if place.left() < 0.45 * width as f32 {
-        0
+    let beside = width * 27 / 100;
+    let columns = if place.right() < beside as f32 {
+        0..beside
     } else {
-        width * 45 / 100
+        width * 45 / 100..width
     };
     let bottom = (place.bottom() as u32 + 1).min(picture.height());
     for y in place.top().max(0.0) as u32..bottom {
-        for x in left..width {
+        for x in columns.clone() {
             picture.put_pixel(x, y, Rgba([128, 128, 128, 255]));
         }
     }

@@ -134,7 +134,7 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
     let (history, stages) = (run.leader().history(), run.leader().stages());
     let loss = same("loss", loss_figure(history, stages, run.leader().best_epoch()));
     assert_eq!(loss.curves, 3);
-    assert!(loss.words.contains("mean squared error (scaled)") && loss.words.contains("best weights"));
+    assert!(loss.words.contains("mse (scaled)") && loss.words.contains("best weights"));
     let state = same("training state", training_state_figure(history, stages));
     assert!(state.words.contains("gradient") && state.words.contains("validation failures"));
     let runs = [("A: first run", history), ("B: second run", &history[..20])];
