@@ -237,7 +237,7 @@ fn a_test_set_that_lacks_a_row_says_which_rows_there_are() {
 fn files_of_simulated_sensors_refuse_measured_runs() {
     let run = trained(settings(RowModel::Shared), &recording(60, &[0], 10), 50);
     let message = NetworkFile::from_run(&run).unwrap_err().to_string();
-    assert!(message.contains("measured samples"), "{message}");
+    assert!(message.contains("save its networks with serde"), "{message}");
     let message = CheckpointFile::from_run(&run).unwrap_err().to_string();
     assert!(message.contains("resume it on the same sets"), "{message}");
     // The networks themselves are written by serde.

@@ -179,7 +179,9 @@ pub enum DocumentError {
         flaw: String,
     },
     /// A run on measured samples: the file tells of a simulated sensor, from which samples are drawn again.
-    #[error("a run on measured samples has no {0}; keep its networks or states, and its samples, yourself")]
+    #[error(
+        "a run on measured samples has no {0}; save its networks with serde, or its states and samples, and resume it on the same sets"
+    )]
     Measured(DocumentKind),
     /// The run has values that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
