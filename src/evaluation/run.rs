@@ -100,7 +100,7 @@ impl Run {
         RunFlaw::of(self.leader())
     }
 
-    /// Continues every start from its present weights with another method: [`Trainer::continue_with`].
+    /// Continues every start from its present weights with another method: [`Trainer::continue_with`](crate::training::Trainer::continue_with).
     ///
     /// # Errors
     /// If a setting is out of range, or the networks are too wide for the method; nothing is then changed.
@@ -117,7 +117,7 @@ impl Run {
         Ok(())
     }
 
-    /// Changes the stopping rules of every start: [`Trainer::set_stopping`].
+    /// Changes the stopping rules of every start: [`Trainer::set_stopping`](crate::training::Trainer::set_stopping).
     ///
     /// # Errors
     /// If a setting is out of range; nothing is then changed.
