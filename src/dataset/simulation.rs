@@ -91,6 +91,10 @@ impl Dataset {
 
     /// Replaces the readings of simulated snapshots by what the wires and amplifiers of a faulty sensor make of them, before
     /// noise is added.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only the terminal breaks the wires of a set")
+    )]
     pub(crate) fn break_before_noise(&mut self, faulty: &FaultySensor) {
         let deformations: Vec<Deformation> = (0..self.samples())
             .step_by(self.row_count())
@@ -106,6 +110,10 @@ impl Dataset {
 
     /// Replaces the readings of simulated snapshots by what the converter of a faulty sensor makes of them, after noise was
     /// added.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only the terminal breaks the wires of a set")
+    )]
     pub(crate) fn break_after_noise(&mut self, faulty: &FaultySensor) {
         let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
         let length = read.len() * self.channels();
@@ -115,6 +123,10 @@ impl Dataset {
     }
 
     /// Coordinates of a row-wire in the simulated snapshot that begins with sample `first`, if the row-wire is read.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only the terminal breaks the wires of a set")
+    )]
     fn simulated_row(&self, first: usize, row: usize) -> Option<&[f64]> {
         let index = self.row_wires_read()?.iter().position(|&other| other == row)?;
         Some(self.sample_targets(first + index))

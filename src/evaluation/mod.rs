@@ -9,6 +9,7 @@ mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+#[cfg(feature = "files")]
 pub(crate) mod format;
 mod frame_time;
 mod machine;

@@ -224,6 +224,10 @@ impl FaultySensor {
     }
 
     /// The deformation of coordinates in mm, 3·M2 of each row-wire; at rest where there are none.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only the terminal breaks the wires of a set")
+    )]
     pub(crate) fn deformation<'a>(&self, coordinates_mm: impl Fn(usize) -> Option<&'a [f64]>) -> Deformation {
         Deformation::from_fn(self.model.scale, |row, node| {
             coordinates_mm(row).map_or(DVec3::ZERO, |coordinates_mm| {
