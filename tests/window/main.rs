@@ -11,6 +11,7 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+mod habits;
 mod identifying;
 mod looking;
 mod pictures;

@@ -1,8 +1,8 @@
 use std::fmt::Debug;
 
-use eframe::egui::{Context, Ui};
+use eframe::egui::Ui;
 
-use super::{Effect, Shared, training_status_ui};
+use super::{Effect, Offers, Shared, training_status_ui};
 use crate::app::theme::space;
 
 /// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
@@ -22,8 +22,8 @@ pub trait View: Debug {
         false
     }
 
-    /// Does what the keys of this frame mean.
-    fn take_shortcuts(&mut self, _ctx: &Context, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+    /// Offers what can be done in it, and does what the user wants of that.
+    fn offer_actions(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Returns the columns of a window of this width in points.
     fn columns(&self, _window_width: f32) -> Columns {

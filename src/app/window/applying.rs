@@ -87,6 +87,12 @@ impl DecouplerWindow {
         self.views.all()[place].enter(&self.shared);
     }
 
+    /// Shows and remembers the theme that the user chose.
+    pub(super) fn choose_theme(&mut self, is_dark: bool) {
+        self.set_dark(is_dark);
+        self.remembered.is_dark = Some(is_dark);
+    }
+
     pub(super) fn set_dark(&mut self, is_dark: bool) {
         self.shared.look.is_dark = is_dark;
         theme::apply(&self.ctx, is_dark);

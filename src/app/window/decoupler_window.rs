@@ -3,6 +3,7 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
+    actions::Overlay,
     closing::Closing,
     columns::{edge_ui, widths_points},
     dialogs::{DialogKind, Dialogs},
@@ -13,7 +14,8 @@ use super::{
     notices::Notices,
     remembered::Remembered,
     save_form::{self, Saving, save_form_ui},
-    top_bar::top_bar_ui,
+    top_bar::{Reach, top_bar_ui},
+    undoing::Undoing,
 };
 use crate::app::{
     job::{Job, Wake},
@@ -43,6 +45,11 @@ pub struct DecouplerWindow {
     pub(super) files: Files,
     pub(super) dialogs: Dialogs,
     pub(super) closing: Option<Closing>,
+    /// A list that lies over the window.
+    pub(super) overlay: Overlay,
+    /// The name of the action picked from the list, to be done in the next frame.
+    pub(super) picked: Option<String>,
+    pub(super) undoing: Undoing,
     pub(super) remembered: Remembered,
     /// Where that is kept, if it is.
     pub(super) memory: Option<Memory>,
@@ -58,6 +65,8 @@ impl DecouplerWindow {
     pub fn new(ctx: &Context, dialogs: DialogKind) -> std::io::Result<Self> {
         let is_dark = ctx.system_theme() != Some(egui::Theme::Light);
         theme::install(ctx, is_dark);
+        // Ours keep to sizes at which the window is whole.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
         let wake: Wake = {
             let ctx = ctx.clone();
             Arc::new(move || ctx.request_repaint())
@@ -78,6 +87,9 @@ impl DecouplerWindow {
             files: Files::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
             closing: None,
+            overlay: Overlay::None,
+            picked: None,
+            undoing: Undoing::default(),
             remembered: Remembered::default(),
             memory: None,
             wake,
@@ -122,11 +134,8 @@ impl DecouplerWindow {
             self.runs.look();
         }
         let mut effects = Vec::new();
+        let actions = self.offer_actions(ui.ctx(), &mut effects);
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
-        // A question is to be answered first.
-        if self.saving.is_none() && self.closing.is_none() {
-            view.take_shortcuts(ui.ctx(), shared, &mut effects);
-        }
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         let window_width = ui.available_width();
@@ -143,7 +152,7 @@ impl DecouplerWindow {
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
-                top_bar_ui(ui, &self.names, self.shown, |ui| {
+                top_bar_ui(ui, &self.names, self.shown, &actions, |ui| {
                     view.tools_ui(ui, shared, &mut effects);
                 })
             });
@@ -199,14 +208,16 @@ impl DecouplerWindow {
             }
         }
         self.apply_all(effects);
-        let (picked, is_other_theme) = top_bar.inner;
-        if let Some(place) = picked {
-            self.show(place);
+        match top_bar.inner {
+            Some(Reach::View(place)) => self.show(place),
+            Some(Reach::Action(name)) => {
+                self.picked = Some(name);
+                self.ctx.request_repaint();
+            }
+            None => {}
         }
-        if is_other_theme {
-            self.set_dark(!self.shared.look.is_dark);
-            self.remembered.is_dark = Some(self.shared.look.is_dark);
-        }
+        self.undoing.follow(ui.input(|input| input.time), &self.shared.draft);
+        self.overlay_ui(ui, &actions);
         self.ask_for_path(ui);
         self.remember();
         // What was begun in this frame must be finished too.

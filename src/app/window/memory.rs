@@ -4,7 +4,7 @@ use std::{
     time::Duration,
 };
 
-use super::{DecouplerWindow, remembered::Remembered};
+use super::{DecouplerWindow, interface_scale::SCALES, remembered::Remembered};
 use crate::{
     app::{
         job::{Job, JobError, Wake},
@@ -80,6 +80,9 @@ impl DecouplerWindow {
         let remembered = Remembered::read(path);
         if let Some(is_dark) = remembered.is_dark {
             self.set_dark(is_dark);
+        }
+        if let Some(scale) = remembered.scale.filter(|scale| SCALES.contains(scale)) {
+            self.set_scale(scale);
         }
         if let Some(draft) = remembered.draft {
             self.configure(draft);

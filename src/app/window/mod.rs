@@ -1,6 +1,7 @@
 //! The window: it lays the views out, hears the news of the training and of files, and applies in one place what views
 //! ask for.
 
+mod actions;
 mod applying;
 mod closing;
 mod columns;
@@ -8,14 +9,18 @@ mod decoupler_window;
 mod dialogs;
 mod files;
 mod frames;
+mod interface_scale;
+mod keys_list;
 mod memory;
 mod news;
 mod notice;
 mod notices;
 mod open;
+mod palette;
 mod remembered;
 mod save_form;
 mod top_bar;
+mod undoing;
 
 pub use decoupler_window::DecouplerWindow;
 pub use dialogs::DialogKind;

@@ -31,6 +31,9 @@ pub(super) struct Remembered {
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,
+    /// Size of text and controls as a share of the usual one, if the user has chosen one.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) scale: Option<f32>,
     /// Width of the column on the left, if the user has drawn it wider or narrower.
     #[serde(deserialize_with = "if_readable")]
     pub(super) form_points: Option<f32>,

@@ -1,6 +1,6 @@
 use std::time::Instant;
 
-use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
+use eframe::egui::{Key, Modifiers, Sense, Ui};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
@@ -14,9 +14,9 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
-        shared::{Effect, Matter, Notice, Shared, View},
+        shared::{Effect, Matter, Notice, Offers, Shared, View},
         theme::space,
-        widgets::{card_ui, placeholder_ui, pressed, scrolled_ui, section_heading_ui},
+        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui},
     },
     figure::Figure,
 };
@@ -51,11 +51,11 @@ impl View for ExperimentsView {
         self.running.is_some()
     }
 
-    fn take_shortcuts(&mut self, ctx: &Context, _shared: &Shared, effects: &mut Vec<Effect>) {
-        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && self.can_run() {
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer_keys("Run experiment", Modifiers::COMMAND, Key::Enter, self.can_run()) {
             self.run(effects);
         }
-        if pressed(ctx, Modifiers::COMMAND, Key::Period) && self.running.is_some() {
+        if offers.offer_keys("Cancel experiment", Modifiers::COMMAND, Key::Period, self.running.is_some()) {
             self.cancel();
         }
     }

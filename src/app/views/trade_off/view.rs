@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use eframe::egui::{
-    Align, ComboBox, Context, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, containers::menu::MenuButton,
+    Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, containers::menu::MenuButton,
 };
 
 use super::{
@@ -11,9 +11,9 @@ use super::{
 use crate::{
     app::{
         plotting::legend_ui,
-        shared::{Effect, Matter, Notice, Shared, View},
+        shared::{Effect, Matter, Notice, Offers, Shared, View},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, pressed, scrolled_ui, segmented_ui, state_ui},
+        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_duration,
     figure::trade_off_figure,
@@ -44,11 +44,11 @@ impl View for TradeOffView {
         self.running.is_some()
     }
 
-    fn take_shortcuts(&mut self, ctx: &Context, shared: &Shared, effects: &mut Vec<Effect>) {
-        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && self.can_measure(shared) {
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer_keys("Measure trade-off", Modifiers::COMMAND, Key::Enter, self.can_measure(shared)) {
             self.measure(shared, effects);
         }
-        if pressed(ctx, Modifiers::COMMAND, Key::Period) && self.running.is_some() {
+        if offers.offer_keys("Cancel measuring", Modifiers::COMMAND, Key::Period, self.running.is_some()) {
             self.cancel();
         }
     }

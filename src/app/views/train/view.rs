@@ -1,4 +1,4 @@
-use eframe::egui::{Context, Key, Modifiers, Ui};
+use eframe::egui::{Key, Modifiers, Ui};
 
 use super::{
     TrainView,
@@ -8,9 +8,9 @@ use super::{
     workbench::{WorkbenchLayout, workbench_ui},
 };
 use crate::app::{
-    shared::{Columns, Effect, Phase, Shared, View},
+    shared::{Columns, Effect, Offers, Phase, Shared, View},
     theme::space,
-    widgets::{pressed, snapshot_ui},
+    widgets::snapshot_ui,
 };
 
 impl View for TrainView {
@@ -22,26 +22,33 @@ impl View for TrainView {
         self.measuring.follow(shared, &mut self.decoders);
     }
 
-    fn take_shortcuts(&mut self, ctx: &Context, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
         let phase = shared.phase;
-        if pressed(ctx, Modifiers::COMMAND, Key::Enter) && !phase.is_busy() && phase != Phase::Died {
+        let is_idle = !phase.is_busy() && phase != Phase::Died;
+        if offers.offer_keys("Train", Modifiers::COMMAND, Key::Enter, is_idle) {
             effects.push(Effect::Train);
         }
-        if pressed(ctx, Modifiers::COMMAND, Key::P) {
-            match phase {
-                Phase::Training => effects.push(Effect::Pause),
-                Phase::Paused => effects.push(Effect::Resume),
-                _ => {}
-            }
+        if offers.offer("Continue training", shared.can_continue()) {
+            effects.push(Effect::Continue);
         }
-        if pressed(ctx, Modifiers::COMMAND, Key::Period) && phase.is_busy() {
+        let (name, effect) = if phase == Phase::Paused {
+            ("Resume training", Effect::Resume)
+        } else {
+            ("Pause training", Effect::Pause)
+        };
+        let can_pause = matches!(phase, Phase::Training | Phase::Paused);
+        if offers.offer_keys(name, Modifiers::COMMAND, Key::P, can_pause) {
+            effects.push(effect);
+        }
+        if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
             effects.push(Effect::Stop);
         }
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        if pressed(ctx, Modifiers::NONE, Key::PageDown) && self.snapshot + 1 < snapshots {
+        let has_next = self.snapshot + 1 < snapshots;
+        if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {
             self.snapshot += 1;
         }
-        if pressed(ctx, Modifiers::NONE, Key::PageUp) && self.snapshot > 0 {
+        if offers.offer_keys("Previous test snapshot", Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
             self.snapshot -= 1;
         }
     }

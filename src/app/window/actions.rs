@@ -1,0 +1,83 @@
+use eframe::egui::{Context, Key, Modifiers, Ui};
+
+use super::{
+    DecouplerWindow,
+    keys_list::keys_list_ui,
+    palette::{Palette, Reply, palette_ui},
+};
+use crate::app::shared::{Action, Effect, Offers};
+
+/// What lies over the window for a moment.
+#[derive(Debug, Default)]
+pub(super) enum Overlay {
+    /// Nothing.
+    #[default]
+    None,
+    /// The list of all actions.
+    Palette(Palette),
+    /// The list of all keys.
+    Keys,
+}
+
+/// Keys of the views, in the order of the top bar.
+const VIEW_KEYS: [Key; 9] = [
+    Key::Num1,
+    Key::Num2,
+    Key::Num3,
+    Key::Num4,
+    Key::Num5,
+    Key::Num6,
+    Key::Num7,
+    Key::Num8,
+    Key::Num9,
+];
+
+impl DecouplerWindow {
+    /// Offers what can be done now, by the view on show and by the window, and does what the user wants of that.
+    pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
+        // A question is to be answered first.
+        let hears_keys =
+            self.saving.is_none() && self.closing.is_none() && matches!(self.overlay, Overlay::None);
+        let mut offers = Offers::new(ctx, self.picked.take(), hears_keys);
+        self.views.all()[self.shown].offer_actions(&mut offers, &self.shared, effects);
+        self.offer_undoing(&mut offers);
+        for (place, name) in self.names.clone() {
+            let is_other = place != self.shown;
+            if offers.offer_keys(format!("Show {name}"), Modifiers::COMMAND, VIEW_KEYS[place], is_other) {
+                self.show(place);
+            }
+        }
+        let theme = if self.shared.look.is_dark { "Light theme" } else { "Dark theme" };
+        if offers.offer(theme, true) {
+            self.choose_theme(!self.shared.look.is_dark);
+        }
+        self.offer_scales(&mut offers);
+        if offers.offer_keys("Search actions", Modifiers::COMMAND, Key::K, true) {
+            self.overlay = Overlay::Palette(Palette::default());
+        }
+        if offers.offer_keys("Keys", Modifiers::NONE, Key::Questionmark, true) {
+            self.overlay = Overlay::Keys;
+        }
+        offers.into_actions()
+    }
+
+    /// Shows the list that the user asked for.
+    pub(super) fn overlay_ui(&mut self, ui: &Ui, actions: &[Action]) {
+        let is_done = match &mut self.overlay {
+            Overlay::None => false,
+            Overlay::Palette(palette) => match palette_ui(ui, palette, actions) {
+                Some(Reply::Pick(name)) => {
+                    self.picked = Some(name);
+                    true
+                }
+                Some(Reply::Close) => true,
+                None => false,
+            },
+            Overlay::Keys => keys_list_ui(ui, actions),
+        };
+        if is_done {
+            self.overlay = Overlay::None;
+            ui.request_repaint();
+        }
+    }
+}
