@@ -187,7 +187,6 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
     let mut driver = Driver::open();
     let reset = "Reset to the paper's settings";
     assert!(!driver.is_enabled(reset));
-    driver.click("Geometry");
     driver.enter("Height", "8");
     driver.enter("Row pitch", "2.5");
     driver.enter("Resistivity", "1e3");

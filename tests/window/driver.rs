@@ -22,6 +22,17 @@ use crate::support::rasterise::Rasteriser;
 /// Time after which something awaited counts as never coming.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
+/// Parts of the configuration that are folded away at first.
+const FOLDED: [&str; 7] = [
+    "Scene",
+    "Samples",
+    "Geometry",
+    "Network inputs",
+    "When to stop",
+    "Method settings",
+    "Figures of the paper",
+];
+
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
 
@@ -82,7 +93,17 @@ impl Driver {
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
         driver.wait("the first surface", |driver| driver.state().test().is_some());
+        if driver.shown() == "Train" {
+            driver.unfold();
+        }
         driver
+    }
+
+    /// Unfolds every part of the configuration.
+    fn unfold(&mut self) {
+        for name in FOLDED {
+            self.click_button(name);
+        }
     }
 
     /// What the window knows.

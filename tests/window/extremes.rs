@@ -115,7 +115,6 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
         let mut driver = Driver::open();
         driver.configure_small();
         driver.enter("Epochs", "3");
-        driver.click("Geometry");
         for (label, text) in changes {
             driver.enter(label, text);
         }

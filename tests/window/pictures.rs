@@ -90,7 +90,6 @@ fn album(size: Vec2, is_dark: bool) {
     album.driver.enter("Validation samples", "0");
     album.driver.train();
     album.take("12-diverged");
-    album.driver.click("Geometry");
     album.driver.type_into("Array scale", "10x6");
     album.driver.harness().run_steps(2);
     album.take("13-geometry-and-bad-array");

@@ -39,13 +39,7 @@ impl<'a> Offers<'a> {
     }
 
     /// Offers an action that also these keys do. Returns true if the user wants it now.
-    pub fn offer_keys(
-        &mut self,
-        name: impl Into<String>,
-        modifiers: Modifiers,
-        key: Key,
-        is_possible: bool,
-    ) -> bool {
+    pub fn offer_keys(&mut self, name: impl Into<String>, modifiers: Modifiers, key: Key, is_possible: bool) -> bool {
         self.add(name.into(), Some(KeyboardShortcut::new(modifiers, key)), is_possible)
     }
 
@@ -124,7 +118,10 @@ mod tests {
         let stop = Some((Modifiers::COMMAND, Key::Period));
         let (actions, done) = frame(Some("Stop"), stop, true);
         assert_eq!(done, [false; 3]);
-        assert_eq!(actions.iter().map(|action| action.is_possible).collect::<Vec<_>>(), [true, false, true]);
+        assert_eq!(
+            actions.iter().map(|action| action.is_possible).collect::<Vec<_>>(),
+            [true, false, true]
+        );
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod components;
 pub mod fields;
+mod fold;
 mod snapshot;
 mod table;
 
@@ -9,5 +10,6 @@ pub use components::{
     card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button, progress_bar_ui,
     scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
 };
+pub use fold::fold_ui;
 pub use snapshot::snapshot_ui;
 pub use table::{Column, Row, table_ui};

@@ -36,8 +36,7 @@ impl DecouplerWindow {
     /// Offers what can be done now, by the view on show and by the window, and does what the user wants of that.
     pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
         // A question is to be answered first.
-        let hears_keys =
-            self.saving.is_none() && self.closing.is_none() && matches!(self.overlay, Overlay::None);
+        let hears_keys = self.saving.is_none() && self.closing.is_none() && matches!(self.overlay, Overlay::None);
         let mut offers = Offers::new(ctx, self.picked.take(), hears_keys);
         self.views.all()[self.shown].offer_actions(&mut offers, &self.shared, effects);
         self.offer_undoing(&mut offers);
@@ -47,7 +46,11 @@ impl DecouplerWindow {
                 self.show(place);
             }
         }
-        let theme = if self.shared.look.is_dark { "Light theme" } else { "Dark theme" };
+        let theme = if self.shared.look.is_dark {
+            "Light theme"
+        } else {
+            "Dark theme"
+        };
         if offers.offer(theme, true) {
             self.choose_theme(!self.shared.look.is_dark);
         }

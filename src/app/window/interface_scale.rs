@@ -19,7 +19,9 @@ impl DecouplerWindow {
         let can_shrink = scale > *SCALES.start() + 0.5 * STEP;
         // On many keyboards plus is the shifted equals sign.
         let is_equals = can_grow
-            && self.ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals));
+            && self
+                .ctx
+                .input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals));
         if offers.offer_keys("Larger interface", Modifiers::COMMAND, Key::Plus, can_grow) || is_equals {
             self.set_scale(scale + STEP);
         }

@@ -86,9 +86,9 @@ fn action_ui(ui: &mut Ui, action: &Action, is_marked: bool) -> eframe::egui::Res
     let line = ui.allocate_ui_with_layout(vec2(width, space(7)), Layout::left_to_right(Align::Center), |ui| {
         ui.add_enabled_ui(action.is_possible, |ui| {
             let text = Button::selectable(is_marked, action.name.as_str());
-            let text = text.min_size(vec2(width, space(7))).right_text(
-                RichText::new(keys.unwrap_or_default()).color(dim),
-            );
+            let text = text
+                .min_size(vec2(width, space(7)))
+                .right_text(RichText::new(keys.unwrap_or_default()).color(dim));
             ui.add(text)
         })
         .inner
@@ -127,7 +127,12 @@ mod tests {
             action("Train", true),
             action("Show Trade-off", true),
         ];
-        let names = |typed| matching(&actions, typed).iter().map(|found| found.name.as_str()).collect::<Vec<_>>();
+        let names = |typed| {
+            matching(&actions, typed)
+                .iter()
+                .map(|found| found.name.as_str())
+                .collect::<Vec<_>>()
+        };
         assert_eq!(names(""), ["Train", "Show Trade-off", "Stop training"]);
         assert_eq!(names("off show"), ["Show Trade-off"]);
         assert_eq!(names("TRAIN"), ["Train", "Stop training"]);

@@ -39,8 +39,8 @@ pub(super) fn top_bar_ui(
             let theme = theme_ui(ui);
             let search = if width > 2.0 * space(165) { "Search" } else { "…" };
             let search = action_button_ui(ui, actions, "Search actions", search);
-            let redo = action_button_ui(ui, actions, "Redo change of settings", "⟳");
-            let undo = action_button_ui(ui, actions, "Undo change of settings", "⟲");
+            let redo = action_button_ui(ui, actions, "Redo change of settings", "↻");
+            let undo = action_button_ui(ui, actions, "Undo change of settings", "↺");
             ui.add_space(space(2));
             tools_ui(ui);
             keys.or(theme).or(search).or(redo).or(undo)

@@ -55,7 +55,12 @@ impl View for ExperimentsView {
         if offers.offer_keys("Run experiment", Modifiers::COMMAND, Key::Enter, self.can_run()) {
             self.run(effects);
         }
-        if offers.offer_keys("Cancel experiment", Modifiers::COMMAND, Key::Period, self.running.is_some()) {
+        if offers.offer_keys(
+            "Cancel experiment",
+            Modifiers::COMMAND,
+            Key::Period,
+            self.running.is_some(),
+        ) {
             self.cancel();
         }
     }

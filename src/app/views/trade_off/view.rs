@@ -45,10 +45,20 @@ impl View for TradeOffView {
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer_keys("Measure trade-off", Modifiers::COMMAND, Key::Enter, self.can_measure(shared)) {
+        if offers.offer_keys(
+            "Measure trade-off",
+            Modifiers::COMMAND,
+            Key::Enter,
+            self.can_measure(shared),
+        ) {
             self.measure(shared, effects);
         }
-        if offers.offer_keys("Cancel measuring", Modifiers::COMMAND, Key::Period, self.running.is_some()) {
+        if offers.offer_keys(
+            "Cancel measuring",
+            Modifiers::COMMAND,
+            Key::Period,
+            self.running.is_some(),
+        ) {
             self.cancel();
         }
     }

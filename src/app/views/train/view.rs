@@ -48,7 +48,12 @@ impl View for TrainView {
         if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {
             self.snapshot += 1;
         }
-        if offers.offer_keys("Previous test snapshot", Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
+        if offers.offer_keys(
+            "Previous test snapshot",
+            Modifiers::NONE,
+            Key::PageUp,
+            self.snapshot > 0,
+        ) {
             self.snapshot -= 1;
         }
     }

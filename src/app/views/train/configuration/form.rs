@@ -1,51 +1,71 @@
-use eframe::egui::{CollapsingHeader, ComboBox, RichText, Ui};
+use eframe::egui::Ui;
 
 use super::{
-    network_section::network_section_ui,
+    choices::{array_choice_ui, hidden_choice_ui},
+    method_section::{method_choice_ui, method_settings_ui, stopping_ui},
+    network_section::inputs_ui,
     preset_section::{applied, present, preset_section_ui},
-    scene_section::{samples_section_ui, scene_section_ui},
-    sensor_section::sensor_section_ui,
+    scene_section::{outlook_notes_ui, samples_section_ui, scene_section_ui},
+    sensor_section::geometry_ui,
+    summaries,
 };
 use crate::{
     app::{
         shared::{Effect, Phase, Shared},
-        theme::{Theme, space, type_size},
+        theme::space,
         views::train::paper_figure::PaperFigure,
-        widgets::{
-            fields::{capitalised, count_ui, input_text, quantity_ui},
-            ghost_button, scrolled_ui, section_heading_ui,
-        },
+        widgets::{fold_ui, ghost_button, scrolled_ui},
     },
-    evaluation::{MOST_STARTS, Outlook, SimulatedSettings},
-    training::{Method, StoppingRules},
+    evaluation::{Outlook, SimulatedSettings},
 };
 
-/// The settings of the next training, in the order of the pipeline.
-/// Returns the paper's figure that is to be shown, if the user said so.
+/// The settings of the next training. Returns the paper's figure that is to be shown, if the user said so.
 pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<PaperFigure> {
     let mut draft = shared.draft;
     let mut picked = None;
     scrolled_ui(ui, "configuration", |ui| {
         let is_busy = shared.phase.is_busy();
-        ui.add_enabled_ui(!is_busy, |ui| preset_section_ui(ui, &mut draft));
+        // What is held can be continued with another method.
+        let is_held = shared.phase == Phase::Paused;
+        let scene = draft.source.scene;
         let followed = present(&draft);
-        ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {
-            picked = paper_section_ui(ui);
-        });
+        ui.add_space(space(2));
         ui.add_enabled_ui(!is_busy, |ui| {
-            sensor_section_ui(ui, &mut draft);
-            let noise = draft.source.scene.noise;
-            scene_section_ui(ui, &mut draft, outlook(shared));
+            array_choice_ui(ui, &mut draft.source.sensor.scale);
+            hidden_choice_ui(ui, &mut draft);
+        });
+        ui.add_enabled_ui(!is_busy || is_held, |ui| method_choice_ui(ui, &mut draft));
+        ui.add_enabled_ui(!is_busy, |ui| {
+            preset_section_ui(ui, &mut draft);
+            ui.add_space(space(2));
+            ui.separator();
+            outlook_notes_ui(ui, &draft, outlook(shared));
+            fold_ui(ui, "Scene", &summaries::of_scene(&draft), |ui| {
+                scene_section_ui(ui, &mut draft, outlook(shared));
+            });
             // How many samples are best depends on whether there is noise.
-            if let Some(preset) = followed.filter(|_| draft.source.scene.noise != noise) {
+            if let Some(preset) = followed.filter(|_| draft.source.scene.noise != scene.noise) {
                 draft = applied(preset, &draft);
             }
-            samples_section_ui(ui, &mut draft);
-            network_section_ui(ui, &mut draft);
+            fold_ui(ui, "Samples", &summaries::of_samples(&draft), |ui| {
+                samples_section_ui(ui, &mut draft)
+            });
+            let geometry = summaries::of_geometry(&draft.source.sensor.geometry);
+            fold_ui(ui, "Geometry", &geometry, |ui| geometry_ui(ui, &mut draft));
+            fold_ui(ui, "Network inputs", &summaries::of_inputs(&draft), |ui| {
+                inputs_ui(ui, &mut draft)
+            });
         });
-        // What is held can be continued with another method.
-        ui.add_enabled_ui(!is_busy || shared.phase == Phase::Paused, |ui| {
-            training_section_ui(ui, &mut draft, !is_busy);
+        ui.add_enabled_ui(!is_busy || is_held, |ui| {
+            fold_ui(ui, "When to stop", &summaries::of_stopping(&draft), |ui| {
+                stopping_ui(ui, &mut draft)
+            });
+            fold_ui(ui, "Method settings", &summaries::of_method(&draft), |ui| {
+                method_settings_ui(ui, &mut draft, !is_busy);
+            });
+        });
+        ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {
+            fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_section_ui(ui));
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             ui.add_space(space(4));
@@ -80,7 +100,6 @@ fn outlook(shared: &Shared) -> Option<&Outlook> {
 
 /// The paper's figures of single networks, one click each.
 fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
-    section_heading_ui(ui, "The paper's figures");
     // So small that the names fit in the narrowest window.
     let gap = space(1);
     let mut picked = None;
@@ -96,65 +115,4 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
         }
     });
     picked
-}
-
-fn training_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
-    section_heading_ui(ui, "Training");
-    let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
-                error is kept. Several starts show how much the results vary. Default 1.";
-    ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", hint, &mut draft.starts, 1..=MOST_STARTS)
-    });
-    let method = &mut draft.training.method;
-    // The longest names fill a line.
-    let label = ui.label("Method").on_hover_text("Algorithm that adjusts the weights.");
-    let combo = ComboBox::from_id_salt("method")
-        .selected_text(method.name())
-        .width(ui.available_width())
-        .height(space(90));
-    let shown = combo.show_ui(ui, |ui| {
-        for option in Method::all() {
-            let is_selected = option.short_name() == method.short_name();
-            let choice = ui
-                .selectable_label(is_selected, option.name())
-                .on_hover_text(option.description());
-            if choice.clicked() && !is_selected {
-                *method = option;
-            }
-        }
-    });
-    shown.response.labelled_by(label.id);
-    let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
-    for setting in method.settings() {
-        let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
-        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
-    }
-    let stopping = &mut draft.training.stopping;
-    let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
-                from the present one.";
-    count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
-    CollapsingHeader::new("Stopping criteria")
-        .id_salt("stopping")
-        .show(ui, |ui| {
-            let hint = "Training error (mse of the scaled coordinates) at which training ends. Default 0.";
-            quantity_ui(ui, "Goal (mse)", hint, &mut stopping.goal_mse, 0.0..=1e300, "");
-            let hint = "Norm of the gradient below which training ends. Default 1e-7.";
-            quantity_ui(
-                ui,
-                "Smallest gradient",
-                hint,
-                &mut stopping.min_gradient,
-                0.0..=1e300,
-                "",
-            );
-            let hint = "Training ends after this many epochs without a new best validation error. Default 6.";
-            count_ui(
-                ui,
-                "Validation failures",
-                hint,
-                &mut stopping.max_fail,
-                1..=StoppingRules::MOST_EPOCHS,
-            );
-        });
 }

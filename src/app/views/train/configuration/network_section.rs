@@ -1,53 +1,17 @@
-use eframe::egui::{RichText, Slider, Stroke, Ui};
+use eframe::egui::{RichText, Ui};
 
 use crate::{
     app::{
-        theme::{Theme, space, type_size},
-        widgets::{
-            fields::{capitalised, count_ui, list_ui, options_ui},
-            section_heading_ui, slider_style,
-        },
+        theme::{Theme, type_size},
+        widgets::fields::{capitalised, list_ui, options_ui},
     },
-    evaluation::{SimulatedSettings, Workload},
-    export::describe_workload,
-    network::{HiddenSuggestions, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    evaluation::SimulatedSettings,
+    network::{Quantity, ScalingChoice, Shape},
     scene::{Movement, Rows},
 };
 
-/// Shows the inputs and the size of the network; changes `draft`.
-pub fn network_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    section_heading_ui(ui, "Network");
-    inputs_ui(ui, draft);
-    let hint = "Number of nodes in the tanh layer between resistances and coordinates.";
-    count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
-    let scale = draft.source.sensor.scale;
-    let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
-    let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
-    hidden_slider_ui(ui, &mut draft.hidden, [suggestions.logarithm, low, high]);
-    let dim = Theme::of(ui).palette.dim;
-    let (n, m) = (scale.columns(), scale.coordinates_per_row());
-    let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
-        .on_hover_text(format!(
-            "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from \
-             1 to 10 (Eq. 12). A starting point, not a limit."
-        ));
-    weights_ui(ui, draft);
-    workload_ui(ui, draft);
-}
-
-/// Memory and time of a training that takes much of either.
-fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
-    if let Ok(workload) = Workload::of(draft)
-        && workload.is_large()
-    {
-        let warning = Theme::of(ui).palette.warning;
-        let text = capitalised(&describe_workload(&workload));
-        ui.label(RichText::new(text).size(type_size().note).color(warning));
-    }
-}
-
-fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+/// What the network reads, and how large it becomes; changes `draft`.
+pub fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let options = [
         (Quantity::Resistance, "Resistance", "R, as in the paper."),
         (
@@ -82,6 +46,7 @@ fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     if let Some(picked) = options_ui(ui, "Scaling", hint, &options, draft.inputs.scaling) {
         draft.inputs.scaling = picked;
     }
+    weights_ui(ui, draft);
 }
 
 /// Shows the size of the networks.
@@ -118,48 +83,4 @@ fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
         .on_hover_text(
             "Inputs are the resistances of a row-wire; outputs are those coordinates of its nodes that vary.",
         );
-}
-
-/// A slider for small networks, with small marks at the suggestions.
-fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
-    const MOST: usize = 64;
-    ui.scope(|ui| {
-        slider_style(ui);
-        ui.spacing_mut().slider_width = ui.available_width();
-        let slider = Slider::new(hidden, 1..=MOST)
-            .show_value(false)
-            .clamping(eframe::egui::SliderClamping::Never);
-        let response = ui.add(slider);
-        let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
-        let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-        for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
-            let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
-            let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
-            ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
-        }
-        let value = *hidden as f64;
-        response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
-    });
-    ui.add_space(space(1));
-}
-
-#[cfg(test)]
-mod tests {
-    use egui_kittest::{Harness, kittest::Queryable as _};
-
-    use super::*;
-
-    #[test]
-    fn a_large_training_tells_its_memory_and_time_before_it_begins() {
-        for (hidden, is_told) in [(12, false), (512, true)] {
-            let mut draft = SimulatedSettings {
-                hidden,
-                ..SimulatedSettings::default()
-            };
-            draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
-            let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
-            let found = harness.query_by_label_contains("of memory");
-            assert_eq!(found.is_some(), is_told, "{hidden} hidden nodes");
-        }
-    }
 }

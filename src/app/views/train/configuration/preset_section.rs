@@ -1,14 +1,14 @@
 use eframe::egui::Ui;
 
 use crate::{
-    app::widgets::{explained_options_ui, section_heading_ui},
+    app::{theme::space, widgets::explained_options_ui},
     evaluation::{Preset, SimulatedSettings, Simulation},
     scene::Scene,
 };
 
 /// Shows the presets on which the settings are based; changes `draft`.
 pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    section_heading_ui(ui, "Preset");
+    ui.add_space(space(2));
     let options = [
         (
             Some(Preset::Paper),

@@ -7,7 +7,7 @@ use crate::{
         widgets::{
             dim_ui,
             fields::{capitalised, count_ui, field_ui, list_ui, options_ui, percent_ui, quantity_ui},
-            note_ui, section_heading_ui,
+            note_ui,
         },
     },
     dataset::LARGEST_SAMPLES,
@@ -19,7 +19,6 @@ use crate::{
 /// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
 /// it is known.
 pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Option<&Outlook>) {
-    section_heading_ui(ui, "Scene");
     rows_ui(ui, draft);
     movement_ui(ui, &mut draft.source.scene.movement);
     loading_ui(ui, &mut draft.source.scene.loading);
@@ -33,12 +32,11 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
     );
     noise_ui(ui, &mut draft.source.scene.noise);
     size_ui(ui, draft);
-    outlook_ui(ui, draft, outlook);
+    condition_ui(ui, outlook);
 }
 
 /// Shows the numbers of samples and the seed; changes `draft`.
 pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    section_heading_ui(ui, "Samples");
     let rows = draft.source.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
         1 => "Number of samples to which the network is fitted.".to_owned(),
@@ -250,8 +248,8 @@ fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     );
 }
 
-/// Shows the condition number of the scene, and its warnings.
-fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
+/// Shows the condition number of the scene.
+fn condition_ui(ui: &mut Ui, outlook: Option<&Outlook>) {
     let condition = outlook.map(|outlook| outlook.worst_row.condition());
     let text = match condition {
         Some(condition) if condition.is_infinite() => "Condition number infinite".to_owned(),
@@ -261,6 +259,10 @@ fn outlook_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>)
         "Worst-case amplification of a relative error in the readings: the largest singular value of the Jacobian of \
          ln R over the smallest, for the worst row with its nodes pressed half way.",
     );
+}
+
+/// Shows the warnings of the scene, which stand there also while its settings are folded away.
+pub fn outlook_notes_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
     let Some(outlook) = outlook else { return };
     let sideways = draft.source.scene.movement != Movement::Z;
     if outlook.warnings.is_empty() && sideways {

@@ -1,79 +1,16 @@
-use eframe::egui::{self, CollapsingHeader, RichText, TextEdit, Ui};
+use eframe::egui::{RichText, Ui};
 
 use crate::{
     app::{
-        theme::{Theme, space, type_size},
-        widgets::{fields::quantity_ui, note_ui, section_heading_ui, segmented_ui},
+        theme::{Theme, type_size},
+        widgets::fields::quantity_ui,
     },
     evaluation::SimulatedSettings,
-    sensor::{ArrayScale, Geometry},
+    sensor::Geometry,
 };
 
-/// Array scale, geometry and resistivity; changes `draft`.
-pub fn sensor_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    section_heading_ui(ui, "Sensor array");
-    let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
-    let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
-    if let Some(scale) = segmented_ui(
-        ui,
-        "Array scale of the paper",
-        &options,
-        draft.source.sensor.scale,
-        true,
-    ) {
-        draft.source.sensor.scale = scale;
-    }
-    array_scale_ui(ui, &mut draft.source.sensor.scale);
-    let scale = draft.source.sensor.scale;
-    let dim = Theme::of(ui).palette.dim;
-    let text = format!(
-        "{} row-wires of {} nodes over {} column-wires of {} nodes",
-        scale.rows(),
-        scale.nodes_per_row(),
-        scale.columns(),
-        scale.nodes_per_column()
-    );
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
-    if let Some(note) = scale.note() {
-        note_ui(ui, &note);
-    }
-    CollapsingHeader::new("Geometry")
-        .id_salt("geometry")
-        .show(ui, |ui| geometry_ui(ui, draft));
-}
-
-/// The scale as text, taken over when it parses; until then the reason it does not stands below.
-fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
-    let id = ui.scope_id().with("array scale text");
-    let typed = ui.data(|data| data.get_temp::<String>(id));
-    let mut text = typed.clone().unwrap_or_else(|| scale.to_string());
-    let response = ui
-        .horizontal(|ui| {
-            let label = ui.label("Array scale");
-            let edit = TextEdit::singleline(&mut text)
-                .desired_width(f32::INFINITY)
-                .margin(egui::vec2(space(2), space(1)));
-            ui.add(edit).labelled_by(label.id)
-        })
-        .inner
-        .on_hover_text(
-            "M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any size is \
-                        possible.",
-        );
-    let parsed = text.parse::<ArrayScale>();
-    if response.changed() {
-        ui.data_mut(|data| data.insert_temp(id, text));
-        if let Ok(parsed) = parsed {
-            *scale = parsed;
-        }
-    } else if !response.has_focus() && typed.is_some() && parsed.is_ok() {
-        ui.data_mut(|data| data.remove_temp::<String>(id));
-    } else if let (Some(_), Err(error)) = (typed, parsed) {
-        note_ui(ui, &error.to_string());
-    }
-}
-
-fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+/// Lengths and resistivity; changes `draft`.
+pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let Geometry {
         height_mm,
         row_x0_mm,

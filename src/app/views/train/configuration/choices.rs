@@ -1,0 +1,149 @@
+use eframe::egui::{self, RichText, Slider, Stroke, TextEdit, Ui};
+
+use crate::{
+    app::{
+        theme::{Theme, space, type_size},
+        widgets::{
+            fields::{capitalised, count_ui},
+            note_ui, segmented_ui, slider_style,
+        },
+    },
+    evaluation::{SimulatedSettings, Workload},
+    export::describe_workload,
+    network::{HiddenSuggestions, LARGEST_HIDDEN},
+    sensor::ArrayScale,
+};
+
+/// The scale of the array: one of the paper's, or any other typed; changes `scale`.
+pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
+    array_scale_ui(ui, scale);
+    let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
+    let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
+    if let Some(picked) = segmented_ui(ui, "Array scale of the paper", &options, *scale, true) {
+        *scale = picked;
+    }
+    let dim = Theme::of(ui).palette.dim;
+    let text = format!(
+        "{} of {} over {} of {}",
+        counted(scale.rows(), "row-wire"),
+        counted(scale.nodes_per_row(), "node"),
+        counted(scale.columns(), "column-wire"),
+        counted(scale.nodes_per_column(), "node")
+    );
+    ui.label(RichText::new(text).size(type_size().note).color(dim));
+    if let Some(note) = scale.note() {
+        note_ui(ui, &note);
+    }
+    ui.add_space(space(1));
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
+/// The scale as text, taken over when it parses; until then the reason it does not stands below.
+fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
+    let id = ui.scope_id().with("array scale text");
+    let typed = ui.data(|data| data.get_temp::<String>(id));
+    let mut text = typed.clone().unwrap_or_else(|| scale.to_string());
+    let response = ui
+        .horizontal(|ui| {
+            let label = ui.label("Array scale");
+            let edit = TextEdit::singleline(&mut text)
+                .desired_width(f32::INFINITY)
+                .margin(egui::vec2(space(2), space(1)));
+            ui.add(edit).labelled_by(label.id)
+        })
+        .inner
+        .on_hover_text(
+            "M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any size is \
+                        possible.",
+        );
+    let parsed = text.parse::<ArrayScale>();
+    if response.changed() {
+        ui.data_mut(|data| data.insert_temp(id, text));
+        if let Ok(parsed) = parsed {
+            *scale = parsed;
+        }
+    } else if !response.has_focus() && typed.is_some() && parsed.is_ok() {
+        ui.data_mut(|data| data.remove_temp::<String>(id));
+    } else if let (Some(_), Err(error)) = (typed, parsed) {
+        note_ui(ui, &error.to_string());
+    }
+}
+
+/// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
+pub fn hidden_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let hint = "Number of nodes in the tanh layer between resistances and coordinates.";
+    count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
+    let scale = draft.source.sensor.scale;
+    let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
+    let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
+    hidden_slider_ui(ui, &mut draft.hidden, [suggestions.logarithm, low, high]);
+    let dim = Theme::of(ui).palette.dim;
+    let (n, m) = (scale.columns(), scale.coordinates_per_row());
+    let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
+    ui.label(RichText::new(text).size(type_size().note).color(dim))
+        .on_hover_text(format!(
+            "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from \
+             1 to 10 (Eq. 12). A starting point, not a limit."
+        ));
+    workload_ui(ui, draft);
+    ui.add_space(space(1));
+}
+
+/// Memory and time of a training that takes much of either.
+fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+    if let Ok(workload) = Workload::of(draft)
+        && workload.is_large()
+    {
+        let warning = Theme::of(ui).palette.warning;
+        let text = capitalised(&describe_workload(&workload));
+        ui.label(RichText::new(text).size(type_size().note).color(warning));
+    }
+}
+
+/// A slider for small networks, with small marks at the suggestions.
+fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
+    const MOST: usize = 64;
+    ui.scope(|ui| {
+        slider_style(ui);
+        ui.spacing_mut().slider_width = ui.available_width();
+        let slider = Slider::new(hidden, 1..=MOST)
+            .show_value(false)
+            .clamping(eframe::egui::SliderClamping::Never);
+        let response = ui.add(slider);
+        let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
+        let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
+        for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
+            let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
+            let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
+            ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
+        }
+        let value = *hidden as f64;
+        response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
+    });
+    ui.add_space(space(1));
+}
+
+#[cfg(test)]
+mod tests {
+    use egui_kittest::{Harness, kittest::Queryable as _};
+
+    use super::*;
+
+    #[test]
+    fn a_large_training_tells_its_memory_and_time_before_it_begins() {
+        for (hidden, is_told) in [(12, false), (512, true)] {
+            let mut draft = SimulatedSettings {
+                hidden,
+                ..SimulatedSettings::default()
+            };
+            draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
+            let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
+            let found = harness.query_by_label_contains("of memory");
+            assert_eq!(found.is_some(), is_told, "{hidden} hidden nodes");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+use eframe::egui::{ComboBox, RichText, Ui};
+
+use crate::{
+    app::{
+        theme::{Theme, space, type_size},
+        widgets::fields::{capitalised, count_ui, input_text, quantity_ui},
+    },
+    evaluation::{MOST_STARTS, SimulatedSettings},
+    training::{Method, StoppingRules},
+};
+
+/// The choice of the method; changes `draft`.
+pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let method = &mut draft.training.method;
+    // The longest names fill a line.
+    let label = ui.label("Method").on_hover_text("Algorithm that adjusts the weights.");
+    let combo = ComboBox::from_id_salt("method")
+        .selected_text(method.name())
+        .width(ui.available_width())
+        .height(space(90));
+    let shown = combo.show_ui(ui, |ui| {
+        for option in Method::all() {
+            let is_selected = option.short_name() == method.short_name();
+            let choice = ui
+                .selectable_label(is_selected, option.name())
+                .on_hover_text(option.description());
+            if choice.clicked() && !is_selected {
+                *method = option;
+            }
+        }
+    });
+    shown.response.labelled_by(label.id);
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
+}
+
+/// The settings of the chosen method and the number of starts; changes `draft`. A training that is held
+/// (`is_new` is false) keeps its starts.
+pub fn method_settings_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
+    for setting in draft.training.method.settings() {
+        let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
+        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
+    }
+    let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
+                error is kept. Several starts show how much the results vary. Default 1.";
+    ui.add_enabled_ui(is_new, |ui| {
+        count_ui(ui, "Starts", hint, &mut draft.starts, 1..=MOST_STARTS)
+    });
+}
+
+/// The rules that end a training; changes `draft`.
+pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let stopping = &mut draft.training.stopping;
+    let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
+                from the present one.";
+    count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
+    let hint = "Training ends after this many epochs without a new best validation error. Default 6.";
+    count_ui(
+        ui,
+        "Validation failures",
+        hint,
+        &mut stopping.max_fail,
+        1..=StoppingRules::MOST_EPOCHS,
+    );
+    let hint = "Training error (mse of the scaled coordinates) at which training ends. Default 0.";
+    quantity_ui(ui, "Goal (mse)", hint, &mut stopping.goal_mse, 0.0..=1e300, "");
+    let hint = "Norm of the gradient below which training ends. Default 1e-7.";
+    quantity_ui(
+        ui,
+        "Smallest gradient",
+        hint,
+        &mut stopping.min_gradient,
+        0.0..=1e300,
+        "",
+    );
+}

@@ -1,0 +1,88 @@
+//! How the folded parts of the configuration stand, in a few words each.
+
+use crate::{
+    app::widgets::fields::input_text,
+    evaluation::SimulatedSettings,
+    network::{Quantity, ScalingChoice},
+    scene::{IndenterShape, Loading, Movement, Rows},
+    sensor::Geometry,
+};
+
+/// Loading, rows, axes and noise.
+pub(super) fn of_scene(draft: &SimulatedSettings) -> String {
+    let scene = &draft.source.scene;
+    let loading = match scene.loading {
+        Loading::RandomNodes => "random nodes".to_owned(),
+        Loading::SmoothField { .. } => "smooth field".to_owned(),
+        Loading::Indenter(indenter) => match indenter.shape {
+            IndenterShape::Sphere { .. } => "sphere",
+            IndenterShape::FlatPunch { .. } => "flat punch",
+            IndenterShape::Cylinder { .. } => "cylinder",
+            IndenterShape::Edge { .. } => "edge",
+        }
+        .to_owned(),
+    };
+    let rows = match scene.rows {
+        Rows::All => "all rows".to_owned(),
+        Rows::Known => "known rows".to_owned(),
+        Rows::One(row) => format!("row {}", row + 1),
+    };
+    let axes = match scene.movement {
+        Movement::Z => "",
+        Movement::Xyz { .. } => ", x y z",
+    };
+    let noise = if scene.noise.is_none() { "" } else { ", noise" };
+    format!("{loading}, {rows}{axes}{noise}")
+}
+
+/// Numbers of training, validation and test samples, and the seed.
+pub(super) fn of_samples(draft: &SimulatedSettings) -> String {
+    let source = &draft.source;
+    format!(
+        "{} + {} + {}, seed {}",
+        source.samples, source.validation_samples, source.test_samples, draft.seed.0
+    )
+}
+
+/// Height, and whether anything else differs from what is assumed.
+pub(super) fn of_geometry(geometry: &Geometry) -> String {
+    let height = input_text(geometry.height_mm);
+    if *geometry == Geometry::default() {
+        format!("assumed, {height} mm high")
+    } else {
+        format!("yours, {height} mm high")
+    }
+}
+
+/// Quantity and scaling of the inputs.
+pub(super) fn of_inputs(draft: &SimulatedSettings) -> String {
+    let quantity = match draft.inputs.quantity {
+        Quantity::Raw => "readings",
+        Quantity::Resistance => "resistance",
+        Quantity::Conductance => "conductance",
+        Quantity::LogResistance => "log-resistance",
+    };
+    let scaling = match draft.inputs.scaling {
+        ScalingChoice::MinMax => "min-max",
+        ScalingChoice::Whitening => "whitening",
+    };
+    format!("{quantity}, {scaling}")
+}
+
+/// The rules that mostly end a training.
+pub(super) fn of_stopping(draft: &SimulatedSettings) -> String {
+    let stopping = &draft.training.stopping;
+    format!("{} epochs, {} failures", stopping.epochs, stopping.max_fail)
+}
+
+/// The first of the method's own settings, and the number of starts.
+pub(super) fn of_method(draft: &SimulatedSettings) -> String {
+    let mut method = draft.training.method;
+    let first = method.settings().into_iter().next();
+    let first = first.map(|setting| format!("{} {}, ", setting.name, input_text(*setting.value)));
+    let starts = match draft.starts {
+        1 => "1 start".to_owned(),
+        starts => format!("{starts} starts"),
+    };
+    format!("{}{starts}", first.unwrap_or_default())
+}

@@ -1,0 +1,36 @@
+use eframe::egui::{Align, CollapsingHeader, Color32, Label, Layout, RichText, Ui, UiBuilder};
+
+use crate::app::theme::{Theme, space, type_size};
+
+/// A part of a form that is folded away until its name is clicked; `summary` tells beside the name how it stands.
+/// `contents` is added only while it is unfolded.
+pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mut Ui)) {
+    let dim = Theme::of(ui).palette.dim;
+    let header = ui
+        .scope(|ui| {
+            let visuals = ui.visuals_mut();
+            // The whole line can be clicked, and shows so under the pointer.
+            visuals.collapsing_header_frame = true;
+            visuals.widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
+            let shown = CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                let raised = Theme::of(ui).palette.raised;
+                let visuals = ui.visuals_mut();
+                visuals.collapsing_header_frame = false;
+                visuals.widgets.inactive.weak_bg_fill = raised;
+                contents(ui);
+                ui.add_space(space(2));
+            });
+            shown.header_response
+        })
+        .inner;
+    let text_width =
+        ui.painter()
+            .layout_no_wrap(name.to_owned(), eframe::egui::TextStyle::Body.resolve(ui.style()), dim);
+    let mut place = header.rect;
+    place.min.x += space(7) + text_width.size().x + space(2);
+    place.max.x -= space(1);
+    let layout = Layout::right_to_left(Align::Center);
+    let mut beside = ui.new_child(UiBuilder::new().max_rect(place).layout(layout));
+    let text = RichText::new(summary).size(type_size().note).color(dim);
+    beside.add(Label::new(text).truncate().selectable(false));
+}
