@@ -102,7 +102,7 @@ impl Driver {
     /// Unfolds every part of the configuration.
     fn unfold(&mut self) {
         for name in FOLDED {
-            self.click_button(name);
+            self.click(name);
         }
     }
 
