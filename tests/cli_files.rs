@@ -327,3 +327,38 @@ fn figures_that_single_precision_has_not_are_explained() {
     let words = "single precision";
     assert!(double.iter().all(|remark| !remark.as_str().unwrap().contains(words)));
 }
+
+#[test]
+fn a_report_is_written_beside_json_with_the_same_figures_and_shares_no_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = format!("train {SMALL} --seed 3 --decoder ridge --json --report r.html");
+    let output = decoupler(&arguments, folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let html = fs::read_to_string(folder.path().join("r.html")).unwrap();
+    for value in [
+        &printed["errors"]["z_percent"],
+        &printed["errors"]["worst_mm"],
+        &printed["baselines"]["mean"]["z_mm"],
+        &printed["decoders"]["ridge"]["residual"],
+    ] {
+        let rounded = decoupler::export::format_number(value.as_f64().unwrap());
+        assert!(html.contains(&format!("<td>{rounded}</td>")), "{value}");
+    }
+    // The command in it repeats the run.
+    let (_, command) = html.split_once("<pre>decoupler ").unwrap();
+    let (command, _) = command.split_once("</pre>").unwrap();
+    let again = decoupler(&format!("{command} --decoder ridge --json"), folder.path());
+    let again: Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(again["errors"], printed["errors"]);
+
+    let message = failure(
+        &format!("train {SMALL} --out r.html --report ./r.html"),
+        folder.path(),
+        2,
+    );
+    assert!(message.contains("--out and --report name the same file"), "{message}");
+    assert_eq!(fs::read_to_string(folder.path().join("r.html")).unwrap(), html);
+    let message = failure(&format!("train {SMALL} --report none/r.html"), folder.path(), 1);
+    assert!(message.contains("does not exist"), "{message}");
+}

@@ -11,7 +11,7 @@ use super::interruption;
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
-    export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError},
+    export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError},
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::SensorError,
@@ -65,6 +65,8 @@ pub(super) enum Failure {
     Sensor(SensorError),
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Report(#[from] ReportError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("{}", joined(.0))]

@@ -21,9 +21,9 @@ use crate::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
     },
     export::{
-        atomic_write, check_writable, describe_conditions,
+        atomic_write, cells_table, check_writable, describe_conditions,
         figures::{PictureError, PictureFormat},
-        format_duration, write_cells, write_experiment_markdown, write_trials,
+        format_duration, trials_table, write_experiment_markdown,
     },
     figure::experiment_figure,
     network::LARGEST_HIDDEN,
@@ -237,8 +237,8 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureErr
     let write_markdown =
         |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);
     [
-        atomic_write(&cells, |writer| write_cells(results, writer)).map_err(PictureError::from),
-        atomic_write(&trials, |writer| write_trials(results, writer)).map_err(PictureError::from),
+        atomic_write(&cells, |writer| cells_table(results).write_csv(writer)).map_err(PictureError::from),
+        atomic_write(&trials, |writer| trials_table(results).write_csv(writer)).map_err(PictureError::from),
         atomic_write(&markdown, write_markdown).map_err(PictureError::from),
         picture.save(PictureFormat::Svg, &svg),
         picture.save(PictureFormat::Png, &png),

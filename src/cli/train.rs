@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
-    export::{CheckpointFile, NetworkFile, check_writable, format_number},
+    export::{CheckpointFile, NetworkFile, check_writable, format_number, report::RunReport},
 };
 
 /// Train a network and print its errors
@@ -37,6 +37,9 @@ pub(super) struct Train {
     /// File for the network, to be opened in the window or given to decode
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
     json: bool,
@@ -45,21 +48,7 @@ pub(super) struct Train {
 impl Train {
     pub(super) fn run(self) -> Result<(), Failure> {
         let checkpointing = self.checkpoint.checkpointing()?;
-        if let Some(path) = &self.out {
-            if self
-                .checkpoint
-                .checkpoint
-                .as_ref()
-                .is_some_and(|other| is_same(path, other))
-            {
-                let message = "--out and --checkpoint name the same file: give each its own";
-                return Err(Failure::Arguments(message.to_owned()));
-            }
-            check_writable(path)?;
-        }
-        if let Some(path) = &self.checkpoint.checkpoint {
-            check_writable(path)?;
-        }
+        self.check_paths()?;
         let mut run = match &self.checkpoint.checkpoint {
             Some(path) if self.checkpoint.resume => self.resume(path)?,
             _ => {
@@ -78,20 +67,50 @@ impl Train {
             _ => self.measure_decoders(&file, &run, &mut decoders),
         };
         let flaw = run.flaw();
+        let reported = self.report.as_ref().map_or(Ok(()), |path| {
+            let report = RunReport {
+                name: None,
+                file: &file,
+                flaw: flaw.as_ref(),
+                decoders: &decoders,
+            };
+            report.save(path)
+        });
         if self.json {
             print_json(&file, flaw.as_ref(), &decoders)?;
         } else {
             print_text(&file, flaw.as_ref(), &decoders)?;
         }
         measured?;
-        match (saved, end) {
-            (Err(unsaved), Err(end)) => {
-                // Nobody is left to tell if this fails.
-                let _ = writeln!(stderr(), "{end}");
-                Err(unsaved.into())
-            }
-            (saved, end) => Ok(saved.map_err(Failure::from).and(end)?),
+        let saved = saved.map_err(Failure::from);
+        let reported = reported.map_err(Failure::from);
+        let mut failures = [saved, reported, end].into_iter().filter_map(Result::err);
+        let Some(first) = failures.next() else { return Ok(()) };
+        for other in failures {
+            // Nobody is left to tell if this fails.
+            let _ = writeln!(stderr(), "{other}");
         }
+        Err(first)
+    }
+
+    /// Checks that every file has a path of its own that can be written.
+    fn check_paths(&self) -> Result<(), Failure> {
+        let files = [
+            ("--out", &self.out),
+            ("--report", &self.report),
+            ("--checkpoint", &self.checkpoint.checkpoint),
+        ];
+        let files: Vec<_> = files
+            .iter()
+            .filter_map(|(name, path)| Some((name, path.as_ref()?)))
+            .collect();
+        for (number, (name, path)) in files.iter().enumerate() {
+            if let Some((other, _)) = files[number + 1..].iter().find(|(_, other)| is_same(path, other)) {
+                let message = format!("{name} and {other} name the same file: give each its own");
+                return Err(Failure::Arguments(message));
+            }
+        }
+        files.iter().try_for_each(|(_, path)| Ok(check_writable(path)?))
     }
 
     fn measure_decoders(
@@ -177,6 +196,9 @@ impl Train {
         let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
         if let Some(path) = &self.out {
             command += &format!(" --out {}", quoted(path));
+        }
+        if let Some(path) = &self.report {
+            command += &format!(" --report {}", quoted(path));
         }
         if self.json {
             command += " --json";

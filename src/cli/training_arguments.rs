@@ -189,6 +189,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
+    use crate::export::report::train_command;
 
     fn parsed(line: &str) -> TrainingArguments {
         let command = TrainingArguments::augment_args(Command::new("train"));
@@ -204,5 +205,25 @@ mod tests {
                     --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
                     200 --seed 0";
         assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
+    }
+
+    #[test]
+    fn the_command_in_a_report_gives_the_settings_of_the_run() {
+        let lines = [
+            "train",
+            "train --preset best --array 10x6_3x18 --hidden 7 --seed 18446744073709551615",
+            "train --rows 3 --axes xyz --loading smooth:2.5 --noise 1e-3 --noise-ohm 0.1 --adc-bits 12 --drift 0.0123 \
+             --noise-in training --inputs log --scaling whiten --starts 4",
+            "train --loading indenter:flat-punch --method gdm --set learning-rate=0.3 --epochs 77 --goal 1e-5 \
+             --max-fail 9 --min-gradient 0 --samples 123 --test-samples 17 --validation-samples 0",
+        ];
+        for line in lines {
+            let settings = parsed(&line.split_whitespace().collect::<Vec<_>>().join(" "))
+                .settings()
+                .unwrap();
+            let command = train_command(&settings).unwrap();
+            let command = command.strip_prefix("decoupler ").unwrap();
+            assert_eq!(parsed(command).settings().unwrap(), settings, "{command}");
+        }
     }
 }

@@ -3,8 +3,8 @@ use std::{
     time::Duration,
 };
 
-use super::{format_duration, format_number};
-use crate::evaluation::experiments::{CellResults, CellSummary, ExperimentResults, Figure, Verdict};
+use super::{Cell, Table, TableColumn, TableForm, format_duration, format_number};
+use crate::evaluation::experiments::{CellResults, CellSummary, ExperimentResults, Figure, Trial, Verdict};
 
 /// The results of an experiment for reading: the same columns in the terminal, in files and in the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,13 +70,37 @@ impl ExperimentTable {
             number("bound Z %", |cell| cell.bound_z_percent),
             number("epochs", |cell| cell.epochs_run),
             (
-                "training",
+                Self::TIME,
                 seconds,
                 time.map_or_else(|| format_number(None), format_duration),
             ),
         ]);
         figures
     }
+
+    /// The table for other documents, with the training time in seconds.
+    pub fn table(&self) -> Table {
+        let axes = self.headings.iter().position(|heading| heading.starts_with("Z %"));
+        let axes = axes.unwrap_or(self.headings.len());
+        let columns = self.headings.iter().map(|&heading| match heading {
+            Self::TIME => TableColumn::new(heading, heading, "s"),
+            _ => TableColumn::field(heading),
+        });
+        let row = |(texts, values): (&Vec<String>, &Vec<Option<f64>>)| {
+            let labels = texts[..axes].iter().map(|label| match label.parse() {
+                Ok(count) => Cell::Count(count),
+                Err(_) => Cell::Text(label.clone()),
+            });
+            labels.chain(values[axes..].iter().copied().map(Cell::from)).collect()
+        };
+        Table {
+            columns: columns.collect(),
+            rows: self.rows.iter().zip(&self.values).map(row).collect(),
+        }
+    }
+
+    /// Heading of the training time.
+    const TIME: &'static str = "training";
 
     /// Explanation of the last columns, to be shown below the table.
     pub const NOTE: &'static str = "Medians, least and largest over seeds (and repeats). mean: always answering the \
@@ -85,34 +109,33 @@ impl ExperimentTable {
          its starts.";
 }
 
-/// Writes the figures of every cell as CSV. Numbers are written so that reading gives the same bits; where there is
-/// none the field is empty.
-///
-/// # Errors
-/// Any error of `writer`.
-pub fn write_cells(results: &ExperimentResults, writer: &mut dyn Write) -> io::Result<()> {
-    write!(writer, "array,hidden,samples,method,epochs,starts,trials")?;
+/// The figures of every cell: for programs.
+pub fn cells_table(results: &ExperimentResults) -> Table {
+    let mut fields = ["array", "hidden", "samples", "method", "epochs", "starts", "trials"]
+        .map(str::to_owned)
+        .to_vec();
     for axis in ["z", "x", "y"] {
-        for figure in ["published", "median", "min", "max"] {
-            write!(writer, ",{axis}_percent_{figure}")?;
-        }
+        fields.extend(["published", "median", "min", "max"].map(|figure| format!("{axis}_percent_{figure}")));
     }
-    writeln!(
-        writer,
-        ",mean_z_percent,linear_z_percent,bound_z_percent,epochs_run,training_seconds,epoch_ms"
-    )?;
-    for summary in results.summaries() {
-        write!(
-            writer,
-            "{},{},{},{},{},{},{}",
-            summary.array,
-            summary.hidden,
-            summary.samples,
-            summary.method,
-            summary.epochs,
-            summary.starts,
-            summary.trials
-        )?;
+    let rest = [
+        "mean_z_percent",
+        "linear_z_percent",
+        "bound_z_percent",
+        "epochs_run",
+        "training_seconds",
+        "epoch_ms",
+    ];
+    fields.extend(rest.map(str::to_owned));
+    let row = |summary: CellSummary| {
+        let mut row: Vec<Cell> = vec![
+            summary.array.to_string().into(),
+            summary.hidden.into(),
+            summary.samples.into(),
+            summary.method.to_string().into(),
+            summary.epochs.into(),
+            summary.starts.into(),
+            summary.trials.into(),
+        ];
         for figure in [&summary.z_percent, &summary.x_percent, &summary.y_percent] {
             let Figure {
                 published,
@@ -121,7 +144,7 @@ pub fn write_cells(results: &ExperimentResults, writer: &mut dyn Write) -> io::R
                 max,
                 ..
             } = *figure;
-            write_fields([published, median, min, max], writer)?;
+            row.extend([published, median, min, max].map(Cell::from));
         }
         let rest = [
             summary.mean_z_percent,
@@ -131,52 +154,65 @@ pub fn write_cells(results: &ExperimentResults, writer: &mut dyn Write) -> io::R
             summary.training_seconds,
             summary.epoch_ms,
         ];
-        write_fields(rest, writer)?;
-        writeln!(writer)?;
+        row.extend(rest.map(Cell::from));
+        row
+    };
+    Table {
+        columns: fields.into_iter().map(TableColumn::field).collect(),
+        rows: results.summaries().into_iter().map(row).collect(),
     }
-    Ok(())
 }
 
-/// Writes every trial as CSV, in the manner of [`write_cells`]; repeats are counted from 1.
-///
-/// # Errors
-/// Any error of `writer`.
-pub fn write_trials(results: &ExperimentResults, writer: &mut dyn Write) -> io::Result<()> {
-    writeln!(
-        writer,
-        "array,hidden,samples,method,epochs,seed,repeat,z_percent,x_percent,y_percent,z_mm,worst_mm,mean_z_percent,\
-         linear_z_percent,bound_z_percent,epochs_run,seconds"
-    )?;
-    for cell in &results.cells {
-        let settings = &cell.cell.settings;
-        let training = &settings.training;
-        let method = training.method.short_name();
-        for trial in &cell.trials {
-            write!(
-                writer,
-                "{},{},{},{method},{},{},{}",
-                settings.source.sensor.scale,
-                settings.hidden,
-                settings.source.samples,
-                training.stopping.epochs,
-                trial.seed,
-                trial.repeat + 1
-            )?;
-            let figures = [
-                trial.errors.z_percent,
-                trial.errors.x_percent,
-                trial.errors.y_percent,
-                Some(trial.errors.z_mm),
-                Some(trial.errors.worst_mm),
-                trial.baselines.mean.z_percent,
-                trial.baselines.linear.z_percent,
-                trial.bottleneck.z_percent,
-            ];
-            write_fields(figures, writer)?;
-            writeln!(writer, ",{},{:?}", trial.epochs, trial.seconds)?;
-        }
+/// Every trial: for programs. Repeats are counted from 1.
+pub fn trials_table(results: &ExperimentResults) -> Table {
+    const FIELDS: [&str; 17] = [
+        "array",
+        "hidden",
+        "samples",
+        "method",
+        "epochs",
+        "seed",
+        "repeat",
+        "z_percent",
+        "x_percent",
+        "y_percent",
+        "z_mm",
+        "worst_mm",
+        "mean_z_percent",
+        "linear_z_percent",
+        "bound_z_percent",
+        "epochs_run",
+        "seconds",
+    ];
+    let of_cell = |cell: &CellResults| {
+        let settings = cell.cell.settings;
+        let row = |trial: &Trial| {
+            vec![
+                settings.source.sensor.scale.to_string().into(),
+                settings.hidden.into(),
+                settings.source.samples.into(),
+                settings.training.method.short_name().into(),
+                settings.training.stopping.epochs.into(),
+                Cell::Count(trial.seed.0),
+                (trial.repeat + 1).into(),
+                trial.errors.z_percent.into(),
+                trial.errors.x_percent.into(),
+                trial.errors.y_percent.into(),
+                trial.errors.z_mm.into(),
+                trial.errors.worst_mm.into(),
+                trial.baselines.mean.z_percent.into(),
+                trial.baselines.linear.z_percent.into(),
+                trial.bottleneck.z_percent.into(),
+                trial.epochs.into(),
+                trial.seconds.into(),
+            ]
+        };
+        cell.trials.iter().map(row).collect::<Vec<_>>()
+    };
+    Table {
+        columns: FIELDS.map(TableColumn::field).to_vec(),
+        rows: results.cells.iter().flat_map(of_cell).collect(),
     }
-    Ok(())
 }
 
 /// Writes table and verdicts as Markdown under `title`, with `conditions` between.
@@ -190,14 +226,9 @@ pub fn write_experiment_markdown(
     verdicts: &[Verdict],
     writer: &mut dyn Write,
 ) -> io::Result<()> {
-    let table = ExperimentTable::new(results);
-    writeln!(writer, "## {title}\n\n{conditions}\n")?;
-    writeln!(writer, "| {} |", table.headings.join(" | "))?;
-    writeln!(writer, "|{}", "---:|".repeat(table.headings.len()))?;
-    for row in &table.rows {
-        writeln!(writer, "| {} |", row.join(" | "))?;
-    }
-    writeln!(writer, "\n{}\n", ExperimentTable::NOTE)?;
+    let table = ExperimentTable::new(results).table().text(TableForm::Markdown);
+    writeln!(writer, "## {title}\n\n{conditions}\n\n{table}")?;
+    writeln!(writer, "{}\n", ExperimentTable::NOTE)?;
     for Verdict {
         claim,
         standing,
@@ -205,16 +236,6 @@ pub fn write_experiment_markdown(
     } in verdicts
     {
         writeln!(writer, "* {claim}: **{standing}**. {finding}")?;
-    }
-    Ok(())
-}
-
-fn write_fields<const N: usize>(values: [Option<f64>; N], writer: &mut dyn Write) -> io::Result<()> {
-    for value in values {
-        match value {
-            Some(value) => write!(writer, ",{value:?}")?,
-            None => write!(writer, ",")?,
-        }
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Files for later and for other programs: network files, checkpoints, CSV tables, figures (feature `figures`), and the
+//! Files for later and for other programs: network files, checkpoints, tables, figures and reports (feature `figures`), and the
 //! one way in which all of them are written: whole or not at all.
 
 mod atomic;
@@ -16,12 +16,16 @@ mod limited;
 mod network_document;
 mod network_file;
 mod old_run_list;
+#[cfg(feature = "figures")]
+pub mod report;
 mod run_folder;
 mod samples;
 mod sealed;
 mod soundness;
+mod table;
 mod tables;
-mod trade_file;
+#[cfg(feature = "figures")]
+mod trade_tables;
 mod unfinished;
 mod workload_words;
 
@@ -29,15 +33,17 @@ pub use crate::evaluation::format::{format_duration, format_number, format_perce
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};
-pub use experiment_tables::{ExperimentTable, write_cells, write_experiment_markdown, write_trials};
+pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::{NetworkFile, TrainingRecord};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
-pub use tables::{write_errors, write_loss_curves};
-pub use trade_file::write_trade_off;
+pub use table::{Cell, Table, TableColumn, TableForm};
+pub use tables::{decoder_table, error_table, write_loss_curves};
+#[cfg(feature = "figures")]
+pub use trade_tables::{trade_off_points, trade_off_summary};
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
 pub use workload_words::describe_workload;

@@ -1,25 +1,77 @@
 use std::io::{self, Write};
 
-use crate::{evaluation::ErrorRow, training::EpochRecord};
+use super::{Cell, Table, TableColumn};
+use crate::{
+    evaluation::{DecoderReport, ErrorRow, Errors},
+    training::EpochRecord,
+};
 
-/// Writes an error table as CSV. Numbers are written so that reading gives the same bits; where there is none the
-/// field is empty.
-///
-/// # Errors
-/// Any error of `writer`.
-pub fn write_errors(rows: &[ErrorRow], writer: &mut dyn Write) -> io::Result<()> {
-    writeln!(writer, "decoupler,{}", ErrorRow::COLUMNS.join(","))?;
-    for row in rows {
-        write!(writer, "{}", row.name)?;
-        for value in row.values() {
-            write_optional(value, writer)?;
-        }
-        writeln!(writer)?;
+/// The error table: for files all figures of [`ErrorRow`], for readers the same with units.
+pub fn error_table(rows: &[ErrorRow]) -> Table {
+    let words = [
+        ("Z", "%"),
+        ("X", "%"),
+        ("Y", "%"),
+        ("Z", "mm"),
+        ("Z", "% of the stroke"),
+        ("worst node", "mm"),
+    ];
+    let fields = ErrorRow::COLUMNS.into_iter().zip(words);
+    let figures = fields.map(|(field, (heading, unit))| TableColumn::new(field, heading, unit));
+    let row = |row: &ErrorRow| {
+        let values = row.values().into_iter().map(Cell::from);
+        std::iter::once(row.name.into()).chain(values).collect()
+    };
+    Table {
+        columns: std::iter::once(TableColumn::new("decoder", "Decoder", ""))
+            .chain(figures)
+            .collect(),
+        rows: rows.iter().map(row).collect(),
     }
-    Ok(())
 }
 
-/// Writes the errors of every epoch as CSV, in the manner of [`write_errors`].
+/// The table of decoders beside the Bayesian reference, if that is more than rounding.
+pub fn decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> Table {
+    let reference = reference.filter(|reference| !reference.is_rounding());
+    let row = |report: &DecoderReport| {
+        vec![
+            report.kind.name(report.precision).into(),
+            report.errors.z_percent.into(),
+            report.errors.z_mm.into(),
+            reference.and_then(|reference| report.errors.times(reference)).into(),
+            report.residual.into(),
+            report.cost.frame_us.into(),
+        ]
+    };
+    let of_reference = reference.map(|errors| {
+        let nothing = || Cell::Number(None);
+        vec![
+            "reference".into(),
+            errors.z_percent.into(),
+            errors.z_mm.into(),
+            1.0.into(),
+            nothing(),
+            nothing(),
+        ]
+    });
+    let mut table = Table {
+        columns: vec![
+            TableColumn::new("decoder", "Decoder", ""),
+            TableColumn::new("z_percent", "Z", "%"),
+            TableColumn::new("z_mm", "Z", "mm"),
+            TableColumn::new("times_reference", "times reference", ""),
+            TableColumn::new("residual", "residual", ""),
+            TableColumn::new("frame_us", "a frame", "µs"),
+        ],
+        rows: reports.iter().map(row).chain(of_reference).collect(),
+    };
+    if reference.is_none() {
+        table.remove_column("times_reference");
+    }
+    table
+}
+
+/// Writes the errors of every epoch as CSV, in the manner of [`Table::write_csv`].
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -69,7 +121,7 @@ mod tests {
             worst_mm: None,
         };
         let mut table = Vec::new();
-        write_errors(&[row], &mut table).unwrap();
+        error_table(&[row]).write_csv(&mut table).unwrap();
         assert_eq!(
             String::from_utf8(table).unwrap(),
             "decoupler,z_percent,x_percent,y_percent,z_mm,z_full_scale_percent,worst_mm\n\

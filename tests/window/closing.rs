@@ -155,7 +155,7 @@ fn a_file_under_way_is_finished_before_the_window_closes() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.open_form("Type a path for the error table");
+    driver.export("Error table, CSV");
     driver.type_into("File", &pipe.display().to_string());
     driver.click_button("Save");
     assert!(!close(&mut driver));

@@ -252,15 +252,16 @@ fn figures_of_the_paper_are_one_click() {
 
 #[test]
 fn pictures_in_view_are_saved_as_their_names_end() {
-    const SURFACES: &str = "Type a path for the picture of the surfaces";
-    const CHART: &str = "Type a path for the picture of the chart";
+    const CHART: &str = "Chart, SVG";
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
-    assert!(!driver.is_enabled(SURFACES), "nothing to save yet");
+    driver.open_menu();
+    assert!(!driver.is_enabled(CHART), "nothing to save yet");
+    driver.press(Key::Escape);
     driver.configure_small();
     driver.train();
     let at = |name: &str| folder.path().join(name);
-    driver.save(SURFACES, &at("a.png"));
+    driver.save("Surfaces, PNG", &at("a.png"));
     assert!(driver.says("Saved "), "{:#?}", driver.texts());
     driver.click("Dismiss");
     let tabs = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
@@ -286,7 +287,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
 fn saved_surfaces(driver: &mut Driver) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("surfaces.svg");
-    driver.save("Type a path for the picture of the surfaces", &path);
+    driver.save("Surfaces, SVG", &path);
     assert!(driver.says("Saved "), "{:#?}", driver.texts());
     driver.click("Dismiss");
     fs::read_to_string(path).unwrap()

@@ -48,7 +48,9 @@ fn what_a_network_has_to_beat_stands_there_before_a_training() {
     };
     assert_eq!(driver.table()[..20], pending(&driver));
     assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
-    assert!(!driver.is_enabled("Network…"), "there is nothing to export yet");
+    driver.open_menu();
+    assert!(!driver.is_enabled("ONNX, f64") && driver.says("Nothing is trained yet"));
+    driver.press(eframe::egui::Key::Escape);
 
     // Other samples to train on, the same to test on.
     driver.enter("Training samples", "200");

@@ -16,12 +16,16 @@ use crate::{
     driver::{Driver, small, table_of, trained},
 };
 
-const SAVE: &str = "Type a path for the checkpoint";
+const SAVE: &str = "Checkpoint, resumable";
 const OPEN: &str = "Type the path of a checkpoint";
 
 /// Types `path` into the form behind `button` and confirms.
 fn give_path(driver: &mut Driver, button: &str, path: &Path) {
-    driver.open_form(button);
+    if button == OPEN {
+        driver.open_form(button);
+    } else {
+        driver.export(button);
+    }
     driver.type_into("File", &path.display().to_string());
     driver.click_button(if button == OPEN { "Open" } else { "Save" });
 }
@@ -158,7 +162,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     driver.wait_for_epochs(20);
     driver.click("■ Stop");
     ended(&mut driver);
-    save(&mut driver, "Type a path for the network", &network);
+    save(&mut driver, "Network file, JSON", &network);
     let mut whole = stepped(momentum(1_000_000), driver.epochs());
     whole.stop();
     let mut expected = NetworkFile::from_run(&whole).unwrap();

@@ -139,7 +139,10 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     assert!(driver.has("12, Z % publ.: 2.28"), "{:#?}", driver.texts());
     assert!(driver.has("12, Z % median: –"), "{:#?}", driver.texts());
     assert!(driver.says("Press Run"));
-    assert!(!driver.is_enabled("Export") && !driver.is_enabled(OPEN));
+    assert!(!driver.is_enabled(OPEN));
+    driver.open_menu();
+    assert!(!driver.is_enabled("Figure, SVG") && driver.says("No trial has finished yet"));
+    driver.press(eframe::egui::Key::Escape);
     // What is typed is what would be filled in.
     driver.type_into("Hidden nodes", "12, 99");
     assert!(driver.has("99, Z % publ.: –"), "{:#?}", driver.texts());
@@ -222,12 +225,11 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     }
     driver.settle();
     for (button, name, expected) in [
-        ("Table as CSV…", "cells.csv", "array,hidden,samples"),
-        ("Every trial as CSV…", "trials.csv", "array,hidden,samples"),
-        ("Table and verdicts as Markdown…", "table.md", "## Sweep over two axes"),
+        ("Table, CSV", "cells.csv", "array,hidden,samples"),
+        ("Every trial, CSV", "trials.csv", "array,hidden,samples"),
+        ("Table and verdicts, Markdown", "table.md", "## Sweep over two axes"),
     ] {
         let path = folder.path().join(name);
-        driver.click("Export");
         driver.save(button, &path);
         assert!(driver.says("Saved "));
         driver.click("Dismiss");
@@ -235,11 +237,10 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
         assert!(text.starts_with(expected), "{text}");
     }
     for (button, name, expected) in [
-        ("Figure as SVG…", "map.svg", &b"<svg"[..]),
-        ("Figure as PNG…", "map.png", b"\x89PNG"),
+        ("Figure, SVG", "map.svg", &b"<svg"[..]),
+        ("Figure, PNG", "map.png", b"\x89PNG"),
     ] {
         let path = folder.path().join(name);
-        driver.click("Export");
         driver.save(button, &path);
         assert!(driver.says("Saved "));
         driver.click("Dismiss");

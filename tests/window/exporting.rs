@@ -6,13 +6,13 @@ use decoupler::{
     export::{NetworkFile, format_number},
     network::Networks,
 };
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{Key, Modifiers, OutputCommand};
 
 use crate::driver::{Driver, small, trained};
 
-const NETWORK: &str = "Type a path for the network";
-const ERRORS: &str = "Type a path for the error table";
-const LOSS: &str = "Type a path for the loss curves";
+const NETWORK: &str = "Network file, JSON";
+const ERRORS: &str = "Error table, CSV";
+const LOSS: &str = "Loss curves, CSV";
 
 fn trained_driver() -> Driver {
     let mut driver = Driver::open();
@@ -116,11 +116,11 @@ fn a_form_is_closed_without_writing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("errors.csv").display().to_string();
     let mut driver = trained_driver();
-    driver.open_form(ERRORS);
+    driver.export(ERRORS);
     driver.type_into("File", &path);
     driver.click_button("Cancel");
     assert!(!driver.has("File"));
-    driver.open_form(ERRORS);
+    driver.export(ERRORS);
     driver.type_into("File", &path);
     driver.press(Key::Escape);
     assert!(!driver.has("File"));
@@ -128,7 +128,7 @@ fn a_form_is_closed_without_writing() {
     assert!(driver.notice().is_none());
     assert!(names(folder.path()).is_empty());
 
-    driver.open_form(ERRORS);
+    driver.export(ERRORS);
     driver.type_into("File", "  ");
     assert!(!driver.is_enabled("Save"), "a file needs a name");
     let (phase, shown) = (driver.state().phase, driver.views().train.snapshot);
@@ -146,8 +146,8 @@ fn enter_saves_and_the_suggested_name_tells_runs_apart() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("loss.csv");
     let mut driver = trained_driver();
-    // Without a desktop the dialog's button opens the form too.
-    driver.click("Loss curves…");
+    // Without a desktop the form takes the place of the dialog.
+    driver.export(LOSS);
     let suggested = driver.get("File").value().unwrap();
     assert!(suggested.ends_with("loss-10x6_3x18-h6-lm-seed0.csv"), "{suggested}");
     driver.settle();
@@ -171,7 +171,7 @@ fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
     driver.harness().run_steps(60);
     assert!(driver.says("does not exist"), "a failure waits for the user");
     let path = folder.path().join("network.json");
-    driver.open_form(NETWORK);
+    driver.export(NETWORK);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the file", |driver| driver.says("Saved "));
@@ -179,4 +179,141 @@ fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
     driver.harness().run_steps(60);
     assert_eq!(driver.notice(), None);
     assert!(driver.comes_to_rest());
+}
+
+#[test]
+fn every_network_format_leaves_in_three_clicks_read_back_and_with_its_deviation() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = trained_driver();
+    let bundles = [
+        ("ONNX, f64", "network.onnx"),
+        ("ONNX, f32", "network.onnx"),
+        ("C99, f64", "c99_f64_decode.c"),
+        ("C99, f32", "c99_f32_decode.c"),
+        ("C99, fixed16", "c99_fixed16_decode.c"),
+        ("MATLAB/Octave, f64", "matlab_octave_f64_decode.m"),
+        ("NumPy, f64", "network.npz"),
+        ("NumPy, f32", "decode.py"),
+    ];
+    for (name, file) in bundles {
+        let path = folder
+            .path()
+            .join(name.to_lowercase().replace(", ", "_").replace('/', "_"));
+        driver.save(name, &path);
+        let (format, _) = name.split_once(", ").unwrap();
+        let told = format!("{format} written and read back: largest deviation ");
+        assert!(driver.says(&told), "{:#?}", driver.texts());
+        assert!(driver.says(&path.display().to_string()));
+        let found = names(&path);
+        for expected in [file, "README.txt", "golden.csv", "metadata.json"] {
+            assert!(found.iter().any(|name| name == expected), "{name}: {found:?}");
+        }
+        driver.click("Dismiss");
+    }
+    // The bundle knows the network of the run: its golden answers are those of the library.
+    let metadata = fs::read_to_string(folder.path().join("onnx_f64/metadata.json")).unwrap();
+    assert!(metadata.contains("10×6_3×18"), "{metadata}");
+    let taken = folder.path().join("onnx_f64");
+    driver.save("ONNX, f64", &taken);
+    assert!(driver.says("is there already"), "{:#?}", driver.texts());
+}
+
+#[test]
+fn tables_are_copied_as_they_are_shown() {
+    let mut driver = trained_driver();
+    let shown = driver.table();
+    for form in ["Markdown", "LaTeX", "tab-separated"] {
+        driver.open_menu();
+        let name = format!("Copy error table as {form}");
+        driver.get(&name).click();
+        let mut copied = None;
+        for _ in 0..3 {
+            driver.harness().step();
+            let commands = &driver.harness().output().platform_output.commands;
+            copied = copied.or(commands.iter().find_map(|command| match command {
+                OutputCommand::CopyText(text) => Some(text.clone()),
+                _ => None,
+            }));
+        }
+        let copied = copied.unwrap_or_else(|| panic!("{name} copied nothing"));
+        let line = copied.lines().find(|line| line.contains("network")).unwrap();
+        let cell = |column: &str| {
+            let name = format!("network, {column}: ");
+            shown.iter().find_map(|cell| cell.strip_prefix(&name)).unwrap()
+        };
+        let (percent, mm) = (cell("Z %"), cell("mm"));
+        match form {
+            "tab-separated" => {
+                let error = driver.state().result().unwrap().errors;
+                let cells: Vec<&str> = line.split('\t').collect();
+                assert_eq!(cells[1].parse(), Ok(error.z_percent.unwrap()));
+                assert_eq!(cells[4].parse(), Ok(error.z_mm));
+            }
+            _ => assert!(
+                line.contains(&format!(" {percent} ")) && line.contains(&format!(" {mm} ")),
+                "{line}"
+            ),
+        }
+        assert!(
+            driver.has(&format!("Copied the error table as {form}")),
+            "{:#?}",
+            driver.texts()
+        );
+        driver.click("Dismiss");
+    }
+}
+
+#[test]
+fn the_menu_says_of_each_view_why_nothing_can_leave_yet() {
+    let mut driver = Driver::open();
+    for (view, name, reason) in [
+        ("Train", "Report, HTML", "Nothing is trained yet: press Train first."),
+        (
+            "Experiments",
+            "Copy table as LaTeX",
+            "No trial has finished yet: press Run first.",
+        ),
+        (
+            "Compare",
+            "A: ONNX, f64",
+            "No run is chosen as A: choose one in the list.",
+        ),
+        (
+            "Trade-off",
+            "All points, CSV",
+            "No point is measured yet: press Measure first.",
+        ),
+    ] {
+        driver.click_button(view);
+        driver.settle();
+        driver.open_menu();
+        assert!(!driver.is_enabled(name), "{view}");
+        assert!(driver.has(reason), "{view}: {:#?}", driver.texts());
+        driver.press(Key::Escape);
+        assert!(!driver.has(reason), "{view}: the menu is closed");
+    }
+}
+
+#[test]
+fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = trained_driver();
+    let report = folder.path().join("report.html");
+    driver.save("Report, HTML", &report);
+    driver.click("Dismiss");
+    let html = fs::read_to_string(&report).unwrap();
+    for cell in driver.table() {
+        let (_, value) = cell.rsplit_once(": ").unwrap();
+        assert!(html.contains(&format!("<td>{value}</td>")), "{cell}");
+    }
+    driver.click_button("Compare");
+    let name = driver.state().runs.workspace.runs[0].name.clone();
+    driver.click(&format!("{name} as A"));
+    driver.wait("the run", |driver| driver.state().runs.pinned(0).is_some());
+    let [network, of_kept] = ["network.json", "kept.html"].map(|name| folder.path().join(name));
+    driver.save("A: Network file, JSON", &network);
+    driver.click("Dismiss");
+    driver.save("A: Report, HTML", &of_kept);
+    assert_eq!(NetworkFile::load(&network).unwrap().settings, small());
+    assert!(fs::read_to_string(of_kept).unwrap().contains(&format!("<h1>{name}: ")));
 }

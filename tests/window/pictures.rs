@@ -76,7 +76,9 @@ fn album(size: Vec2, is_dark: bool) {
     }
     album.take("9-hover");
     album.driver.harness().remove_cursor();
-    album.driver.click("Type a path for the network");
+    album.driver.open_menu();
+    album.take("10-menu");
+    album.driver.export("Network file, JSON");
     album.take("10-save");
     album.driver.type_into("File", "/nowhere/network.json");
     album.driver.click_button("Save");

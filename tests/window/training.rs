@@ -146,7 +146,7 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
     // What the training thread knows once it has answered what came after Pause.
     let folder = tempfile::tempdir().unwrap();
     let curves = folder.path().join("curves.csv");
-    driver.save("Type a path for the loss curves", &curves);
+    driver.save("Loss curves, CSV", &curves);
     let lines = fs::read_to_string(curves).unwrap().lines().count();
     assert_eq!(
         (driver.epochs(), lines),

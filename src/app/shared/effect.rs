@@ -26,6 +26,13 @@ pub enum Effect {
     ChooseFile(FileTask),
     /// Ask for the path in the window itself.
     TypePath(FileTask),
+    /// Put this text on the clipboard, and tell so.
+    Copy {
+        /// The text.
+        text: String,
+        /// What the user is told.
+        notice: String,
+    },
     /// Call the kept run with this number so.
     RenameRun(u64, String),
     /// Show the kept run with this number in one of the two places, or nothing.

@@ -2,11 +2,12 @@
 //! that a view may ask for.
 
 mod effect;
+mod export;
 mod file_task;
 mod look;
+mod network_exports;
 mod notice;
 mod offers;
-mod picture_file;
 mod run_list;
 mod run_view;
 mod state;
@@ -15,11 +16,12 @@ mod view;
 
 pub use super::training_worker::RunResult;
 pub use effect::Effect;
-pub use file_task::{FileTask, FileWords, Purpose};
+pub use export::{Ask, Export, ExportGroup, copy_exports, csv_export, picture_exports};
+pub use file_task::{Contents, FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
+pub use network_exports::{NetworkSource, file_stem, network_exports};
 pub use notice::{Matter, Notice};
 pub use offers::{Action, Offers};
-pub use picture_file::{CHART, SURFACES, export_pictures_ui};
 pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;
 pub use state::{Phase, Preview, Shared};

@@ -18,6 +18,8 @@ pub enum Matter {
     Preview,
     /// A file that the user has saved.
     File,
+    /// What was copied.
+    Clipboard,
     /// The run list.
     RunList,
     /// The view with the paper's tables and sweeps.

@@ -2,7 +2,7 @@ use std::fmt::Debug;
 
 use eframe::egui::Ui;
 
-use super::{Effect, Offers, Shared, training_status_ui};
+use super::{Effect, Export, Offers, Shared, training_status_ui};
 use crate::app::theme::space;
 
 /// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
@@ -35,6 +35,12 @@ pub trait View: Debug {
 
     /// Its tools at the right of the top bar, from right to left.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Returns everything that it can hand out, and what it cannot now with the reason. The order is that of the menu;
+    /// forms of one thing follow each other.
+    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+        Vec::new()
+    }
 
     /// Its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);

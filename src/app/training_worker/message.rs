@@ -1,9 +1,9 @@
 use std::{
-    path::{Path, PathBuf},
+    fmt,
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
-        mpsc::Sender,
     },
     time::Duration,
 };
@@ -38,8 +38,8 @@ pub enum Request {
     Resume,
     /// End the training; its network stays.
     Stop,
-    /// Write a file about this training, so long as no other has taken its place, and tell here how that went.
-    Export(RunId, WriteRun, PathBuf, Sender<Result<(), String>>),
+    /// Look at this training, so long as no other has taken its place.
+    Inspect(RunId, Inspection),
 }
 
 /// Message of the worker to the window.
@@ -61,8 +61,28 @@ pub enum Event {
     Died(Option<JobError>),
 }
 
-/// Writes a file about a training, or says why not.
-pub type WriteRun = fn(&Run, &Path) -> Result<(), String>;
+/// Takes what it needs from a training, or is told why that is not there.
+pub struct Inspection(Box<Inspect>);
+
+type Inspect = dyn FnOnce(Result<&Run, &str>) + Send;
+
+impl Inspection {
+    /// Runs `inspect` on the worker's thread.
+    pub fn new(inspect: impl FnOnce(Result<&Run, &str>) + Send + 'static) -> Self {
+        Self(Box::new(inspect))
+    }
+
+    /// Looks at `run`.
+    pub(super) fn inspect(self, run: Result<&Run, &str>) {
+        (self.0)(run);
+    }
+}
+
+impl fmt::Debug for Inspection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Inspection")
+    }
+}
 
 /// Tells trainings apart, also those of a worker that died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

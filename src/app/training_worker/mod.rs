@@ -7,5 +7,5 @@ mod message;
 mod training_loop;
 
 pub use handle::Worker;
-pub use message::{Began, Event, Progress, Request, RunId, RunResult, WriteRun, append_epochs};
+pub use message::{Began, Event, Inspection, Progress, Request, RunId, RunResult, append_epochs};
 pub use training_loop::LOST;

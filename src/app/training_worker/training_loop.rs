@@ -114,16 +114,12 @@ impl<'a> TrainingLoop<'a> {
                     self.report_progress();
                 }
             }
-            Request::Export(id, write, path, answer) => {
-                let result = match &self.run {
-                    Some(run) if self.id == Some(id) => write(run, &path),
-                    Some(_) => Err(REPLACED.to_owned()),
-                    // The window offers no export before a training, so there was one.
-                    None => Err(LOST.to_owned()),
-                };
-                // Who asked waits for it.
-                let _ = answer.send(result);
-            }
+            Request::Inspect(id, inspection) => inspection.inspect(match &self.run {
+                Some(run) if self.id == Some(id) => Ok(run),
+                Some(_) => Err(REPLACED),
+                // The window offers no export before a training, so there was one.
+                None => Err(LOST),
+            }),
         }
     }
 

@@ -22,7 +22,7 @@ use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, trade_off::TradeOffView,
     train::TrainView,
 };
-pub(super) use train::ExportKind;
+pub(super) use train::{CHECKPOINT, checkpoint_task};
 
 /// All views.
 #[derive(Debug)]

@@ -37,8 +37,20 @@ impl DecouplerWindow {
     pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
         // A question is to be answered first.
         let hears_keys = self.saving.is_none() && self.closing.is_none() && matches!(self.overlay, Overlay::None);
+        let is_listed = self.picked.is_some() || matches!(self.overlay, Overlay::Palette(_));
         let mut offers = Offers::new(ctx, self.picked.take(), hears_keys);
         self.views.all()[self.shown].offer_actions(&mut offers, &self.shared, effects);
+        // These have no keys, and take longer to list.
+        if is_listed {
+            for export in self.views.all()[self.shown].exports(&self.shared) {
+                let name = format!("Export {}", export.label());
+                if offers.offer(name, export.ask.is_ok())
+                    && let Ok(ask) = export.ask
+                {
+                    effects.push(ask());
+                }
+            }
+        }
         self.offer_undoing(&mut offers);
         for (place, name) in self.names.clone() {
             let is_other = place != self.shown;

@@ -7,10 +7,10 @@ use super::{DecouplerWindow, closing::Closing, remembered::is_within_limits, sav
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileTask, Matter, Phase, Purpose},
+        shared::{Effect, FileTask, Matter, Notice, Phase, Purpose},
         theme,
-        training_worker::{LOST, Request, Worker},
-        views::ExportKind,
+        training_worker::{Inspection, LOST, Request, Worker},
+        views::CHECKPOINT,
     },
     evaluation::SimulatedSettings,
 };
@@ -63,6 +63,10 @@ impl DecouplerWindow {
                 }
             }
             Effect::TypePath(task) => self.type_path(task),
+            Effect::Copy { text, notice } => {
+                self.ctx.copy_text(text);
+                self.notices.tell(Matter::Clipboard, Notice::Done(notice));
+            }
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
@@ -110,16 +114,23 @@ impl DecouplerWindow {
 
     /// Does with the file in `path` what it was asked for.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
-        let is_checkpoint = task.words == ExportKind::Checkpoint.words();
+        let is_checkpoint = task.words == CHECKPOINT;
         if is_checkpoint && self.closing == Some(Closing::ChoosingPath) {
             self.closing = Some(Closing::Finishing);
         }
         match task.purpose {
-            Purpose::SaveTraining(run, write) => {
-                let (send, written) = channel();
-                self.worker.ask(Request::Export(run, write, path.clone(), send));
-                self.files
-                    .write(path, move |_| written.recv().unwrap_or_else(|_| Err(LOST.to_owned())));
+            Purpose::SaveTraining(run, contents) => {
+                let (send, taken) = channel();
+                let inspection = Inspection::new(move |run| {
+                    let taken = run.map_err(str::to_owned).and_then(|run| contents.take(run));
+                    // Who asked waits for it.
+                    let _ = send.send(taken);
+                });
+                self.worker.ask(Request::Inspect(run, inspection));
+                self.files.write(path, move |path| {
+                    let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
+                    taken?.write(path)
+                });
             }
             Purpose::Save(contents) => self.files.write(path, move |path| contents.write(path)),
             // A training may have begun while the desktop's dialog was open.

@@ -4,7 +4,7 @@ use super::DecouplerWindow;
 use crate::app::{
     shared::{Effect, Phase},
     theme::{semibold, space, type_size},
-    views::ExportKind,
+    views::checkpoint_task,
     widgets::{ghost_button, primary_button},
 };
 
@@ -114,7 +114,7 @@ impl DecouplerWindow {
         let Some(closing) = chosen else { return };
         self.closing = closing;
         if let (Some(Closing::ChoosingPath), Some(run)) = (closing, &self.shared.run) {
-            self.apply(Effect::ChooseFile(ExportKind::Checkpoint.task(run)));
+            self.apply(Effect::ChooseFile(checkpoint_task(run)));
         }
         ui.request_repaint();
     }

@@ -7,6 +7,7 @@ use super::{
     closing::Closing,
     columns::{edge_ui, widths_points},
     dialogs::{DialogKind, Dialogs},
+    export_menu::export_menu_ui,
     files::Files,
     frames::changes_something,
     memory::Memory,
@@ -153,6 +154,7 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, &self.names, self.shown, &actions, |ui| {
+                    export_menu_ui(ui, || view.exports(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
                 })
             });
@@ -248,15 +250,12 @@ impl DecouplerWindow {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::{
         app::{
-            shared::{FileTask, FileWords, Purpose},
+            shared::{Contents, FileTask, FileWords},
             test_view::TestView,
         },
-        evaluation::Run,
         export::NetworkFile,
     };
 
@@ -280,20 +279,16 @@ mod tests {
 
     /// Returns the task of saving the network on show.
     fn save_task(window: &DecouplerWindow) -> FileTask {
-        let write = |run: &Run, path: &Path| {
-            let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
-            file.save(path).map_err(|error| error.to_string())
+        let words = FileWords {
+            kind: "network",
+            description: "",
+            extensions: &["json"],
         };
-        FileTask {
-            words: FileWords {
-                name: "Network…",
-                kind: "network",
-                description: "",
-                extensions: &["json"],
-            },
-            suggestion: "network.json".to_owned(),
-            purpose: Purpose::SaveTraining(window.shared.run.as_ref().unwrap().id, write),
-        }
+        let run = window.shared.run.as_ref().unwrap().id;
+        FileTask::save_run(words, "network", run, |run| {
+            let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
+            Ok(Contents::new(move |path| file.save(path)))
+        })
     }
 
     /// Takes news until `holds`; at most a minute.

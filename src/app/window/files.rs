@@ -12,8 +12,8 @@ use crate::app::job::{Job, JobError, Wake};
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// Result of writing a file, unless the thread failed.
-type Written = Result<Result<(), String>, JobError>;
+/// What the user is told of a file, or why it was not written, unless the thread failed.
+type Written = Result<Result<String, String>, JobError>;
 
 /// Files that are being written.
 pub struct Files {
@@ -30,8 +30,12 @@ impl Files {
         }
     }
 
-    /// Writes the file `path` in the background.
-    pub fn write<X: Display>(&mut self, path: PathBuf, write: impl FnOnce(&Path) -> Result<(), X> + Send + 'static) {
+    /// Writes the file `path` in the background. `write` returns what the user is told then.
+    pub fn write<X: Display>(
+        &mut self,
+        path: PathBuf,
+        write: impl FnOnce(&Path) -> Result<String, X> + Send + 'static,
+    ) {
         let mut job = Job::prompt("file", Arc::clone(&self.wake));
         let target = path.clone();
         job.start(
@@ -41,13 +45,13 @@ impl Files {
         self.under_way.push((path, job));
     }
 
-    /// The next file that is there, or why it is not.
-    pub fn next_written(&mut self) -> Option<Result<PathBuf, String>> {
+    /// What the user is told of the next file that is there, or why it is not.
+    pub fn next_written(&mut self) -> Option<Result<String, String>> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, written) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
         let (path, _) = self.under_way.remove(number);
         Some(match written {
-            Ok(written) => written.map(|()| path),
+            Ok(written) => written,
             Err(error) => Err(format!("cannot write '{}': {error}", path.display())),
         })
     }
@@ -85,9 +89,12 @@ mod tests {
         let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
         let folder = tempfile::tempdir().unwrap();
         let [whole, broken, missing] = ["whole", "broken", "none/missing"].map(|name| folder.path().join(name));
-        files.write(whole.clone(), |path| fs::write(path, "text"));
-        files.write(broken.clone(), |_| -> Result<(), WriteError> { panic!("a defect") });
-        files.write(missing, |path| crate::export::atomic_write(path, |_| Ok(())));
+        let told = "it is there".to_owned();
+        files.write(whole, move |path| fs::write(path, "text").map(|()| told));
+        files.write(broken.clone(), |_| -> Result<String, WriteError> { panic!("a defect") });
+        files.write(missing, |path| {
+            crate::export::atomic_write(path, |_| Ok(())).map(|()| String::new())
+        });
         assert_eq!(files.paths().count(), 3);
         let mut told = Vec::new();
         while told.len() < 3 {
@@ -95,8 +102,8 @@ mod tests {
             told.extend(std::iter::from_fn(|| files.next_written()));
         }
         assert_eq!(files.paths().count(), 0);
-        let has = |wanted: &dyn Fn(&Result<PathBuf, String>) -> bool| told.iter().any(wanted);
-        assert!(has(&|told| told.as_ref() == Ok(&whole)));
+        let has = |wanted: &dyn Fn(&Result<String, String>) -> bool| told.iter().any(wanted);
+        assert!(has(&|told| told.as_deref() == Ok("it is there")));
         assert!(has(&|told| told
             .as_ref()
             .is_err_and(|reason| reason.contains("does not exist"))));
@@ -117,7 +124,7 @@ mod tests {
         files.write(path.clone(), move |path| {
             begun.send(()).unwrap();
             opened.recv().unwrap();
-            fs::write(path, "text")
+            fs::write(path, "text").map(|()| String::new())
         });
         has_begun.recv().unwrap();
         gate.send(()).unwrap();

@@ -1,5 +1,3 @@
-use std::path::PathBuf;
-
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set},
@@ -54,11 +52,11 @@ impl DecouplerWindow {
         self.ask_for_what_is_missing();
     }
 
-    fn tell_written(&mut self, written: Result<PathBuf, String>) {
+    fn tell_written(&mut self, written: Result<String, String>) {
         let notice = match written {
-            Ok(path) => {
+            Ok(told) => {
                 self.typed = None;
-                Notice::Done(format!("Saved {}", path.display()))
+                Notice::Done(told)
             }
             Err(reason) => {
                 // The user has to see this.

@@ -276,6 +276,6 @@ fn stroke_style(stroke: Stroke) -> String {
     format!(r#"stroke="{colour}" stroke-width="{width}"{dashes}"#)
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

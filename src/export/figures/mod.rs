@@ -6,6 +6,7 @@
 mod canvas;
 mod colour_bar;
 mod colours;
+mod dark;
 mod frame;
 mod heat_map;
 mod legend;
@@ -14,6 +15,7 @@ mod plot;
 mod plot_figure;
 mod surfaces;
 
+pub(crate) use dark::dark_style;
 pub use picture::{Picture, PictureError, PictureFormat};
 
 use crate::figure::Figure;

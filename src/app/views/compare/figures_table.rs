@@ -5,11 +5,11 @@ use eframe::egui::Ui;
 use super::scene_words::{inputs_words, loading_words, movement_words, noise_words, rows_words};
 use crate::{
     app::{
-        shared::RunList,
+        shared::{PLACES, RunList},
         theme::Theme,
-        widgets::{Column, Row, table_ui},
+        widgets::{Column, Row, fields::capitalised, table_ui},
     },
-    export::{KeptRun, format_duration, format_number},
+    export::{KeptRun, Table, TableColumn, format_duration, format_number},
 };
 
 const COLUMNS: [Column; 2] = [
@@ -61,6 +61,22 @@ const FIGURES: [(&str, FigureOf); 18] = [
         time.map_or_else(|_| format_number(None), format_duration)
     }),
 ];
+
+/// The same figures for other documents, under the names of the runs.
+pub fn compared_table(runs: &RunList) -> Table {
+    let name = |place: usize| {
+        let run = runs.pinned(place).map_or("", |run| &run.name);
+        TableColumn::field(format!("{}: {run}", PLACES[place]))
+    };
+    let row = |(name, figure): &(&'static str, FigureOf)| {
+        let cell = |place| runs.pinned(place).map_or_else(|| format_number(None), figure);
+        vec![capitalised(name).into(), cell(0).into(), cell(1).into()]
+    };
+    Table {
+        columns: vec![TableColumn::field("Figure"), name(0), name(1)],
+        rows: FIGURES.iter().map(row).collect(),
+    }
+}
 
 /// Errors, configuration and cost of both runs.
 pub fn figures_ui(ui: &mut Ui, runs: &RunList) {

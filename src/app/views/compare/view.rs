@@ -1,16 +1,16 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
-use super::{CompareView, Compared, figures_table::figures_ui, list::run_list_ui};
+use super::{CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui};
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Look, PLACES, RightCard, RunList, Shared, View, export_pictures_ui},
+        shared::{Effect, Export, Look, PLACES, RightCard, RunList, Shared, View},
         surface_view::{ColourBar, SurfaceView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
     },
     figure::{
-        Figure, PlotFigure, compared_losses_figure,
+        PlotFigure, compared_losses_figure,
         surface::{Surface, SurfaceFigure, ViewMode},
     },
 };
@@ -28,6 +28,10 @@ impl View for CompareView {
         if let Some(snapshot) = snapshot_ui(ui, self.snapshot, self.snapshots()) {
             self.show_snapshot(snapshot);
         }
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        compare_exports(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -68,14 +72,6 @@ impl View for CompareView {
             scrolled_ui(ui, "compared figures", |ui| {
                 section_heading_ui(ui, "Errors on the test sets");
                 figures_ui(ui, &shared.runs);
-                let surfaces = (!figure.surfaces.is_empty()).then(|| figure.into());
-                let losses = losses.map(Figure::from);
-                export_pictures_ui(
-                    ui,
-                    (surfaces, "compared-surfaces.png"),
-                    (losses, "compared-loss.png"),
-                    effects,
-                );
             });
         });
         ui.allocate_rect(whole, Sense::hover());
@@ -84,7 +80,7 @@ impl View for CompareView {
 
 impl CompareView {
     /// The surfaces of the runs that are prepared, with one scale.
-    fn figure(&self, shared: &Shared) -> SurfaceFigure {
+    pub(super) fn figure(&self, shared: &Shared) -> SurfaceFigure {
         let look = shared.look;
         let surface = |place: usize| {
             let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
@@ -169,7 +165,7 @@ fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, look: Look, effects:
 }
 
 /// The errors of each epoch of the runs that are chosen.
-fn losses(runs: &RunList) -> Option<PlotFigure> {
+pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
     let [a, b] = [0, 1].map(|place| {
         let run = runs.pinned(place)?;
         Some((format!("{}: {}", PLACES[place], run.name), &*run.file.training.history))

@@ -2,7 +2,7 @@
 //! window stays free.
 
 mod axis_form;
-mod file;
+mod exports;
 mod form;
 mod heat_map;
 mod open_cell;

@@ -1,10 +1,6 @@
-use std::sync::Arc;
+use eframe::egui::{Align, FontId, Label, Layout, RichText, Ui, Vec2, vec2};
 
-use eframe::egui::{
-    Align, FontId, Label, Layout, RichText, TextWrapMode, Ui, Vec2, containers::menu::MenuButton, vec2,
-};
-
-use super::{ExperimentLook, Outcome, Topic, file::ExperimentFile, open_cell::open_cell, table::table_ui};
+use super::{ExperimentLook, Outcome, Topic, open_cell::open_cell, table::table_ui};
 use crate::{
     app::{
         shared::{Effect, Shared},
@@ -17,7 +13,7 @@ use crate::{
 /// Margins of a card, both sides together.
 const MARGINS: f32 = 24.0;
 
-/// Title, how it was made, files, and the table.
+/// Title, how it was made, and the table.
 pub fn results_card_ui(
     ui: &mut Ui,
     (topic, outcome): (Topic, &Outcome),
@@ -28,7 +24,6 @@ pub fn results_card_ui(
     let dim = Theme::of(ui).palette.dim;
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            export_ui(ui, topic, outcome, effects);
             open_ui(ui, outcome, look.marked, shared, effects);
             let heading = RichText::new(topic.heading()).font(semibold(type_size().title));
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -65,24 +60,6 @@ fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
     ui.painter()
         .layout(text, FontId::proportional(size), colour, width)
         .size()
-}
-
-fn export_ui(ui: &mut Ui, topic: Topic, outcome: &Outcome, effects: &mut Vec<Effect>) {
-    let has_figures = outcome.trials().0 > 0;
-    ui.add_enabled_ui(has_figures, |ui| {
-        let button = MenuButton::from_button(ghost_button("Export"));
-        let (button, _) = button.ui(ui, |ui| {
-            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
-            for file in ExperimentFile::ALL {
-                let words = file.words();
-                if ui.button(words.name).on_hover_text(words.description).clicked() {
-                    let results = Arc::clone(&outcome.results);
-                    effects.push(Effect::ChooseFile(file.task(topic, results)));
-                }
-            }
-        });
-        button.on_disabled_hover_text("Nothing to export yet: no trial has finished");
-    });
 }
 
 /// Takes the marked cell to the Train view.

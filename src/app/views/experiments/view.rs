@@ -4,6 +4,7 @@ use eframe::egui::{Key, Modifiers, Sense, Ui};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
+    exports::experiment_exports,
     heat_map::sweep_ui,
     panel,
     results_card::{results_card_height, results_card_ui},
@@ -14,7 +15,7 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
-        shared::{Effect, Matter, Notice, Offers, Shared, View},
+        shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
         theme::space,
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui},
     },
@@ -63,6 +64,10 @@ impl View for ExperimentsView {
         ) {
             self.cancel();
         }
+    }
+
+    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+        experiment_exports(self)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

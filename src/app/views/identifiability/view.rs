@@ -6,7 +6,7 @@ use super::{Analysis, IdentifiabilityView, facts::facts_ui, form};
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Look, Shared, View, export_pictures_ui},
+        shared::{Effect, Export, Look, Shared, View, picture_exports},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
@@ -14,7 +14,7 @@ use crate::{
     },
     export::format_number,
     figure::{
-        singular_values_figure,
+        Figure, PlotFigure, singular_values_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
@@ -44,6 +44,22 @@ impl View for IdentifiabilityView {
                 Err(reason) => self.problem = Some(reason),
             }
         }
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        let analysis = self.analysis.as_ref();
+        let analysis = analysis.ok_or_else(|| match &self.problem {
+            Some(problem) => problem.clone(),
+            None => "The singular values are still being computed.".to_owned(),
+        });
+        let surfaces = analysis.clone().map(|analysis| {
+            let place = self.place_of_axis(analysis.question.scene.movement.axes());
+            move || Figure::from(identifiability_figure(self, analysis, place, shared.look))
+        });
+        let values = analysis.map(|analysis| || Figure::from(singular_values(analysis)));
+        let surfaces = picture_exports("Surfaces", "identifiability".to_owned(), surfaces);
+        let values = picture_exports("Singular values", "singular-values".to_owned(), values);
+        surfaces.chain(values).collect()
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -90,9 +106,8 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
-    let singular_values = singular_values_figure(&analysis.rows, analysis.worst, analysis.hidden_below_per_mm());
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        titled_plots_ui(ui, "Singular values", &singular_values);
+        titled_plots_ui(ui, "Singular values", &singular_values(analysis));
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "identifiability facts", |ui| {
@@ -100,16 +115,14 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
                 note_ui(ui, problem);
             }
             facts_ui(ui, analysis);
-            export_pictures_ui(
-                ui,
-                (Some(figure.into()), "identifiability.png"),
-                (Some(singular_values.into()), "singular-values.png"),
-                effects,
-            );
         });
     });
     ui.allocate_rect(whole, Sense::hover());
     (shown.axis, shown.node) = pointed;
+}
+
+fn singular_values(analysis: &Analysis) -> PlotFigure {
+    singular_values_figure(&analysis.rows, analysis.worst, analysis.hidden_below_per_mm())
 }
 
 /// From no sensitivity to the largest of any axis.

@@ -3,7 +3,7 @@
 
 mod chart;
 mod choices;
-mod file;
+mod exports;
 mod form;
 mod names;
 mod panel;

@@ -1,19 +1,17 @@
 use std::time::Instant;
 
-use eframe::egui::{
-    Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, TextWrapMode, Ui, containers::menu::MenuButton,
-};
+use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, Ui};
 
 use super::{
     TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
-    file::TradeOffFile, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
+    exports::trade_off_exports, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
 };
 use crate::{
     app::{
         plotting::legend_ui,
-        shared::{Effect, Matter, Notice, Offers, Shared, View},
+        shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
+        widgets::{card_ui, dim_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_duration,
     figure::trade_off_figure,
@@ -63,6 +61,10 @@ impl View for TradeOffView {
         }
     }
 
+    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+        trade_off_exports(self)
+    }
+
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         panel::form_ui(ui, self, shared, effects);
     }
@@ -95,7 +97,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
     let lower_height = (0.38 * whole.height()).clamp(space(50), space(85));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
     card_ui(ui, upper.with_max_y(upper.max.y - gap), |ui| {
-        head_ui(ui, outcome, &mut look, effects);
+        head_ui(ui, outcome, &mut look);
         if level.points.is_empty() {
             placeholder_ui(ui, waiting(trade.running.is_some()));
             return;
@@ -125,12 +127,11 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut
     }
 }
 
-fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook, effects: &mut Vec<Effect>) {
+fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            export_ui(ui, outcome, look, effects);
             level_ui(ui, outcome, look);
         });
     });
@@ -162,22 +163,6 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
         (look.level, look.marked) = (level, None);
     }
     dim_ui(ui, "Noise");
-}
-
-fn export_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &TradeOffLook, effects: &mut Vec<Effect>) {
-    ui.add_enabled_ui(outcome.points().0 > 0, |ui| {
-        let button = MenuButton::from_button(ghost_button("Export"));
-        let (button, _) = button.ui(ui, |ui| {
-            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
-            for file in TradeOffFile::ALL {
-                let words = file.words();
-                if ui.button(words.name).on_hover_text(words.description).clicked() {
-                    effects.push(Effect::ChooseFile(file.task(outcome.levels.clone(), look)));
-                }
-            }
-        });
-        button.on_disabled_hover_text("Nothing to export yet: no point has been measured");
-    });
 }
 
 /// Returns the hint shown while a noise level has no points.

@@ -3,12 +3,13 @@ use eframe::egui::{Key, Modifiers, Ui};
 use super::{
     TrainView,
     configuration::configuration_ui,
+    exports::train_exports,
     report,
     run_buttons::run_buttons_ui,
     workbench::{WorkbenchLayout, workbench_ui},
 };
 use crate::app::{
-    shared::{Columns, Effect, Offers, Phase, Shared, View},
+    shared::{Columns, Effect, Export, Offers, Phase, Shared, View},
     theme::space,
     widgets::snapshot_ui,
 };
@@ -71,6 +72,10 @@ impl View for TrainView {
         ui.add_space(space(4));
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
         self.snapshot = snapshot_ui(ui, self.snapshot, snapshots).unwrap_or(self.snapshot);
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        train_exports(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

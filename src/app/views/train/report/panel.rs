@@ -5,12 +5,11 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        shared::{Effect, FileTask, FileWords, Phase, Purpose, RunResult, RunView, Shared},
+        shared::{Effect, Phase, RunResult, RunView, Shared},
         theme::{Theme, space, type_size},
         views::train::{
             decoders::{REFERENCE, decoders_ui},
-            export_kind::{ExportKind, OPEN_CHECKPOINT, file_name},
-            shown_figure::ShownPicture,
+            exports::open_task,
             state::TrainView,
         },
         widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
@@ -19,7 +18,7 @@ use crate::{
     export::{format_duration, format_number},
 };
 
-/// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
+/// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         section_heading_ui(ui, "Errors on the test set");
@@ -41,33 +40,9 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         } else {
             expectation_ui(ui, shared);
         }
-        section_heading_ui(ui, "Export");
-        for kind in ExportKind::ALL {
-            // A training under way is held first.
-            let is_standing = kind != ExportKind::Checkpoint || matches!(shared.phase, Phase::Paused | Phase::Ended(_));
-            let run = shown.map(|(run, _)| run).filter(|_| is_standing);
-            ui.add_enabled_ui(run.is_some(), |ui| {
-                file_ui(ui, kind.words(), false, || run.map(|run| kind.task(run)), effects);
-            });
-        }
-        for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
-            ui.add_enabled_ui(shown.is_some(), |ui| {
-                file_ui(ui, picture.words(), false, || picture.task(view, shared), effects);
-            });
-        }
         section_heading_ui(ui, "Open");
         let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
-        ui.add_enabled_ui(can_open, |ui| {
-            let task = || {
-                let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
-                Some(FileTask {
-                    words: OPEN_CHECKPOINT,
-                    suggestion: file_name("training", OPEN_CHECKPOINT, settings),
-                    purpose: Purpose::Open,
-                })
-            };
-            file_ui(ui, OPEN_CHECKPOINT, true, task, effects);
-        });
+        ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, result);
@@ -276,33 +251,23 @@ fn format_short_time(time: Duration) -> String {
 
 const PATH_BUTTON_WIDTH: f32 = space(24);
 
-/// Two buttons that ask for the path of a file; `task` tells what is to be done with it then.
-fn file_ui(
-    ui: &mut Ui,
-    words: FileWords,
-    is_read: bool,
-    task: impl Fn() -> Option<FileTask>,
-    effects: &mut Vec<Effect>,
-) {
+/// Two buttons that ask for the path of a checkpoint.
+fn open_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     ui.horizontal(|ui| {
         let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button(words.name).min_size([width, space(7)].into());
-        if ui.add(button).on_hover_text(words.description).clicked() {
-            effects.extend(task().map(Effect::ChooseFile));
+        let button = ghost_button("Open checkpoint…").min_size([width, space(7)].into());
+        let task = open_task(shared);
+        if ui.add(button).on_hover_text(task.words.description).clicked() {
+            effects.push(Effect::ChooseFile(task.clone()));
         }
         let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
         let is_enabled = path.enabled();
-        let verb = if is_read {
-            "Type the path of a"
-        } else {
-            "Type a path for the"
-        };
-        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, format!("{verb} {}", words.kind)));
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, "Type the path of a checkpoint"));
         if path
             .on_hover_text("Type the path instead of choosing the file.")
             .clicked()
         {
-            effects.extend(task().map(Effect::TypePath));
+            effects.push(Effect::TypePath(task));
         }
     });
 }

@@ -1,0 +1,140 @@
+"""Live decoding over a pseudo-terminal pair, at normal priority.
+
+Usage: follow.py PROGRAM [SECONDS], where PROGRAM is the release build; SECONDS is how long frames come at a steady rate, 600
+unless given. Trains the network of the 10x10_5x30 array with 12 hidden nodes, sends whole frames (300 resistances a line), and
+prints Markdown tables: a steady 1000 frames a second, the same with garbage in every tenth line, and as many as the
+terminal carries, also with a reader of the answers that is slower than the program.
+"""
+
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tty
+
+PROGRAM = pathlib.Path(sys.argv[1]).resolve()
+SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 600.0
+RATE = 1000
+
+
+def resident_kib(process):
+    return int(re.search(r"VmRSS:\s+(\d+)", pathlib.Path(f"/proc/{process.pid}/status").read_text())[1])
+
+
+class Decoder:
+    """The program at one end of a pseudo-terminal, and what it answers."""
+
+    def __init__(self, network, most_a_second=None):
+        self.most_a_second = most_a_second
+        self.master, slave = os.openpty()
+        tty.setraw(self.master)
+        tty.setraw(slave)
+        command = [PROGRAM, "decode", "--network", network, "--follow", "--input", f"{os.ttyname(slave)}:115200"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.answers, self.last = 0, time.monotonic()
+        self.warnings = []
+        self.slave = slave
+        threading.Thread(target=self.count, daemon=True).start()
+        threading.Thread(target=self.listen, daemon=True).start()
+        time.sleep(1.0)
+        # The program may have come in the middle of a line: it leaves out the first.
+        self.send(b"the end of a line\n")
+
+    def count(self):
+        while chunk := os.read(self.process.stdout.fileno(), 1 << 16):
+            answers = chunk.count(b"\n")
+            self.answers += answers
+            self.last = time.monotonic()
+            if self.most_a_second:
+                time.sleep(answers / self.most_a_second)
+
+    def listen(self):
+        for line in self.process.stderr:
+            self.warnings.append(line.decode().strip())
+
+    def send(self, data):
+        view = memoryview(data)
+        while view:
+            view = view[os.write(self.master, view) :]
+
+    def settle(self):
+        """Waits until it has answered all that it will."""
+        while time.monotonic() - max(self.last, self.begun) < 1.0:
+            time.sleep(0.05)
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(20)
+        time.sleep(0.2)
+        # The first line of the output has the names.
+        return self.answers - 1, [line for line in self.warnings if not line.startswith("warning")][-6:]
+
+
+def steady(network, lines, seconds, garbage):
+    decoder = Decoder(network)
+    decoder.begun = time.monotonic()
+    memory, sent, bad, late = [], 0, 0, 0.0
+    while (due := decoder.begun + sent / RATE) < decoder.begun + seconds:
+        late = max(late, time.monotonic() - due)
+        while (wait := due - time.monotonic()) > 0:
+            time.sleep(wait)
+        is_bad = garbage and sent % 10 == 9
+        decoder.send(b"12.5,\xff\x00garbage;;1e999,nan\n" if is_bad else lines[sent % len(lines)])
+        bad += is_bad
+        sent += 1
+        if sent % (5 * RATE) == 0:
+            memory.append(resident_kib(decoder.process))
+    decoder.settle()
+    memory.append(resident_kib(decoder.process))
+    answered, report = decoder.end()
+    name = "garbage in every tenth line" if garbage else "steady"
+    print(f"| {name} | {seconds:.0f} | {sent} | {bad} | {answered} | {sent - bad - answered} | {memory[0]} to {memory[-1]} |")
+    print(f"<!-- sender at most {1e3 * late:.0f} ms late; {' / '.join(report)} -->", flush=True)
+
+
+def flood(network, lines, seconds, most_a_second):
+    decoder = Decoder(network, most_a_second)
+    decoder.begun = time.monotonic()
+    block = b"".join(lines)
+    memory, sent, gaps, before = [], 0, 0.0, decoder.answers
+    while time.monotonic() < decoder.begun + seconds:
+        decoder.send(block)
+        sent += len(lines)
+        gaps = max(gaps, time.monotonic() - decoder.last) if decoder.answers > 1 else 0.0
+        memory.append(resident_kib(decoder.process))
+    answered = decoder.answers - before
+    decoder.settle()
+    start, before = time.monotonic(), decoder.answers
+    decoder.send(lines[0])
+    while decoder.answers == before and time.monotonic() - start < 5:
+        time.sleep(0.0005)
+    alone = time.monotonic() - start
+    memory.append(resident_kib(decoder.process))
+    _, report = decoder.end()
+    name = f"flood, answers taken at {most_a_second} a second" if most_a_second else "flood"
+    print(f"| {name} | {seconds:.0f} | {sent} | {sent / seconds:.0f} | {answered / seconds:.0f} | {1e3 * gaps:.0f} | {1e3 * alone:.1f} | {memory[0]} to {memory[-1]} |")
+    print(f"<!-- {' / '.join(report)} -->", flush=True)
+
+
+with tempfile.TemporaryDirectory() as home:
+    network, readings = pathlib.Path(home, "n.json"), pathlib.Path(home, "r.csv")
+    quiet = {"check": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    subprocess.run([PROGRAM, "train", "--epochs", "60", "--decoder", "mean", "--out", network], **quiet)
+    subprocess.run([PROGRAM, "simulate", "--samples", "200", "--seed", "3", "--out", readings], **quiet)
+    rows = [line.split(",") for line in readings.read_text().splitlines()]
+    columns = [rows[0].index(f"r_{k}") for k in range(1, 31)]
+    values = [[f"{float(row[column]):.6f}" for column in columns] for row in rows[1:]]
+    frames = [sum(values[frame : frame + 10], []) for frame in range(0, len(values), 10)]
+    lines = [(",".join(frame) + "\n").encode() for frame in frames]
+    print("| frames | seconds | sent | bad | answered | lost | resident memory, KiB |\n|---|---|---|---|---|---|---|")
+    steady(network, lines, SECONDS, garbage=False)
+    steady(network, lines, min(SECONDS, 60.0), garbage=True)
+    print("\n| frames | seconds | sent | sent a second | answered a second | longest gap, ms | one after it, ms | resident memory, KiB |")
+    print("|---|---|---|---|---|---|---|---|")
+    flood(network, lines, min(SECONDS, 30.0), None)
+    flood(network, lines, min(SECONDS, 30.0), 2000)

@@ -1,0 +1,200 @@
+//! Networks and the reports of their runs as exports, of the training on show or of a kept run.
+
+use std::{path::Path, sync::Arc};
+
+use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
+use crate::{
+    app::training_worker::RunId,
+    evaluation::{DecoderReport, Run, SimulatedSettings},
+    export::{
+        NetworkFile,
+        bundle::{BundleFormat, BundlePrecision, BundleReport, export_bundle},
+        format_number,
+        report::RunReport,
+    },
+};
+
+/// A trained network that can be exported.
+#[derive(Clone, Debug)]
+pub enum NetworkSource {
+    /// Of the training on show, which the worker has.
+    Training(RunId, Box<SimulatedSettings>),
+    /// Of a kept run with this name.
+    Kept(String, Arc<NetworkFile>),
+}
+
+impl NetworkSource {
+    /// The file that `contents` makes of the network and its record.
+    fn task(
+        &self,
+        words: FileWords,
+        what: &str,
+        contents: impl Fn(Arc<NetworkFile>, Option<&Run>) -> Contents + Send + Sync + 'static,
+    ) -> FileTask {
+        match self {
+            Self::Training(run, settings) => {
+                let take = move |run: &Run| {
+                    let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
+                    Ok(contents(Arc::new(file), Some(run)))
+                };
+                FileTask::save_run(words, &file_stem(what, settings), *run, take)
+            }
+            Self::Kept(_, file) => {
+                let stem = file_stem(what, &file.settings);
+                FileTask::save(words, &stem, contents(Arc::clone(file), None))
+            }
+        }
+    }
+}
+
+/// The network in every form and the report of its run; `source` gives it, or the reason why there is none. `prefix`
+/// stands before every name.
+pub fn network_exports<'a>(
+    prefix: &str,
+    source: &Result<NetworkSource, String>,
+    decoders: impl Fn() -> Vec<DecoderReport> + Clone + 'a,
+) -> Vec<Export<'a>> {
+    let bundles = BundleFormat::ALL.into_iter().flat_map(|format| {
+        let precisions = format.precisions().iter();
+        precisions.map(move |&precision| (format, precision))
+    });
+    let ask = |task: Box<dyn FnOnce(NetworkSource) -> FileTask + 'a>| {
+        source
+            .clone()
+            .map(|source| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task(source))) })
+    };
+    let mut exports: Vec<Export<'a>> = bundles
+        .map(|(format, precision)| {
+            let words = bundle_words(format);
+            Export {
+                group: ExportGroup::Network,
+                name: format!("{prefix}{}", bundle_name(format)),
+                form: match format {
+                    BundleFormat::Json => "JSON".to_owned(),
+                    _ => precision.to_string(),
+                },
+                description: words.description,
+                ask: ask(Box::new(move |source| bundle_task(&source, format, precision))),
+            }
+        })
+        .collect();
+    exports.push(Export {
+        group: ExportGroup::Report,
+        name: format!("{prefix}Report"),
+        form: "HTML".to_owned(),
+        description: REPORT.description,
+        ask: ask(Box::new(move |source| report_task(&source, decoders()))),
+    });
+    exports
+}
+
+fn bundle_name(format: BundleFormat) -> &'static str {
+    match format {
+        BundleFormat::Onnx => "ONNX",
+        BundleFormat::C99 => "C99",
+        BundleFormat::Matlab => "MATLAB/Octave",
+        BundleFormat::NumPy => "NumPy",
+        BundleFormat::Json => "Network file",
+    }
+}
+
+fn bundle_words(format: BundleFormat) -> FileWords {
+    let (kind, description) = match format {
+        BundleFormat::Onnx => (
+            "network as ONNX",
+            "A folder with the network as an ONNX graph (opset 13) and golden vectors: ohm in, mm out.",
+        ),
+        BundleFormat::C99 => (
+            "network as C99",
+            "A folder with one header and one source in C99 and a self-test: ohm in, mm out. fixed16 computes in whole \
+             numbers only, for microcontrollers.",
+        ),
+        BundleFormat::Matlab => (
+            "network for MATLAB and Octave",
+            "A folder with one function file for MATLAB and GNU Octave and golden vectors: ohm in, mm out.",
+        ),
+        BundleFormat::NumPy => (
+            "network for NumPy",
+            "A folder with the weights as .npz, a short decode.py and golden vectors: ohm in, mm out.",
+        ),
+        BundleFormat::Json => {
+            return FileWords {
+                kind: "network",
+                description: "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal \
+                              commands decode and export read it.",
+                extensions: &["json"],
+            };
+        }
+    };
+    FileWords {
+        kind,
+        description,
+        extensions: &[],
+    }
+}
+
+fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePrecision) -> FileTask {
+    let words = bundle_words(format);
+    if format == BundleFormat::Json {
+        return source.task(words, "network", |file, _| Contents::new(move |path| file.save(path)));
+    }
+    source.task(words, &format!("{format}-{precision}"), move |file, _| {
+        Contents::telling(move |path| {
+            let report = export_bundle(&file, format, precision, path).map_err(|error| error.to_string())?;
+            Ok(told(&report))
+        })
+    })
+}
+
+/// What the user is told of a bundle that was written.
+fn told(report: &BundleReport) -> String {
+    let deviation_mm = report.deviation() * report.output_range_mm;
+    let mut text = format!(
+        "{} written and read back: largest deviation {} mm. Saved {}",
+        bundle_name(report.format),
+        format_number(deviation_mm),
+        report.path.display()
+    );
+    for remark in &report.remarks {
+        text += &format!(". Note: {remark}");
+    }
+    text
+}
+
+const REPORT: FileWords = FileWords {
+    kind: "report",
+    description: "Settings, errors, figures, remarks and the terminal command that repeats the run, in one file for any \
+                  browser.",
+    extensions: &["html"],
+};
+
+fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask {
+    let name = match source {
+        NetworkSource::Training(..) => None,
+        NetworkSource::Kept(name, _) => Some(name.clone()),
+    };
+    source.task(REPORT, "report", move |file, run| {
+        let flaw = run.and_then(Run::flaw);
+        let (name, decoders) = (name.clone(), decoders.clone());
+        Contents::new(move |path: &Path| {
+            RunReport {
+                name: name.as_deref(),
+                file: &file,
+                flaw: flaw.as_ref(),
+                decoders: &decoders,
+            }
+            .save(path)
+        })
+    })
+}
+
+/// A name that tells the files of different runs apart: what the file holds, and of which run. Without extension.
+pub fn file_stem(what: &str, settings: &SimulatedSettings) -> String {
+    let array = settings.source.sensor.scale.to_string().replace('×', "x");
+    let (hidden, method) = (settings.hidden, settings.training.method.short_name());
+    let starts = match settings.starts {
+        1 => String::new(),
+        starts => format!("-starts{starts}"),
+    };
+    format!("{what}-{array}-h{hidden}-{method}{starts}-seed{}", settings.seed)
+}

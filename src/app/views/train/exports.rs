@@ -1,0 +1,133 @@
+//! What the training on show can be taken away as.
+
+use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
+use crate::{
+    app::shared::{
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunView,
+        Shared, copy_exports, csv_export, file_stem, network_exports, picture_exports,
+    },
+    evaluation::{DecoderReport, error_rows},
+    export::{CheckpointFile, atomic_write, decoder_table, error_table, write_loss_curves},
+    figure::{Figure, surface::ViewMode},
+};
+
+/// A saved training to go on from.
+pub const CHECKPOINT: FileWords = FileWords {
+    kind: "checkpoint",
+    description: "The training as it stands, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
+                  --resume), it gives bit-identical results.",
+    extensions: &["checkpoint"],
+};
+
+const OPENED: FileWords = FileWords {
+    description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
+                  history, and pauses it. A resumed training gives bit-identical results.",
+    ..CHECKPOINT
+};
+
+const ERRORS: FileWords = FileWords {
+    kind: "error table",
+    description: "The table of errors with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+const LOSS_CURVES: FileWords = FileWords {
+    kind: "loss curves",
+    description: "Training, validation and test error of every epoch with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+/// Task of saving the checkpoint of `run`.
+pub fn checkpoint_task(run: &RunView) -> FileTask {
+    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.settings), run.id, |run| {
+        let file = CheckpointFile::from_run(run).map_err(|error| error.to_string())?;
+        Ok(Contents::new(move |path| file.save(path)))
+    })
+}
+
+/// Task of opening a checkpoint.
+pub(super) fn open_task(shared: &Shared) -> FileTask {
+    let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
+    FileTask {
+        words: OPENED,
+        suggestion: OPENED.file_name(&file_stem("training", settings)),
+        purpose: Purpose::Open,
+    }
+}
+
+/// Everything that can be exported of the training on show.
+pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Export<'a>> {
+    let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+    let shown = shown.ok_or_else(|| "Nothing is trained yet: press Train first.".to_owned());
+    let run = shown.clone().map(|(run, _)| run);
+    let stem = |what: &str| {
+        run.as_ref()
+            .map_or_else(|_| String::new(), |run| file_stem(what, &run.settings))
+    };
+    let source = run
+        .clone()
+        .map(|run| NetworkSource::Training(run.id, Box::new(run.settings)));
+    let mut exports = network_exports("", &source, move || measured(view));
+    let what = match shared.look.mode {
+        ViewMode::ThreeD => "surfaces",
+        ViewMode::Top => "surfaces-top",
+    };
+    let surfaces = run.clone().map(|_| || Figure::from(surface_figure(view, shared)));
+    exports.extend(picture_exports("Surfaces", stem(what), surfaces));
+    let chart = run.clone().and_then(|_| {
+        let figure = chart_figure(view, shared).ok_or("This chart has nothing to show yet.")?;
+        Ok(move || Figure::from(figure.clone()))
+    });
+    exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
+    let errors = shown
+        .clone()
+        .map(|(run, result)| move || error_table(&error_rows(&result.errors, &run.baselines, run.published.as_ref())));
+    exports.push(csv_export("Error table", ERRORS, stem("errors"), errors.clone()));
+    exports.push(loss_export(run.clone(), stem("loss")));
+    exports.extend(copy_exports("Error table", errors));
+    let decoders = shown.map(|(run, _)| run).and_then(|run| {
+        let reports = measured(view);
+        if reports.is_empty() {
+            return Err("No decoder is measured yet: unfold More decoders in the report.".to_owned());
+        }
+        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref()))
+    });
+    exports.extend(copy_exports("Decoder table", decoders));
+    let standing = run.and_then(|run| match shared.phase {
+        Phase::Paused | Phase::Ended(_) => Ok(run),
+        Phase::Died => Err("The training was lost with its thread: train again.".to_owned()),
+        _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
+    });
+    exports.push(Export {
+        group: ExportGroup::Training,
+        name: "Checkpoint".to_owned(),
+        form: "resumable".to_owned(),
+        description: CHECKPOINT.description,
+        ask: standing.map(|run| -> Ask<'a> { Box::new(|| Effect::ChooseFile(checkpoint_task(run))) }),
+    });
+    exports
+}
+
+fn loss_export<'a>(run: Result<&'a RunView, String>, stem: String) -> Export<'a> {
+    Export {
+        group: ExportGroup::Tables,
+        name: "Loss curves".to_owned(),
+        form: "CSV".to_owned(),
+        description: LOSS_CURVES.description,
+        ask: run.map(|run| -> Ask<'a> {
+            Box::new(move || {
+                let history = run.history.clone();
+                let contents =
+                    Contents::new(move |path| atomic_write(path, |writer| write_loss_curves(&history, writer)));
+                Effect::ChooseFile(FileTask::save(LOSS_CURVES, &stem, contents))
+            })
+        }),
+    }
+}
+
+/// Reports of the decoders measured so far.
+fn measured(view: &TrainView) -> Vec<DecoderReport> {
+    let results = view.decoders.measured.iter().flatten();
+    let reports = results.filter_map(|result| result.report.as_ref()?.as_ref().ok());
+    reports.cloned().collect()
+}

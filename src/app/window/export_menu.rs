@@ -1,0 +1,88 @@
+//! The Export menu: everything that the view on show can hand out, drawn from one list.
+
+use eframe::egui::{
+    Align, Button, Layout, RichText, ScrollArea, TextWrapMode, Ui, WidgetInfo, accesskit::Role,
+    containers::menu::MenuButton,
+};
+
+use crate::app::{
+    shared::{Ask, Effect, Export},
+    theme::{Theme, space, type_size},
+    widgets::{ghost_button, section_heading_ui},
+};
+
+const WIDTH: f32 = space(88);
+
+/// The button that opens the menu. `exports` lists what there is; it is called only while the menu is open.
+pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
+    let (button, _) = MenuButton::from_button(ghost_button("Export")).ui(ui, |ui| {
+        ui.set_width(WIDTH);
+        // What the screen cannot hold is scrolled to.
+        let most = ui.ctx().content_rect().height() - space(20);
+        ScrollArea::vertical().max_height(most).show(ui, |ui| {
+            ui.set_width(WIDTH);
+            let asked = exports_ui(ui, exports());
+            effects.extend(asked.map(|ask| ask()));
+        });
+    });
+    button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
+}
+
+/// One line for each thing, with a button for each of its forms; a reason, where there is one, is told once for all that
+/// follow each other and share it. Returns what was asked for.
+fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
+    let mut asked = None;
+    let mut told = String::new();
+    let mut group = None;
+    let mut exports = exports.into_iter().peekable();
+    while let Some(first) = exports.next() {
+        if group.replace(first.group) != Some(first.group) {
+            section_heading_ui(ui, first.group.heading());
+            told.clear();
+        }
+        let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
+        if reason != told && !reason.is_empty() {
+            let text = RichText::new(&reason).size(type_size().note);
+            ui.label(text.color(Theme::of(ui).palette.dim));
+        }
+        told = reason;
+        let name = first.name.clone();
+        let mut forms = vec![first];
+        while let Some(next) = exports.next_if(|next| next.group == forms[0].group && next.name == name) {
+            forms.push(next);
+        }
+        ui.horizontal(|ui| {
+            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+            ui.set_min_height(space(6));
+            let colour = if forms[0].ask.is_ok() {
+                Theme::of(ui).palette.text
+            } else {
+                Theme::of(ui).palette.dim
+            };
+            ui.label(RichText::new(name).color(colour));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.add_space(space(2));
+                // From right to left.
+                for form in forms.into_iter().rev() {
+                    asked = asked.take().or(form_ui(ui, form));
+                }
+            });
+        });
+    }
+    asked
+}
+
+/// The button of one form. Returns the request if it was clicked.
+fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
+    let (label, is_there) = (export.label(), export.ask.is_ok());
+    let button = ui.add_enabled(is_there, Button::new(&export.form));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_there, &label));
+    let button = button.on_hover_text(export.description);
+    match export.ask {
+        Ok(ask) => button.clicked().then_some(ask),
+        Err(reason) => {
+            button.on_disabled_hover_text(reason);
+            None
+        }
+    }
+}

@@ -1,0 +1,137 @@
+use std::fmt;
+
+use super::{Cell, Table, latex::latex};
+
+/// Form in which a table is copied into other documents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableForm {
+    /// GitHub-flavoured Markdown, numbers rounded for readers.
+    Markdown,
+    /// LaTeX for the packages `booktabs` and `siunitx`, numbers rounded for readers and aligned at the decimal point.
+    Latex,
+    /// Columns separated by tabs, numbers with every digit: for spreadsheets.
+    TabSeparated,
+}
+
+impl TableForm {
+    /// All forms, in the order offered to the user.
+    pub const ALL: [Self; 3] = [Self::Markdown, Self::Latex, Self::TabSeparated];
+}
+
+impl fmt::Display for TableForm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Markdown => "Markdown",
+            Self::Latex => "LaTeX",
+            Self::TabSeparated => "tab-separated",
+        })
+    }
+}
+
+impl Table {
+    /// Returns the table in `form`.
+    pub fn text(&self, form: TableForm) -> String {
+        match form {
+            TableForm::Markdown => self.markdown(),
+            TableForm::Latex => latex(self),
+            TableForm::TabSeparated => self.tab_separated(),
+        }
+    }
+
+    fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let mut text = line(self.columns.iter().map(|column| escaped(&column.title())).collect());
+        let rules = (0..self.columns.len()).map(|column| if self.is_numeric(column) { "---:" } else { "---" });
+        text += &line(rules.map(str::to_owned).collect());
+        for row in &self.rows {
+            text += &line(row.iter().map(|cell| escaped(&cell.rounded())).collect());
+        }
+        text
+    }
+
+    fn tab_separated(&self) -> String {
+        // A tab or line break inside a cell would begin another.
+        let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
+        let line = |cells: Vec<String>| cells.join("\t") + "\n";
+        let mut text = line(self.columns.iter().map(|column| plain(column.title())).collect());
+        for row in &self.rows {
+            text += &line(row.iter().map(|cell: &Cell| plain(cell.exact())).collect());
+        }
+        text
+    }
+}
+
+/// Escapes what Markdown would take for markup.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        // Inside a word an underscore is one.
+        let is_inside = before.is_alphanumeric() && letters.peek().is_some_and(|next| next.is_alphanumeric());
+        match letter {
+            '\n' | '\r' => escaped.push(' '),
+            '_' if is_inside => escaped.push(letter),
+            '\\' | '|' | '*' | '_' | '`' | '[' | '<' | '~' => escaped.extend(['\\', letter]),
+            _ => escaped.push(letter),
+        }
+        before = letter;
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::TableColumn, *};
+
+    fn table() -> Table {
+        Table {
+            columns: vec![
+                TableColumn::new("decoder", "Decoder", ""),
+                TableColumn::new("z_percent", "Z", "%"),
+                TableColumn::new("epochs", "epochs", ""),
+            ],
+            rows: vec![
+                vec!["a|b_c 10×6_3×18\n*".into(), (1.0 / 3.0).into(), 1000_usize.into()],
+                vec!["R&D 50 % #1 \\x{y}~^".into(), (-6.13e-5).into(), 7_usize.into()],
+                vec!["none".into(), Cell::Number(None), 20_usize.into()],
+            ],
+        }
+    }
+
+    #[test]
+    fn markdown_has_as_many_cells_in_every_line_whatever_the_names() {
+        let text = table().text(TableForm::Markdown);
+        let expected = "| Decoder | Z (%) | epochs |\n\
+                        | --- | ---: | ---: |\n\
+                        | a\\|b_c 10×6_3×18 \\* | 0.333 | 1000 |\n\
+                        | R&D 50 % #1 \\\\x{y}\\~^ | -6.13e-5 | 7 |\n\
+                        | none | – | 20 |\n";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn spreadsheets_get_every_digit_and_one_line_a_row() {
+        let text = table().text(TableForm::TabSeparated);
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
+        assert_eq!(lines[0], ["Decoder", "Z (%)", "epochs"]);
+        assert_eq!(lines[1], ["a|b_c 10×6_3×18 *", "0.3333333333333333", "1000"]);
+        assert_eq!(lines[3], ["none", "", "20"]);
+        assert_eq!(lines.len(), 4);
+    }
+
+    #[test]
+    fn latex_escapes_names_and_aligns_numbers_at_the_decimal_point() {
+        let expected = "% \\usepackage{booktabs, siunitx}\n\
+                        \\begin{tabular}{l S[table-format=-1.3e-1] S[table-format=4.0]}\n\
+                        \\toprule\n\
+                        Decoder & {Z (\\%)} & {epochs} \\\\\n\
+                        \\midrule\n\
+                        a|b\\_c 10×6\\_3×18 * & 0.333 & 1000 \\\\\n\
+                        R\\&D 50 \\% \\#1 \\textbackslash{}x\\{y\\}\\textasciitilde{}\\textasciicircum{} & -6.13e-5 & 7 \\\\\n\
+                        none & {–} & 20 \\\\\n\
+                        \\bottomrule\n\
+                        \\end{tabular}\n";
+        assert_eq!(table().text(TableForm::Latex), expected);
+    }
+}

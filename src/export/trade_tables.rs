@@ -1,0 +1,96 @@
+use super::{Cell, Table, TableColumn};
+use crate::{
+    decoupling::Precision,
+    evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
+    figure::trade_words::point_name,
+};
+
+/// Every point of every level, with all its figures: for programs.
+pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
+    const FIELDS: [&str; 16] = [
+        "noise",
+        "preset",
+        "decoder",
+        "precision",
+        "hidden",
+        "samples",
+        "epochs",
+        "z_percent",
+        "z_mm",
+        "frame_us",
+        "training_s",
+        "residual",
+        "reference_z_percent",
+        "reference_z_mm",
+        "on_decoding_front",
+        "on_training_front",
+    ];
+    let of_level = |level: &TradeOffLevel| {
+        let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
+        let points = level.points.iter().zip(decoding).zip(training);
+        let row = |((point, on_decoding), on_training): ((&TradeOffPoint, bool), bool)| {
+            let report = &point.report;
+            let precision = match report.precision {
+                Precision::Double => "f64",
+                Precision::Single => "f32",
+            };
+            let hidden = point.hidden();
+            let count = |count: Option<usize>| count.map_or(Cell::Number(None), Cell::from);
+            vec![
+                level.noise.into(),
+                point.preset.to_string().into(),
+                report.kind.to_string().into(),
+                precision.into(),
+                count(hidden),
+                point.settings.source.samples.into(),
+                count(hidden.map(|_| point.settings.training.stopping.epochs)),
+                report.errors.z_percent.into(),
+                report.errors.z_mm.into(),
+                report.cost.frame_us.into(),
+                point.training_seconds.into(),
+                report.residual.into(),
+                point.reference.and_then(|errors| errors.z_percent).into(),
+                point.reference.map(|errors| errors.z_mm).into(),
+                on_decoding.to_string().into(),
+                on_training.to_string().into(),
+            ]
+        };
+        points.map(row).collect::<Vec<_>>()
+    };
+    Table {
+        columns: FIELDS.map(TableColumn::field).to_vec(),
+        rows: levels.iter().flat_map(of_level).collect(),
+    }
+}
+
+/// The points of one level, fastest first: for readers.
+pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
+    let row = |point: &TradeOffPoint| {
+        vec![
+            point_name(point).into(),
+            point.report.errors.z_percent.into(),
+            point.report.errors.z_mm.into(),
+            point.to_reference().into(),
+            point.report.cost.frame_us.into(),
+            point.training_seconds.into(),
+        ]
+    };
+    let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
+    points.sort_by(|a, b| a.report.cost.frame_us.total_cmp(&b.report.cost.frame_us));
+    let mut table = Table {
+        columns: vec![
+            TableColumn::new("decoder", "Decoder", ""),
+            TableColumn::new("z_percent", "Z", "%"),
+            TableColumn::new("z_mm", "Z", "mm"),
+            TableColumn::new("times_reference", "times reference", ""),
+            TableColumn::new("frame_us", "a frame", "µs"),
+            TableColumn::new("training_s", "training", "s"),
+        ],
+        rows: points.into_iter().map(row).collect(),
+    };
+    // Without noise there is no limit to compare with.
+    if level.points.iter().all(|point| point.to_reference().is_none()) {
+        table.remove_column("times_reference");
+    }
+    table
+}
