@@ -68,6 +68,16 @@ impl<'a> Field<'a> {
         [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)].map(|(ix, iy)| self.grid.index(ix, iy))
     }
 
+    /// Places of the corners of a cell as they are drawn, within the box.
+    pub(super) fn corners_mm(&self, ix: usize, iy: usize) -> [DVec3; 4] {
+        let (x_mm, y_mm) = (self.grid.x_mm(), self.grid.y_mm());
+        let corners = [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)];
+        corners.map(|(ix, iy)| {
+            let value = self.values[self.grid.index(ix, iy)];
+            DVec3::new(x_mm[ix], y_mm[iy], value.clamp(*self.shown.start(), *self.shown.end()))
+        })
+    }
+
     /// Returns true if a cell has values and, in the extrapolated margin, they stay in the box.
     pub(super) fn is_drawn(&self, ix: usize, iy: usize) -> bool {
         let is_inside = self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
