@@ -7,8 +7,10 @@ mod decoders;
 mod drawn;
 mod export_kind;
 mod paper_figure;
+mod press;
 mod report;
 mod run_buttons;
+mod scrub;
 mod shown_figure;
 mod state;
 mod surfaces;
@@ -18,4 +20,5 @@ mod workbench;
 pub use chart::BottomTab;
 pub use decoders::DecoderResult;
 pub use export_kind::ExportKind;
+
 pub use state::TrainView;

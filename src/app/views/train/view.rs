@@ -39,11 +39,15 @@ impl View for TrainView {
         }
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
         if pressed(ctx, Modifiers::NONE, Key::PageDown) && self.snapshot + 1 < snapshots {
-            self.snapshot += 1;
+            self.show_snapshot(self.snapshot + 1);
         }
         if pressed(ctx, Modifiers::NONE, Key::PageUp) && self.snapshot > 0 {
-            self.snapshot -= 1;
+            self.show_snapshot(self.snapshot - 1);
         }
+        // Before anything is drawn, so that all of the window shows what the finger does in the same frame.
+        let frames = self.frames().clone();
+        self.press.take_pointer(ctx, shared.test(), &frames);
+        self.follow(shared);
     }
 
     fn columns(&self, window_width: f32) -> Columns {
@@ -58,7 +62,9 @@ impl View for TrainView {
         run_buttons_ui(ui, shared, effects);
         ui.add_space(space(4));
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        self.snapshot = snapshot_ui(ui, self.snapshot, snapshots).unwrap_or(self.snapshot);
+        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, snapshots) {
+            self.show_snapshot(snapshot);
+        }
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

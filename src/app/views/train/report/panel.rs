@@ -10,6 +10,7 @@ use crate::{
         views::train::{
             decoders::{REFERENCE, decoders_ui},
             export_kind::{ExportKind, OPEN_CHECKPOINT, file_name},
+            press::press_section_ui,
             shown_figure::ShownPicture,
             state::TrainView,
         },
@@ -22,12 +23,19 @@ use crate::{
 /// The error table, what can be taken away, and what it cost. Before a training, what the network has to beat.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
+        press_section_ui(ui, &mut view.press, shared);
         section_heading_ui(ui, "Errors on the test set");
-        let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+        let result = view.result(shared).cloned();
+        let shown = shared.shown_run().zip(result.as_ref());
         if let Some((run, result)) = shown {
             let baselines = &run.baselines;
             error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
-            verdict_ui(ui, shared, run, result);
+            match view.scrub.epoch() {
+                Some(_) => {
+                    dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+                }
+                None => verdict_ui(ui, shared, run, result),
+            }
             conditioning_ui(ui, &run.test);
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
@@ -70,7 +78,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         });
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
-            cost_ui(ui, run, result);
+            cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
         }
     });
 }
