@@ -12,6 +12,7 @@ mod box_axes;
 mod camera;
 mod colour_scale;
 mod contour;
+mod cut;
 mod drawing;
 mod edge;
 mod field;

@@ -2,7 +2,11 @@
 
 use glam::DVec3;
 
-use super::{field::Field, sight::Ray, surface_figure::Surface};
+use super::{
+    field::{CellPart, Field},
+    sight::Ray,
+    surface_figure::Surface,
+};
 
 /// Part of a triangle by which a ray may miss it, so that none slips through between two.
 const CRACK: f64 = 1e-9;
@@ -18,10 +22,22 @@ impl Surface {
         crossings.windows(2).find_map(|pair| {
             let middle = ray.from_mm + ray.direction * (0.5 * (pair[0] + pair[1]));
             let (ix, iy) = (cell(field.grid.x_mm(), middle.x)?, cell(field.grid.y_mm(), middle.y)?);
-            let [a, b, c, d] = field.is_drawn(ix, iy).then(|| field.corners_mm(ix, iy))?;
+            let (low, high) = (*field.shown().start(), *field.shown().end());
+            let corners = match field.part(ix, iy) {
+                CellPart::Nothing => return None,
+                CellPart::Cut => field.corners_mm(ix, iy),
+                CellPart::Whole => field
+                    .corners_mm(ix, iy)
+                    .map(|corner| corner.with_z(corner.z.clamp(low, high))),
+            };
+            let [a, b, c, d] = corners;
             let met = [[a, b, c], [a, c, d]].map(|corners| share_at(ray, corners));
-            let first = met.into_iter().flatten().reduce(f64::min)?;
-            Some(ray.from_mm + ray.direction * first)
+            let places = met
+                .into_iter()
+                .flatten()
+                .map(|share| (share, ray.from_mm + ray.direction * share));
+            let shown = places.filter(|(_, place)| (low - CRACK..=high + CRACK).contains(&place.z));
+            Some(shown.min_by(|(one, _), (other, _)| one.total_cmp(other))?.1)
         })
     }
 }

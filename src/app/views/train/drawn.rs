@@ -97,7 +97,7 @@ impl Drawn {
     }
 
     /// Actual and decoupled z of the nodes of the test set, in millimetres, once there is a result.
-    pub(super) fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
+    pub fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
         let (test, decoupled_mm) = self.result()?;
         Some(self.pairs_mm.get_or_init(|| z_pairs_mm(test, decoupled_mm)))
     }

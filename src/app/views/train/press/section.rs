@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, DragValue, Layout, Slider, Ui};
+use eframe::egui::{Align, DragValue, Layout, Slider, Ui, WidgetInfo};
 
 use super::{
     comparing::Compared,
@@ -106,26 +106,42 @@ fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
             dim_ui(ui, "Take a node and drag it up or down.");
             return;
         }
-        let limit = format_number(test.stroke_mm);
-        let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
-        let label = ui.label("Depth").on_hover_text(&hint);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            slider_style(ui);
-            // The number beside the slider has its own width.
-            ui.spacing_mut().slider_width = (ui.available_width() - space(19)).max(space(10));
-            let mut depth_mm = finger.depth_share * test.stroke_mm;
-            let slider = Slider::new(&mut depth_mm, 0.0..=test.stroke_mm)
-                .suffix(" mm")
-                .fixed_decimals(2);
-            let slider = ui.add(slider).labelled_by(label.id).on_hover_text(&hint);
-            if slider.changed() {
-                finger.depth_share = (depth_mm / test.stroke_mm).clamp(0.0, 1.0);
-            }
-        });
+        depth_ui(ui, finger, test.stroke_mm);
     });
     if press.finger != before {
         press.follow_finger(test.stroke_mm);
         ui.request_repaint();
+    }
+}
+
+/// The depth as a number and on a slider that ends at the scene's largest compression.
+fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) {
+    let limit = format_number(stroke_mm);
+    let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
+    let mut depth_mm = finger.depth_share * stroke_mm;
+    let before_mm = depth_mm;
+    let label = ui.label("Depth").on_hover_text(&hint);
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let number = DragValue::new(&mut depth_mm)
+            .range(0.0..=stroke_mm)
+            .speed(0.002 * stroke_mm);
+        let number = number
+            .suffix(" mm")
+            .max_decimals(3)
+            .min_decimals(2)
+            .update_while_editing(false);
+        let number = ui.add_sized([space(16), space(6)], number);
+        number.labelled_by(label.id).on_hover_text(&hint);
+        ui.scope(|ui| {
+            slider_style(ui);
+            ui.spacing_mut().slider_width = (ui.available_width() - space(2)).max(space(8));
+            let slider = ui.add(Slider::new(&mut depth_mm, 0.0..=stroke_mm).show_value(false));
+            slider.widget_info(|| WidgetInfo::slider(true, depth_mm, "Depth of the press"));
+            slider.on_hover_text(&hint);
+        });
+    });
+    if depth_mm != before_mm {
+        finger.depth_share = (depth_mm / stroke_mm).clamp(0.0, 1.0);
     }
 }
 

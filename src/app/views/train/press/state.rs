@@ -79,6 +79,11 @@ impl PressState {
         self.touch.is_some()
     }
 
+    /// What is pressed; `None` while the test set is on show.
+    pub fn touch(&self) -> Option<&Touch> {
+        self.touch.as_ref()
+    }
+
     /// What is shown of the touch; `None` while the test set is on show, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.shown.as_ref().filter(|_| self.is_pressing())
