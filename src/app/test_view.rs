@@ -1,13 +1,14 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::DVec3;
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2, Axis, Zip};
 use thiserror::Error;
 
 use crate::{
     dataset::Dataset,
-    evaluation::{NodeAddress, Outlook, RunError, SimulatedSettings},
+    evaluation::{NodeAddress, Outlook, Pressed, RunError, SimulatedSettings},
     figure::surface::{Quantity, Surface, ViewMode},
+    scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
@@ -27,6 +28,8 @@ pub struct TestView {
     pub rows: Vec<usize>,
     /// The distance a node can travel.
     pub stroke_mm: f64,
+    /// Readings of the sensor at rest, rows read × M4; none where it has none.
+    pub unloaded_ohm: Option<Arc<Array2<f64>>>,
     /// Outlook of the scene; none where it takes long or cannot be computed.
     pub outlook: Option<Outlook>,
 }
@@ -54,13 +57,16 @@ impl TestView {
         let y_mm: Vec<f64> = nodes
             .map(|node| sensor.geometry.node_y_mm(sensor.scale, node))
             .collect();
+        let stroke_mm = settings.source.stroke_mm();
+        let unloaded = Pressed::new(&sensor, &rows, &Touch::default(), stroke_mm);
         Ok(Self {
+            unloaded_ohm: unloaded.ok().map(|unloaded| Arc::new(unloaded.readings_ohm().clone())),
             snapshots: Arc::new(set.snapshots()),
             set,
             surface: Arc::new(SurfaceMap::new(&x_mm, &y_mm)?),
             sensor,
             rows,
-            stroke_mm: settings.source.stroke_mm(),
+            stroke_mm,
             outlook: outlook(settings),
         })
     }
@@ -87,10 +93,28 @@ impl TestView {
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
         let coordinates = samples.iter().flat_map(|&sample| coordinates_mm.row(sample).to_vec());
         let coordinates: Vec<f64> = coordinates.collect();
-        let nodes_mm: Arc<[DVec3]> = coordinates.chunks_exact(3).map(DVec3::from_slice).collect();
+        self.frame_of(coordinates.chunks_exact(3).map(DVec3::from_slice))
+    }
+
+    /// The surface through nodes at these places, row by row.
+    pub fn frame_of(&self, nodes_mm: impl Iterator<Item = DVec3>) -> Frame {
+        let nodes_mm: Arc<[DVec3]> = nodes_mm.collect();
         let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
         let grid_mm = self.surface.evaluate(&z_mm).into();
         Frame { nodes_mm, grid_mm }
+    }
+
+    /// Drops of the readings below those at rest, in percent: rows read × M4; `None` where the sensor has none at rest.
+    pub fn drops_percent(&self, readings_ohm: &Array2<f64>) -> Option<Array2<f64>> {
+        let unloaded_ohm = self.unloaded_ohm.as_deref()?;
+        let ratios = Zip::from(readings_ohm).and(unloaded_ohm);
+        Some(ratios.map_collect(|reading, unloaded| 100.0 * (1.0 - reading / unloaded)))
+    }
+
+    /// Readings of one snapshot: rows read × M4.
+    pub fn readings_ohm(&self, snapshot: usize) -> Array2<f64> {
+        let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
+        self.set.readings().select(Axis(0), samples)
     }
 
     /// The surface of heights.

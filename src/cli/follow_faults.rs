@@ -25,10 +25,6 @@ struct Watch {
     columns: usize,
 }
 
-/// Largest arrays in which faults are looked for: more would take too long for every frame.
-const MOST_UNKNOWNS: usize = 64;
-const MOST_COLUMNS: usize = 128;
-
 impl Faults {
     pub(super) fn new(source: &Simulation, relative_noise: Option<f64>) -> Result<Self, Failure> {
         let (sensor, mut scene) = (&source.sensor, source.scene);
@@ -41,7 +37,7 @@ impl Faults {
         let scale = sensor.scale;
         let reason = if scene.noise.in_test().is_none() {
             Some("the network was trained without noise to judge them by; give --noise REL")
-        } else if scene.unknowns_per_row(scale) > MOST_UNKNOWNS || scale.columns() > MOST_COLUMNS {
+        } else if !FaultMonitor::is_affordable(scale, &scene) {
             Some("the array is too large for it")
         } else {
             None

@@ -34,9 +34,10 @@ impl HeatMap {
         }
     }
 
-    /// Returns the range of places that the colours span.
+    /// Returns the range of places that the colours span: those of the values, and of what the axis includes.
     pub(crate) fn range(&self) -> RangeInclusive<f64> {
-        let places = self.values.iter().filter_map(|&value| self.value_axis.place(value));
+        let values = self.values.iter().chain(&self.value_axis.includes);
+        let places = values.filter_map(|&value| self.value_axis.place(value));
         let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), place| {
             (low.min(place), high.max(place))
         });

@@ -23,5 +23,5 @@ pub use line_parser::{LineError, LineParser, ParsedLine};
 pub use lines::{Keeping, Line, Lines, NextLine};
 pub use re_zero::{ReZero, ReZeroError, ZeroGains};
 pub use recording::{Recorder, Recording, RecordingError};
-pub use simulated::{Simulated, SimulatedError};
+pub use simulated::{Motion, Simulated, SimulatedError};
 pub use source::{Source, SourceError};

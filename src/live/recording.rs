@@ -153,6 +153,21 @@ impl Recording {
         })
     }
 
+    /// Frames that come without times, frames × rows × channels in ohm, at an even rate.
+    ///
+    /// # Errors
+    /// If there is no frame.
+    pub fn at_rate(frames_ohm: Array3<f64>, frames_per_second: f64) -> Result<Self, RecordingError> {
+        let frames = frames_ohm.len_of(Axis(0));
+        if frames == 0 {
+            return Err(RecordingError::Empty);
+        }
+        Ok(Self {
+            times_s: (0..frames).map(|frame| frame as f64 / frames_per_second).collect(),
+            frames_ohm,
+        })
+    }
+
     /// Times of the frames in seconds, in ascending order.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
@@ -201,6 +216,19 @@ mod tests {
         for (time_s, frame) in [(-1.0, 0), (0.0, 0), (0.15, 1), (0.2, 2), (99.0, 3)] {
             assert_eq!(recording.frame_at(time_s), frame, "{time_s}");
         }
+    }
+
+    #[test]
+    fn frames_without_times_come_at_an_even_rate() {
+        let frames = Array3::from_shape_fn((3, 2, 3), |(frame, row, k)| (100 * frame + 10 * row + k) as f64);
+        let recording = Recording::at_rate(frames, 20.0).unwrap();
+        assert_eq!(recording.times_s(), [0.0, 0.05, 0.1]);
+        assert_eq!(
+            recording.frame_ohm(1),
+            ndarray::array![[100.0, 101.0, 102.0], [110.0, 111.0, 112.0]]
+        );
+        let empty = Recording::at_rate(Array3::zeros((0, 2, 3)), 20.0);
+        assert!(matches!(empty, Err(RecordingError::Empty)));
     }
 
     #[test]

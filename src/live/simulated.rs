@@ -14,7 +14,7 @@ use crate::{
 ///
 /// Its place and depth are sums of sines whose phases the seed draws, so that any moment can be computed. Frames of all
 /// row-wires read come at a given rate; time is simulated, and the caller paces them. A fault can be switched on and off
-/// while it runs.
+/// while it runs, and the indenter held or lifted.
 #[derive(Debug)]
 pub struct Simulated {
     model: SensorModel,
@@ -28,7 +28,22 @@ pub struct Simulated {
     fault: Option<FaultySensor>,
     frames_per_second: f64,
     frames: u64,
+    motion: Motion,
+    /// Frames during which the indenter did not wander.
+    frames_at_rest: u64,
     deformation: Deformation,
+}
+
+/// Motion of the indenter of a [`Simulated`] source.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Motion {
+    /// Along its path, pressing and lifting.
+    #[default]
+    Wandering,
+    /// Held where it is, as deep as it is.
+    Held,
+    /// Lifted from the array; it goes on from where it was.
+    Lifted,
 }
 
 /// Error in setting up a simulated source.
@@ -77,6 +92,8 @@ impl Simulated {
             fault: None,
             frames_per_second,
             frames: 0,
+            motion: Motion::default(),
+            frames_at_rest: 0,
             deformation: Deformation::from_fn(model.scale, |_, _| glam::DVec3::ZERO),
         })
     }
@@ -89,6 +106,19 @@ impl Simulated {
     /// Number of readings in a frame: rows × M4.
     pub fn readings(&self) -> usize {
         self.rows.len() * self.model.scale.columns()
+    }
+
+    /// Sets the motion of the indenter from the next frame on.
+    pub fn set_motion(&mut self, motion: Motion) {
+        self.motion = motion;
+    }
+
+    /// Passes over so many frames, as if nobody had taken them. Their noise is not drawn.
+    pub fn skip(&mut self, frames: u64) {
+        self.frames += frames;
+        if self.motion != Motion::Wandering {
+            self.frames_at_rest += frames;
+        }
     }
 
     /// Sets the fault of the frames to come; `None` for none.
@@ -115,8 +145,10 @@ impl Simulated {
     pub fn next_frame(&mut self, readings_ohm: &mut [f64]) -> Result<f64, SensorError> {
         assert_eq!(readings_ohm.len(), self.readings());
         let time_s = self.frames as f64 / self.frames_per_second;
-        self.frames += 1;
-        let (place_mm, depth) = self.path.at(time_s);
+        let along_path_s = (self.frames - self.frames_at_rest) as f64 / self.frames_per_second;
+        self.skip(1);
+        let (place_mm, depth) = self.path.at(along_path_s);
+        let depth = if self.motion == Motion::Lifted { 0.0 } else { depth };
         self.deformation = self.indenter.press(&self.model, place_mm, depth * self.stroke_mm);
         let columns = self.model.scale.columns();
         for (&row, readings_ohm) in self.rows.iter().zip(readings_ohm.chunks_exact_mut(columns)) {
@@ -175,5 +207,53 @@ impl Path {
         };
         let place_mm = self.middle_mm + self.reach_mm * DVec2::new(wave(0), wave(1));
         (place_mm, (0.4 + 0.6 * wave(2)).max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Noise;
+
+    fn source() -> Simulated {
+        let scene = Scene {
+            noise: Noise::default(),
+            ..Scene::default()
+        };
+        Simulated::new(&SensorModel::new("4x4_2x12".parse().unwrap()), &scene, Seed(3), 50.0).unwrap()
+    }
+
+    fn next(source: &mut Simulated) -> (f64, Vec<f64>) {
+        let mut ohm = vec![0.0; source.readings()];
+        (source.next_frame(&mut ohm).unwrap(), ohm)
+    }
+
+    #[test]
+    fn a_held_indenter_stays_a_lifted_one_leaves_no_trace_and_both_go_on_from_there() {
+        let (mut source, mut wandering) = (source(), source());
+        let path: Vec<Vec<f64>> = (0..40).map(|_| next(&mut wandering).1).collect();
+        for frame in &path[..20] {
+            assert_eq!(&next(&mut source).1, frame);
+        }
+        source.set_motion(Motion::Held);
+        for frame in 20..25 {
+            let (time_s, ohm) = next(&mut source);
+            assert_eq!((time_s, &ohm), (f64::from(frame) / 50.0, &path[20]));
+        }
+        source.set_motion(Motion::Lifted);
+        next(&mut source);
+        assert!((0..4).all(|row| source.deformation().row_mm(row).iter().all(|u| u.length() == 0.0)));
+        source.set_motion(Motion::Wandering);
+        for frame in &path[20..] {
+            assert_eq!(&next(&mut source).1, frame);
+        }
+    }
+
+    #[test]
+    fn frames_that_nobody_takes_are_passed_over() {
+        let (mut source, mut whole) = (source(), source());
+        source.skip(7);
+        (0..7).for_each(|_| drop(next(&mut whole)));
+        assert_eq!(next(&mut source), next(&mut whole));
     }
 }

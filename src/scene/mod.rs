@@ -8,14 +8,16 @@ mod noise;
 pub(crate) mod normal;
 mod relative_noise;
 mod rows;
+mod touch;
 
 pub use deformation::Deformation;
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
-pub use loading::{DeformationSampler, Indenter, IndenterShape, Loading, Span};
+pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
 pub use noise::{Noise, NoiseSource, NoisySets};
 pub use relative_noise::RelativeNoise;
 pub use rows::{RowModel, Rows};
+pub use touch::{Print, Touch};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

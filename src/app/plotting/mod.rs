@@ -1,7 +1,9 @@
 //! Figures on the screen: each is the value that is also printed. It knows no view.
 
+mod cells;
 mod colours;
 mod heat_map;
+mod heat_map_frame;
 mod legend;
 mod plot;
 mod plot_figure;
@@ -9,6 +11,7 @@ mod strip;
 #[cfg(test)]
 mod tests;
 
+pub use cells::cells_ui;
 pub use colours::hue_colour;
 pub use heat_map::{CellPointed, heat_map_ui};
 pub use legend::{legend_ui, legend_width};

@@ -1,7 +1,7 @@
 use std::{
     fmt,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, mpsc::Sender},
 };
 
 use crate::{app::training_worker::RunId, evaluation::Run};
@@ -44,6 +44,8 @@ impl FileWords {
 pub enum Purpose {
     /// Take up the training saved in it.
     Open,
+    /// Tell its path to the view that asked for it.
+    Choose(Sender<PathBuf>),
     /// Write it about this training, which the worker has.
     SaveTraining(RunId, ContentsOfRun),
     /// Write it.
@@ -133,7 +135,7 @@ impl FileTask {
 
     /// Returns true if the file is read, not written.
     pub fn is_read(&self) -> bool {
-        matches!(self.purpose, Purpose::Open)
+        matches!(self.purpose, Purpose::Open | Purpose::Choose(_))
     }
 
     /// The word for what is done with it.

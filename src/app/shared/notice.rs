@@ -28,6 +28,8 @@ pub enum Matter {
     TradeOff,
     /// The view with two trainings side by side.
     Comparison,
+    /// Frames decoded as they come.
+    Live,
     /// What the next window finds again.
     Memory,
 }

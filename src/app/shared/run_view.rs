@@ -3,7 +3,7 @@ use crate::{
         test_view::TestView,
         training_worker::{Began, Progress, RunId, RunResult, append_epochs},
     },
-    evaluation::{Baselines, PublishedErrors, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, PastNetworks, PublishedErrors, SimulatedSettings, StartRecord},
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -31,6 +31,8 @@ pub struct RunView {
     pub stages: Vec<Stage>,
     /// State of each start when last reported; empty where there is one only.
     pub starts: Vec<StartRecord>,
+    /// Networks of the epochs so far.
+    pub past: PastNetworks,
     /// Result of the best network on the test set.
     pub result: Option<RunResult>,
     /// Reason for which it ended, if it has.
@@ -60,6 +62,7 @@ impl RunView {
             history: Vec::new(),
             stages: Vec::new(),
             starts: Vec::new(),
+            past: PastNetworks::default(),
             result: None,
             stop_reason: None,
             is_saved: false,
@@ -72,12 +75,14 @@ impl RunView {
             epochs,
             stages,
             starts,
+            past,
             result,
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
         append_epochs(&mut self.history, epochs);
         self.stages = stages;
+        self.past = past;
         if let Some(starts) = starts {
             self.starts = starts;
         }

@@ -1,6 +1,6 @@
 use std::fmt::Debug;
 
-use eframe::egui::Ui;
+use eframe::egui::{Context, Ui};
 
 use super::{Effect, Export, Offers, Shared, training_status_ui};
 use crate::app::theme::space;
@@ -24,6 +24,9 @@ pub trait View: Debug {
 
     /// Offers what can be done in it, and does what the user wants of that.
     fn offer_actions(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Does what the pointer means before anything is drawn, so that all of the window shows it in the same frame.
+    fn take_pointer(&mut self, _ctx: &Context, _shared: &Shared) {}
 
     /// Returns the columns of a window of this width in points.
     fn columns(&self, _window_width: f32) -> Columns {

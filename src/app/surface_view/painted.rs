@@ -8,7 +8,7 @@ use glam::Vec2;
 use super::ribbon;
 use crate::{
     app::theme::{Palette, Theme, rgb, type_size},
-    figure::surface::{self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Surface, Text, ViewMode},
+    figure::surface::{self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Sight, Surface, Text, ViewMode},
 };
 
 /// A laid-out surface and what it was made of.
@@ -22,6 +22,7 @@ pub(super) struct Painted {
     texts: Vec<Text>,
     mesh: Arc<Mesh>,
     pub(super) dots: Dots,
+    pub(super) sight: Sight,
 }
 
 impl Painted {
@@ -63,6 +64,7 @@ impl Painted {
             texts: drawing.texts,
             mesh: Arc::new(mesh(&drawing.mesh)),
             dots: drawing.dots,
+            sight: drawing.sight,
         }
     }
 

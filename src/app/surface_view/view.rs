@@ -10,7 +10,7 @@ use crate::{
     app::theme::{Theme, type_size},
     export::format_number,
     figure::{
-        surface::{OrbitCamera, Quantity, Surface, ViewMode},
+        surface::{OrbitCamera, Quantity, Sight, Surface, ViewMode},
         ticks::tick_text,
     },
 };
@@ -37,6 +37,8 @@ pub struct SurfaceViewResponse {
     pub hovered_node: Option<usize>,
     /// Position of that node on the screen.
     pub hovered_at: Option<Pos2>,
+    /// The way back from points on the screen; `None` where there is no room for a picture.
+    pub sight: Option<Sight>,
     /// Of the whole card.
     pub response: Response,
 }
@@ -59,9 +61,19 @@ impl SurfaceViewResponse {
 impl SurfaceView<'_> {
     /// Draws the surface in the space that is left and lets the user turn it.
     pub fn show(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
+        self.show_with(ui, camera, Hand::Turns)
+    }
+
+    /// As [`Self::show`], but the primary button, scrolling and the keys are left to the caller: drags with shift or another
+    /// button turn.
+    pub fn show_touched(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
+        self.show_with(ui, camera, Hand::Touches)
+    }
+
+    fn show_with(self, ui: &mut Ui, camera: OrbitCamera, hand: Hand) -> SurfaceViewResponse {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let camera = match self.surface.mode {
-            ViewMode::ThreeD => operate(ui, &response, camera),
+            ViewMode::ThreeD => operate(ui, &response, camera, hand),
             ViewMode::Top => camera,
         };
         self.describe(ui, &response);
@@ -69,6 +81,7 @@ impl SurfaceView<'_> {
             camera,
             hovered_node: None,
             hovered_at: None,
+            sight: None,
             response,
         };
         if ui.is_rect_visible(rect) && rect.width() > 60.0 && rect.height() > 60.0 {
@@ -85,7 +98,8 @@ impl SurfaceView<'_> {
     fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
         let painter = ui.painter_at(rect);
         let painted = Painted::of(self.surface, shown.camera, self.theme, ui, &shown.response);
-        let is_idle = !shown.response.dragged();
+        shown.sight = Some(painted.sight);
+        let is_idle = !shown.response.is_pointer_button_down_on();
         let pointer = shown.response.hover_pos().filter(|_| is_idle);
         shown.hovered_node = pointer.and_then(|pointer| painted.dots.nearest(to_glam(pointer)));
         shown.hovered_at = shown
@@ -126,9 +140,18 @@ impl SurfaceView<'_> {
     }
 }
 
+/// Work of the primary button on a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hand {
+    /// It turns the surface.
+    Turns,
+    /// It does what the caller makes of it.
+    Touches,
+}
+
 /// Drags turn, drags with shift or another button shift, scrolling zooms, a double click goes back to the start.
 /// With the focus: arrow keys, plus, minus, Home.
-fn operate(ui: &Ui, response: &Response, camera: OrbitCamera) -> OrbitCamera {
+fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> OrbitCamera {
     let mut camera = camera.clamped();
     if response.clicked() || response.drag_started() {
         response.request_focus();
@@ -136,10 +159,13 @@ fn operate(ui: &Ui, response: &Response, camera: OrbitCamera) -> OrbitCamera {
     let drag = response.drag_delta();
     if response.dragged() && drag != Vec2::ZERO {
         let is_shift = ui.input(|input| input.modifiers.shift);
-        camera = if response.dragged_by(PointerButton::Primary) && !is_shift {
-            camera.dragged(drag.x, drag.y)
-        } else {
-            camera.panned(drag.x / response.rect.width(), drag.y / response.rect.height())
+        let is_primary = response.dragged_by(PointerButton::Primary);
+        camera = match hand {
+            Hand::Touches if is_primary && !is_shift => camera,
+            Hand::Turns if is_shift || !is_primary => {
+                camera.panned(drag.x / response.rect.width(), drag.y / response.rect.height())
+            }
+            _ => camera.dragged(drag.x, drag.y),
         };
     }
     if response.contains_pointer() {
@@ -172,7 +198,7 @@ fn operate(ui: &Ui, response: &Response, camera: OrbitCamera) -> OrbitCamera {
             }
         });
     }
-    if response.double_clicked() {
+    if response.double_clicked() && hand == Hand::Turns {
         OrbitCamera::default()
     } else {
         camera

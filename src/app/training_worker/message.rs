@@ -15,7 +15,7 @@ use crate::{
         job::JobError,
         test_view::{TestView, TestViewError},
     },
-    evaluation::{Baselines, Errors, Run, RunFlaw, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, Errors, PastNetworks, Run, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
@@ -120,6 +120,8 @@ pub struct Progress {
     pub stages: Vec<Stage>,
     /// State of each start, where there are several; now and then only.
     pub starts: Option<Vec<StartRecord>>,
+    /// Networks of the epochs so far.
+    pub past: PastNetworks,
     /// Result so far.
     pub result: RunResult,
     /// Reason for which the training has ended, if it has.
@@ -162,8 +164,10 @@ pub struct RunResult {
     pub wall_time: Option<Duration>,
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
-    /// The networks; there when the training pauses or ends.
-    pub networks: Option<Arc<Networks>>,
+    /// True once the training is paused or has ended.
+    pub is_standing: bool,
+    /// The networks.
+    pub networks: Arc<Networks>,
 }
 
 #[cfg(test)]

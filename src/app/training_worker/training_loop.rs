@@ -16,7 +16,7 @@ use crate::{
         job::Report,
         test_view::{TestView, TestViewError},
     },
-    evaluation::{Run, RunError, network_frame_time},
+    evaluation::{PastNetworks, Run, RunError, network_frame_time},
     export::{CheckpointFile, NetworkFile},
     training::TrainingSettings,
 };
@@ -36,6 +36,8 @@ pub(super) struct TrainingLoop<'a> {
     /// Preparations so far.
     preparations: u64,
     run: Option<Run>,
+    /// Networks of its past epochs.
+    past: PastNetworks,
     /// Which training `run` is.
     id: Option<RunId>,
     is_paused: bool,
@@ -54,6 +56,7 @@ impl<'a> TrainingLoop<'a> {
             cancelled,
             preparations: 0,
             run: None,
+            past: PastNetworks::default(),
             id: None,
             is_paused: false,
             is_kept: false,
@@ -149,6 +152,8 @@ impl<'a> TrainingLoop<'a> {
         };
         // What had ended before it was saved was kept when it ended.
         self.is_kept = run.stop_reason().is_some();
+        self.past = PastNetworks::default();
+        self.past.record(&run);
         (self.run, self.id) = (Some(run), Some(began.id));
         self.is_paused = is_paused;
         self.reported = (0, 0);
@@ -175,6 +180,7 @@ impl<'a> TrainingLoop<'a> {
     fn train_one_epoch(&mut self) {
         let Some(run) = &mut self.run else { return };
         let ended = run.step().is_some();
+        self.past.record(run);
         if ended || Instant::now() >= self.next_report {
             self.report_progress();
         }
@@ -185,7 +191,8 @@ impl<'a> TrainingLoop<'a> {
         let begun = Instant::now();
         let number = run.leader_number();
         let trainer = &run.trainers()[number];
-        let decoupled_mm = run.decouple_test();
+        let networks = run.network();
+        let decoupled_mm = networks.decouple(run.test());
         // Every training of the window is simulated.
         let Some(errors) = run.errors_of(&decoupled_mm) else {
             return;
@@ -206,6 +213,7 @@ impl<'a> TrainingLoop<'a> {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
             starts,
+            past: self.past.clone(),
             result: RunResult {
                 decoupled_mm: Arc::new(decoupled_mm),
                 errors,
@@ -219,7 +227,8 @@ impl<'a> TrainingLoop<'a> {
                     .count(),
                 wall_time: run.wall_time(),
                 frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
-                networks: is_standing.then(|| Arc::new(run.network())),
+                is_standing,
+                networks: Arc::new(networks),
             },
             stop_reason: run.stop_reason(),
         });

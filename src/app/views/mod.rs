@@ -7,6 +7,7 @@
 mod compare;
 mod experiments;
 mod identifiability;
+mod live;
 mod trade_off;
 mod train;
 
@@ -19,8 +20,8 @@ pub use trade_off::{TradeOffEnding, TradeOffPlan};
 pub use train::{BottomTab, DecoderResult};
 
 use self::{
-    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, trade_off::TradeOffView,
-    train::TrainView,
+    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
+    trade_off::TradeOffView, train::TrainView,
 };
 pub(super) use train::{CHECKPOINT, checkpoint_task};
 
@@ -37,6 +38,8 @@ pub struct Views {
     pub identifiability: IdentifiabilityView,
     /// View of the speed and the accuracy of each decoder.
     pub trade_off: TradeOffView,
+    /// View of frames decoded as they come.
+    pub live: LiveView,
 }
 
 impl Views {
@@ -48,17 +51,19 @@ impl Views {
             compare: CompareView::new(Arc::clone(wake)),
             identifiability: IdentifiabilityView::new(Arc::clone(wake)),
             trade_off: TradeOffView::new(Arc::clone(wake)),
+            live: LiveView::new(Arc::clone(wake)),
         }
     }
 
     /// In the order of the top bar. The first is the one that trains.
-    pub fn all(&mut self) -> [&mut dyn View; 5] {
+    pub fn all(&mut self) -> [&mut dyn View; 6] {
         [
             &mut self.train,
             &mut self.experiments,
             &mut self.compare,
             &mut self.identifiability,
             &mut self.trade_off,
+            &mut self.live,
         ]
     }
 }

@@ -36,7 +36,7 @@ impl DecouplerWindow {
     /// Offers what can be done now, by the view on show and by the window, and does what the user wants of that.
     pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
         // A question is to be answered first.
-        let hears_keys = self.saving.is_none() && self.closing.is_none() && matches!(self.overlay, Overlay::None);
+        let hears_keys = !self.is_asked();
         let is_listed = self.picked.is_some() || matches!(self.overlay, Overlay::Palette(_));
         let mut offers = Offers::new(ctx, self.picked.take(), hears_keys);
         self.views.all()[self.shown].offer_actions(&mut offers, &self.shared, effects);
@@ -74,6 +74,11 @@ impl DecouplerWindow {
             self.overlay = Overlay::Keys;
         }
         offers.into_actions()
+    }
+
+    /// Returns true while something lies over the window that is to be answered or closed first.
+    pub(super) fn is_asked(&self) -> bool {
+        self.saving.is_some() || self.closing.is_some() || !matches!(self.overlay, Overlay::None)
     }
 
     /// Shows the list that the user asked for.

@@ -133,6 +133,11 @@ impl DecouplerWindow {
                 });
             }
             Purpose::Save(contents) => self.files.write(path, move |path| contents.write(path)),
+            Purpose::Choose(chosen) => {
+                // A view that has asked for another file since has no use for this one.
+                let _ = chosen.send(path);
+                self.ctx.request_repaint();
+            }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
             Purpose::Open => self.prepare(Request::Open(path)),

@@ -136,7 +136,11 @@ impl DecouplerWindow {
         }
         let mut effects = Vec::new();
         let actions = self.offer_actions(ui.ctx(), &mut effects);
+        let is_asked = self.is_asked();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
+        if !is_asked {
+            view.take_pointer(ui.ctx(), shared);
+        }
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         let window_width = ui.available_width();

@@ -11,6 +11,7 @@ use super::{
     plan_axes::PlanAxes,
     projection::PlotBox,
     shapes::{Bounds, Line, Text},
+    sight::Sight,
     surface_figure::{Surface, ViewMode},
 };
 use crate::figure::colour_map::ColourMap;
@@ -41,6 +42,8 @@ pub struct Drawing {
     pub mesh: Mesh,
     /// The nodes.
     pub dots: Dots,
+    /// From points on the screen back to millimetres.
+    pub sight: Sight,
 }
 
 impl Surface {
@@ -50,19 +53,21 @@ impl Surface {
         let names = ["x (mm)", "y (mm)", self.quantity.axis_name()];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);
-        let (lines, labels, (mesh, dots)) = match self.mode {
+        let (lines, labels, (mesh, dots), sight) = match self.mode {
             ViewMode::ThreeD => {
                 let [width, height] = (card.bounds.size() - LABELS).max(Vec2::ONE).into();
                 let plot_box = PlotBox::new(min_mm, max_mm, height / width);
                 let axes = BoxAxes::new(card.measure, inner, plot_box, camera, &field.range, names);
                 let painted = self.paint(&field, &Stage::Space(&axes.projection), card);
-                (axes.lines(), axes.labels, painted)
+                let sight = Sight::of_projection(&axes.projection);
+                (axes.lines(), axes.labels, painted, sight)
             }
             ViewMode::Top => {
                 let names = [names[0], names[1]];
                 let axes = PlanAxes::new(card.measure, inner, min_mm.truncate(), max_mm.truncate(), names);
                 let painted = self.paint(&field, &Stage::Plan(&axes), card);
-                (axes.lines(), axes.labels, painted)
+                let sight = Sight::of_plan(&axes);
+                (axes.lines(), axes.labels, painted, sight)
             }
         };
         Drawing {
@@ -70,6 +75,7 @@ impl Surface {
             texts: labels.into_texts(),
             mesh,
             dots,
+            sight,
         }
     }
 

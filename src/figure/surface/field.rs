@@ -10,6 +10,17 @@ use crate::surface::Grid;
 /// Room for overshoots of the surface above and below the range, as a part of it.
 const HEADROOM: f64 = 0.08;
 
+/// Part of a cell that is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum CellPart {
+    /// Not a bit.
+    Nothing,
+    /// What stays in the box.
+    Cut,
+    /// All of it.
+    Whole,
+}
+
 /// A surface on its grid.
 pub(super) struct Field<'a> {
     pub(super) grid: &'a Grid,
@@ -64,16 +75,37 @@ impl<'a> Field<'a> {
     }
 
     /// Corners of the cell at `(ix, iy)`, going round it.
-    fn corners(&self, ix: usize, iy: usize) -> [usize; 4] {
+    pub(super) fn corners(&self, ix: usize, iy: usize) -> [usize; 4] {
         [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)].map(|(ix, iy)| self.grid.index(ix, iy))
     }
 
-    /// Returns true if a cell has values and, in the extrapolated margin, they stay in the box.
-    pub(super) fn is_drawn(&self, ix: usize, iy: usize) -> bool {
+    /// Places of the corners of a cell, going round it.
+    pub(super) fn corners_mm(&self, ix: usize, iy: usize) -> [DVec3; 4] {
+        let (x_mm, y_mm) = (self.grid.x_mm(), self.grid.y_mm());
+        let corners = [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)];
+        corners.map(|(ix, iy)| DVec3::new(x_mm[ix], y_mm[iy], self.values[self.grid.index(ix, iy)]))
+    }
+
+    /// Returns how much of a cell is drawn: between the nodes all of it, its values cut off at the box; of the extrapolated
+    /// margin what stays in the box.
+    pub(super) fn part(&self, ix: usize, iy: usize) -> CellPart {
         let is_inside = self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
-        let is_shown = |value: f64| value.is_finite() && (is_inside || self.shown.contains(&value));
-        let corners = self.corners(ix, iy);
-        corners.iter().all(|&corner| is_shown(self.values[corner]))
+        let values = self.corners(ix, iy).map(|corner| self.values[corner]);
+        let (low, high) = (*self.shown.start(), *self.shown.end());
+        if !values.iter().all(|value| value.is_finite()) {
+            CellPart::Nothing
+        } else if is_inside || values.iter().all(|value| self.shown.contains(value)) {
+            CellPart::Whole
+        } else if values.iter().all(|value| *value < low) || values.iter().all(|value| *value > high) {
+            CellPart::Nothing
+        } else {
+            CellPart::Cut
+        }
+    }
+
+    /// Values that the box has room for.
+    pub(super) fn shown(&self) -> &RangeInclusive<f64> {
+        &self.shown
     }
 }
 

@@ -1,10 +1,17 @@
 //! The height field as one mesh, painted from far to near so that what is near hides what is far.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{contour::cross_cell, field::Field, light::Shade, plan_axes::PlanAxes, projection::Projection};
+use super::{
+    contour::cross_cell,
+    cut::cut_cell,
+    field::{CellPart, Field},
+    light::Shade,
+    plan_axes::PlanAxes,
+    projection::Projection,
+};
 use crate::figure::{
     colour_map::{ColourMap, Rgb, is_light},
     ticks::{multiples, step_for},
@@ -67,11 +74,15 @@ pub struct ContourLine {
 /// The surface with its contour lines.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// The grid points, `x points × y points`.
+    /// The grid points, `x points × y points`, followed by the corners of cells cut at the ends of the value axis.
     pub vertices: Vec<Vertex>,
+    /// Number of grid points.
+    points: u32,
+    /// Corners of the pieces of cut cells, going round; a triangle has its last one twice.
+    pieces: Vec<[u32; 4]>,
     /// Number of points along y.
     across: usize,
-    /// Cells by their first corner, in the order of painting.
+    /// Cells by their first corner, or as many more than the grid points as the piece's number, in the order of painting.
     cells: Vec<u32>,
     /// Contour lines in the order of painting.
     lines: Vec<ContourLine>,
@@ -92,6 +103,7 @@ impl Mesh {
         if mesh.vertices.is_empty() {
             return mesh;
         }
+        mesh.points = mesh.vertices.len() as u32;
         let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
         let rows = far_to_near(y_mm, eye_mm.y);
         let levels = contour_levels(&field.range);
@@ -99,23 +111,55 @@ impl Mesh {
             .iter()
             .map(|level| is_light(map.at(field.share(*level))))
             .collect();
-        let mut lineless = 0..0;
+        let mut lineless = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
-            let drawn = rows.iter().filter(|&&iy| field.is_drawn(ix, iy));
-            mesh.cells.extend(drawn.map(|&iy| field.grid.index(ix, iy) as u32));
+            let mut strip = Vec::with_capacity(rows.len());
+            for &iy in &rows {
+                match field.part(ix, iy) {
+                    CellPart::Nothing => continue,
+                    CellPart::Whole => mesh.cells.push(field.grid.index(ix, iy) as u32),
+                    CellPart::Cut => mesh.cut(ix, iy, field, stage),
+                }
+                strip.push((ix, iy));
+            }
             // Lines lag one strip behind, or the next strip would cover half of their width.
-            let strip = lineless.end..mesh.cells.len();
-            mesh.end_strip(lineless, field, &levels, &inks);
+            mesh.end_strip(&lineless, field, stage, (&levels, &inks));
             lineless = strip;
         }
-        mesh.end_strip(lineless, field, &levels, &inks);
+        mesh.end_strip(&lineless, field, stage, (&levels, &inks));
         mesh
     }
 
+    /// Appends what the box leaves of a cell.
+    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Stage<'_>) {
+        let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
+        let (low, high) = (*field.shown().start(), *field.shown().end());
+        for polygon in cut_cell(field.corners_mm(ix, iy), low, high) {
+            let first = self.vertices.len() as u32;
+            self.vertices.extend(polygon.iter().map(|corner| Vertex {
+                at: stage.point(corner.place),
+                ..mixed(&of_cell, corner.shares)
+            }));
+            let last = polygon.len() as u32 - 1;
+            for second in (1..last).step_by(2) {
+                self.cells.push(self.points + self.pieces.len() as u32);
+                let others = [second, second + 1, (second + 2).min(last)];
+                let [b, c, d] = others.map(|corner| first + corner);
+                self.pieces.push([first, b, c, d]);
+            }
+        }
+    }
+
     /// Appends the contour lines in `cells` and ends the strip.
-    fn end_strip(&mut self, cells: Range<usize>, field: &Field<'_>, levels: &[f64], inks: &[bool]) {
-        for at in cells {
-            let corners = self.corners(self.cells[at]);
+    fn end_strip(
+        &mut self,
+        cells: &[(usize, usize)],
+        field: &Field<'_>,
+        stage: &Stage<'_>,
+        (levels, inks): (&[f64], &[bool]),
+    ) {
+        for &(ix, iy) in cells {
+            let corners = field.corners(ix, iy);
             let values = corners.map(|corner| field.values[corner]);
             let (low, high) = values
                 .iter()
@@ -124,11 +168,17 @@ impl Mesh {
                 continue;
             }
             let [a, b, c, d] = corners.map(|corner| self.vertices[corner]);
-            let places = [a.at, b.at, c.at, d.at];
             let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
+            let is_cut = field.part(ix, iy) == CellPart::Cut;
+            let (places, corners_mm) = ([a.at, b.at, c.at, d.at], field.corners_mm(ix, iy));
+            // A cell that is cut has corners that are not seen where they are.
+            let point = |(a, b, part): (usize, usize, f32)| match is_cut {
+                true => stage.point(corners_mm[a].lerp(corners_mm[b], f64::from(part))),
+                false => places[a].lerp(places[b], part),
+            };
             for (&level, &is_black) in levels.iter().zip(inks).filter(|(level, _)| (low..high).contains(level)) {
                 cross_cell(values, level, |ends| {
-                    let [from, to] = ends.map(|(a, b, part)| places[a].lerp(places[b], part));
+                    let [from, to] = ends.map(point);
                     self.lines.push(ContourLine {
                         from,
                         to,
@@ -143,6 +193,9 @@ impl Mesh {
 
     /// Indices of the corners of a cell, going round it.
     pub fn corners(&self, cell: u32) -> [usize; 4] {
+        if let Some(piece) = cell.checked_sub(self.points) {
+            return self.pieces[piece as usize].map(|corner| corner as usize);
+        }
         let (a, b) = (cell as usize, cell as usize + self.across);
         [a, b, b + 1, a + 1]
     }
@@ -198,6 +251,22 @@ fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Vec<Vertex
         }
     }
 }
+/// A vertex between others, by its share of each.
+fn mixed(vertices: &[Vertex; 4], shares: [f64; 4]) -> Vertex {
+    let mix = |of: &dyn Fn(&Vertex) -> f32| -> f32 {
+        vertices
+            .iter()
+            .zip(shares)
+            .map(|(vertex, share)| of(vertex) * share as f32)
+            .sum()
+    };
+    Vertex {
+        at: Vec2::ZERO,
+        colour: [0, 1, 2].map(|part| mix(&|vertex| f32::from(vertex.colour[part])).round() as u8),
+        opacity: mix(&|vertex| vertex.opacity),
+    }
+}
+
 /// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
 /// micrometre would draw lines all over it.
 fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
@@ -271,13 +340,15 @@ mod tests {
                 let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
                 plot_box.unit(place).distance(projection.eye)
             };
-            let corners: Vec<(Vec2, f32)> = (0..mesh.vertices.len())
+            let corners: Vec<(Vec2, f32)> = (0..field.values.len())
                 .map(|index| (mesh.vertices[index].at, distance(index)))
                 .collect();
             for probe in 0..100 {
                 let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
                 let cells = mesh.strips().flat_map(|(cells, _)| cells);
-                let painted = cells.flat_map(|&cell| {
+                // Those cut at the ends of the axis have corners of their own.
+                let whole = cells.filter(|cell| (**cell as usize) < field.values.len());
+                let painted = whole.flat_map(|&cell| {
                     let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
                     [[a, b, c], [a, c, d]]
                         .into_iter()

@@ -5,12 +5,14 @@
 //! a renderer is to paint them.
 //!
 //! `camera` and `projection` say where things lie; `box_axes` and `plan_axes` lay out the frame with its ticks, for which
-//! `labels` finds room; `mesh` is the height field with its contour lines from far to near; `nodes` are the dots on it.
+//! `labels` finds room; `mesh` is the height field with its contour lines from far to near; `nodes` are the dots on it. `sight` leads back from the
+//! screen, and `pick` to the surface.
 
 mod box_axes;
 mod camera;
 mod colour_scale;
 mod contour;
+mod cut;
 mod drawing;
 mod edge;
 mod field;
@@ -18,10 +20,12 @@ mod labels;
 mod light;
 mod mesh;
 mod nodes;
+mod pick;
 mod plan_axes;
 mod projection;
 mod quantity;
 mod shapes;
+mod sight;
 mod surface_figure;
 
 pub use camera::OrbitCamera;
@@ -31,4 +35,5 @@ pub use mesh::{ContourLine, Mesh, Vertex};
 pub use nodes::Dots;
 pub use quantity::Quantity;
 pub use shapes::{Bounds, Disc, Ink, Line, Text};
+pub use sight::{AboveSight, EyeSight, Ray, Sight};
 pub use surface_figure::{Surface, SurfaceFigure, ViewMode};

@@ -86,6 +86,12 @@ impl<'a> PlanAxes<'a> {
         Vec2::new(self.frame.min.x + from_corner.x, self.frame.max.y - from_corner.y)
     }
 
+    /// A corner in millimetres, its point on the screen, and the scale.
+    pub(super) fn corner(&self) -> (DVec2, Vec2, f64) {
+        let corner = Vec2::new(self.frame.min.x, self.frame.max.y);
+        (self.min_mm, corner, self.points_per_mm)
+    }
+
     /// The outline with its ticks.
     pub(super) fn lines(&self) -> Vec<Line> {
         let line = |from: Vec2, to: Vec2| Line {

@@ -1,6 +1,6 @@
 //! From millimetres to points on the screen.
 
-use glam::{DVec3, Mat4, Vec2, Vec3, camera::rh};
+use glam::{DVec2, DVec3, Mat4, Vec2, Vec3, camera::rh};
 
 use super::{camera::OrbitCamera, shapes::Bounds};
 
@@ -8,6 +8,8 @@ use super::{camera::OrbitCamera, shapes::Bounds};
 const EYE_DISTANCE: f32 = 4.0;
 /// The least ratio of the box's horizontal sides; longer arrays are drawn shorter than they are.
 const LEAST_SIDE: f32 = 0.3;
+/// Angle of view, in radians; what is seen is scaled anyway.
+const VIEW: f32 = 0.5;
 /// Heights of the box in units of its longer horizontal side: within these, the picture gets the shape of its card.
 const HEIGHT: std::ops::RangeInclusive<f32> = 0.4..=1.35;
 
@@ -19,8 +21,8 @@ pub(super) struct PlotBox {
     /// Sides in box units; the longer horizontal side is 1.
     sides: Vec3,
     /// Box units per millimetre.
-    per_mm: DVec3,
-    middle_mm: DVec3,
+    pub(super) per_mm: DVec3,
+    pub(super) middle_mm: DVec3,
 }
 
 impl PlotBox {
@@ -103,7 +105,7 @@ impl Projection {
         let distance = EYE_DISTANCE * 0.5 * plot_box.sides.length();
         let eye = camera.towards_eye() * distance;
         let view = rh::view::look_at_mat4(eye, Vec3::ZERO, Vec3::Z);
-        let lens = rh::proj::opengl::perspective(0.5, 1.0, 0.05 * distance, 4.0 * distance);
+        let lens = rh::proj::opengl::perspective(VIEW, 1.0, 0.05 * distance, 4.0 * distance);
         let mut fitted = Self {
             plot_box,
             eye,
@@ -128,6 +130,12 @@ impl Projection {
     pub(super) fn point_of_unit(&self, unit: Vec3) -> Vec2 {
         let seen = self.matrix.project_point3(unit);
         Vec2::new(seen.x, -seen.y) * self.scale + self.offset
+    }
+
+    /// Points on the screen of a tangent of 1, and the point where the eye looks.
+    pub(super) fn points_and_offset(&self) -> (f64, DVec2) {
+        let per_tangent = 1.0 / (0.5 * f64::from(VIEW)).tan();
+        (per_tangent * f64::from(self.scale), self.offset.as_dvec2())
     }
 
     /// The rectangle that the box covers.

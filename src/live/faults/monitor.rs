@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     scene::Scene,
-    sensor::{SensorError, SensorModel},
+    sensor::{ArrayScale, SensorError, SensorModel},
 };
 
 /// Watches whether Eq. (2) explains the frames, and names the wire at fault if it does not.
@@ -61,6 +61,9 @@ pub enum FaultEvent {
 
 /// Normal deviate that is exceeded with a probability of 10⁻³.
 const DEVIATE: f64 = 3.090_232_306_167_814;
+/// Largest arrays that are checked: unknowns of a row, and column-wires.
+const MOST_UNKNOWNS: usize = 64;
+const MOST_COLUMNS: usize = 128;
 /// Largest factor of [`FaultMonitor::PERSISTENCE`] between comparisons of frames that nothing explains.
 const LONGEST_WAIT: usize = 1024;
 
@@ -69,6 +72,11 @@ impl FaultMonitor {
     pub const PERSISTENCE: usize = 4;
     /// Smallest probability at which a fault is named.
     pub const SURE: f64 = 0.99;
+
+    /// Returns `true` unless the array is so large that checking would take too long for every frame.
+    pub fn is_affordable(scale: ArrayScale, scene: &Scene) -> bool {
+        scene.unknowns_per_row(scale) <= MOST_UNKNOWNS && scale.columns() <= MOST_COLUMNS
+    }
 
     /// Prepares to check frames of `rows`, with the noise of `scene`, which must have some.
     ///

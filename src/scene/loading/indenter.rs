@@ -2,7 +2,7 @@ use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::press::{Body, Press};
+use super::press::{Body, Contact, Press};
 use crate::{
     scene::{Deformation, SceneError},
     sensor::SensorModel,
@@ -181,6 +181,20 @@ impl Indenter {
     /// Deformation of the array when the indenter of middle size, upright, presses `depth_mm` deep at (x, y); a cylinder
     /// or an edge along y.
     pub(crate) fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
+        let press = self.upright(place_mm, depth_mm);
+        Deformation::from_fn(model.scale, |row, node| {
+            let rest_mm = model.geometry.row_node_mm(model.scale, row, node);
+            let depth_at_mm = press.depth_at_mm(rest_mm.x, rest_mm.y);
+            DVec3::Z * depth_at_mm.clamp(0.0, depth_mm)
+        })
+    }
+
+    /// The part of the surface that touches the indenter of [`Self::press`].
+    pub fn contact(&self, depth_mm: f64) -> Contact {
+        self.upright(DVec2::ZERO, depth_mm).contact()
+    }
+
+    fn upright(&self, place_mm: DVec2, depth_mm: f64) -> Press {
         let middle = |span: Span| 0.5 * (span.smallest + span.largest);
         let body = match self.shape {
             IndenterShape::Sphere { radius_mm } => Body::Sphere(middle(radius_mm)),
@@ -188,12 +202,7 @@ impl Indenter {
             IndenterShape::Cylinder { radius_mm, .. } => Body::Cylinder(middle(radius_mm)),
             IndenterShape::Edge { .. } => Body::Edge,
         };
-        let press = Press::new(body, place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm);
-        Deformation::from_fn(model.scale, |row, node| {
-            let rest_mm = model.geometry.row_node_mm(model.scale, row, node);
-            let depth_at_mm = press.depth_at_mm(rest_mm.x, rest_mm.y);
-            DVec3::Z * depth_at_mm.clamp(0.0, depth_mm)
-        })
+        Press::new(body, place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm)
     }
 }
 

@@ -8,6 +8,7 @@ mod sampler;
 mod smooth_field;
 
 pub use indenter::{Indenter, IndenterShape, Span};
+pub use press::Contact;
 pub use sampler::DeformationSampler;
 
 use std::{fmt, str::FromStr};

@@ -11,6 +11,23 @@ pub(super) enum Body {
     Edge,
 }
 
+/// Part of the surface that touches an upright indenter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Contact {
+    /// A disc around the middle, under a ball or a punch.
+    Disc {
+        /// Its radius.
+        radius_mm: f64,
+    },
+    /// A strip along y, as far to the left as to the right of the middle, under a cylinder.
+    Strip {
+        /// Half its width.
+        half_width_mm: f64,
+    },
+    /// All to the left of the line through the middle along y, under a block.
+    HalfPlane,
+}
+
 /// One press of an indenter, prepared to be evaluated at many nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
@@ -78,20 +95,41 @@ impl Press {
         }
     }
 
+    /// The part of the surface that touches the body, were it upright.
+    pub(super) fn contact(&self) -> Contact {
+        match self.face {
+            Face::Sphere { contact, .. } | Face::FlatPunch(contact) => Contact::Disc {
+                radius_mm: contact.radius_mm,
+            },
+            Face::Cylinder { radius_mm } => Contact::Strip {
+                half_width_mm: self.half_width_mm(self.depth_mm, radius_mm),
+            },
+            Face::Edge => Contact::HalfPlane,
+        }
+    }
+
     /// A cylinder of this depth and radius at `distance` from its axis: the parabola depth − distance²/(2 radius) up to
     /// where its slope equals the free surface's, a/radius = depth(a)/spread, and that surface beyond.
     fn cylinder(&self, depth_mm: f64, radius: f64, distance: f64) -> f64 {
         if depth_mm <= 0.0 {
             return 0.0;
         }
-        // √(λ² + 2 radius·depth) − λ, in the unit √(2 radius·depth) so that a long λ neither cancels nor overflows.
-        let unit_mm = radius.sqrt() * (2.0 * depth_mm).sqrt();
-        let length = self.spread_mm / unit_mm;
-        let contact = unit_mm / (length + (1.0 + length * length).sqrt());
+        let contact = self.half_width_mm(depth_mm, radius);
         let distance = distance.abs();
         let inside = distance.min(contact);
         let at_body = depth_mm - inside * inside / (2.0 * radius);
         at_body * (-(distance - inside) / self.spread_mm).exp()
+    }
+
+    /// Distance from its axis up to which a cylinder touches the surface.
+    fn half_width_mm(&self, depth_mm: f64, radius: f64) -> f64 {
+        if depth_mm <= 0.0 {
+            return 0.0;
+        }
+        // √(λ² + 2 radius·depth) − λ, in the unit √(2 radius·depth) so that a long λ neither cancels nor overflows.
+        let unit_mm = radius.sqrt() * (2.0 * depth_mm).sqrt();
+        let length = self.spread_mm / unit_mm;
+        unit_mm / (length + (1.0 + length * length).sqrt())
     }
 }
 

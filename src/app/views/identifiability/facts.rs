@@ -1,12 +1,12 @@
 //! Facts derived from the singular values, in words.
 
-use eframe::egui::{Align, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{RichText, Ui};
 
 use super::Analysis;
 use crate::{
     app::{
         theme::{Theme, space, type_size},
-        widgets::{fields::capitalised, note_ui, section_heading_ui},
+        widgets::{fact_ui, fields::capitalised, note_ui, section_heading_ui},
     },
     export::format_number,
 };
@@ -130,18 +130,4 @@ fn noise_facts(analysis: &Analysis) -> [(&'static str, &'static str, String); 4]
             format!("{} % of {prior} mm", format_number(share)),
         ),
     ]
-}
-
-fn fact_ui(ui: &mut Ui, name: &'static str, meaning: &str, value: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.horizontal(|ui| {
-        let text = |text: &str| RichText::new(text).size(type_size().note);
-        ui.label(text(name).color(dim)).on_hover_text(meaning);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let response = ui.add(Label::new(text(value)).truncate());
-            let label = format!("{name}: {value}");
-            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
-            response.on_hover_text(meaning);
-        });
-    });
 }

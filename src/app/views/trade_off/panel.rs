@@ -106,7 +106,7 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
         let measure = primary_button("▶ Measure").min_size(size);
         let measure = ui.add_enabled(trade.can_measure(shared), measure);
         let why_not = if !trade.is_quiet(shared) {
-            "A training or an experiment is running and would distort the times"
+            "A training, an experiment or live decoding is running and would distort the times"
         } else if trade.running.is_some() {
             "A measurement is already running"
         } else {
@@ -143,7 +143,7 @@ fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
     if !trade.is_quiet(shared) {
         note_ui(
             ui,
-            "A training or an experiment is running and makes these times longer.",
+            "A training, an experiment or live decoding is running and makes these times longer.",
         );
     }
 }

@@ -1,7 +1,10 @@
 use super::state::TrainView;
 use crate::{
     app::shared::Shared,
-    figure::{PlotFigure, error_histogram_figure, loss_figure, node_figure, regression_figure, training_state_figure},
+    figure::{
+        Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, error_histogram_figure, loss_figure, node_figure,
+        regression_figure, training_state_figure,
+    },
 };
 
 /// The charts below the surfaces.
@@ -18,6 +21,8 @@ pub enum BottomTab {
     Regression,
     /// The nodes of the snapshot: the paper's Fig. 6.
     Nodes,
+    /// Readings of the snapshot, where there is no room for a card of their own.
+    Readings,
 }
 
 impl BottomTab {
@@ -29,17 +34,24 @@ impl BottomTab {
             Self::ErrorHistogram => "histogram",
             Self::Regression => "regression",
             Self::Nodes => "nodes",
+            Self::Readings => "readings",
         }
     }
 }
 
 /// The chart on show; `None` before there is anything to draw.
 pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
-    let trained = || shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+    let trained = || shared.shown_run().zip(view.result(shared));
     Some(match view.tab {
         BottomTab::Loss => {
             let (run, result) = trained()?;
-            loss_figure(&run.history, &run.stages, result.best_epoch)
+            let mut figure = loss_figure(&run.history, &run.stages, result.best_epoch);
+            if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
+                let at = LineAt::X(epoch as f64);
+                plot.lines
+                    .push(ReferenceLine::new("network on show", at, Hue::Orange, LineStyle::Solid));
+            }
+            figure
         }
         BottomTab::TrainingState => {
             let (run, _) = trained()?;
@@ -49,10 +61,11 @@ pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigu
         BottomTab::Regression => regression_figure(view.drawn.pairs_mm()?),
         BottomTab::Nodes => {
             let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
-            let frames = &view.drawn.frames;
+            let frames = view.frames();
             let decoupled_mm = frames.decoupled.as_ref().map(|(decoupled, _)| &*decoupled.nodes_mm);
             let bars_mm = view.error_bars_mm();
             node_figure(&frames.actual.nodes_mm, decoupled_mm, bars_mm, nodes_per_row)
         }
+        BottomTab::Readings => return None,
     })
 }

@@ -1,7 +1,9 @@
-use eframe::egui::Ui;
+use eframe::egui::{Ui, UiBuilder};
 
 use super::{
     chart::{BottomTab, chart_figure},
+    press::readings_ui,
+    scrub::{self, scrub_bar_ui},
     state::TrainView,
 };
 use crate::app::{
@@ -11,20 +13,29 @@ use crate::app::{
     widgets::{placeholder_ui, tabs_ui},
 };
 
-const TABS: [(BottomTab, &str); 5] = [
+const TABS: [(BottomTab, &str); 6] = [
     (BottomTab::Loss, "Loss"),
     (BottomTab::TrainingState, "Training state"),
     (BottomTab::ErrorHistogram, "Histogram"),
     (BottomTab::Regression, "Regression"),
     (BottomTab::Nodes, "Nodes"),
+    (BottomTab::Readings, "Readings"),
 ];
 
-/// The charts below the surfaces.
-pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+/// The charts below the surfaces; the readings are one of them where they have no card of their own.
+pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
+    if view.tab == BottomTab::Readings && !has_readings {
+        view.tab = BottomTab::default();
+    }
     let figure = chart_figure(view, shared);
     let before = (view.tab, view.has_error_bars);
+    let tabs = if has_readings {
+        &TABS[..]
+    } else {
+        &TABS[..TABS.len() - 1]
+    };
     let has_room = ui.horizontal(|ui| {
-        view.tab = tabs_ui(ui, "Charts", &TABS, view.tab).unwrap_or(view.tab);
+        view.tab = tabs_ui(ui, "Charts", tabs, view.tab).unwrap_or(view.tab);
         if view.tab == BottomTab::Nodes && shared.result().is_some() {
             error_bars_ui(ui, &mut view.has_error_bars);
         }
@@ -35,9 +46,21 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
             if !has_room.inner {
                 legend_ui(ui, &figure.keys);
             }
+            let past = shared.shown_run().map(|run| &run.past);
+            let past = past.filter(|past| before.0 == BottomTab::Loss && past.epochs().len() > 1);
+            let mut plots = ui.available_rect_before_wrap();
+            if past.is_some() {
+                plots.max.y -= scrub::HEIGHT;
+            }
             // Each tab is zoomed by itself.
-            plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
+            ui.scope_builder(UiBuilder::new().max_rect(plots), |ui| {
+                plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
+            });
+            if let Some(past) = past {
+                scrub_bar_ui(ui, &mut view.scrub, past);
+            }
         }
+        None if view.tab == BottomTab::Readings => readings_ui(ui, view.drops_percent(), shared.test()),
         None => placeholder_ui(ui, hint_of_empty_chart(view.tab)),
     }
     if (view.tab, view.has_error_bars) != before {
@@ -61,6 +84,6 @@ fn hint_of_empty_chart(tab: BottomTab) -> &'static str {
         }
         BottomTab::ErrorHistogram => "The distribution of the z errors in the test set appears here.",
         BottomTab::Regression => "Decoupled against actual z of every node in the test set appears here.",
-        BottomTab::Nodes => "",
+        BottomTab::Nodes | BottomTab::Readings => "",
     }
 }

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use crate::{
     app::{
-        shared::Shared,
+        shared::{RunResult, Shared},
         test_view::{Frame, TestView},
     },
     dataset::Dataset,
@@ -17,6 +17,8 @@ use crate::{
 pub struct Drawn {
     /// The snapshot on show.
     pub frames: Frames,
+    /// Drops of its readings below those at rest, in percent: rows read × M4.
+    pub drops_percent: Option<Array2<f64>>,
     of: Option<Of>,
     snapshot: usize,
     spread_mm: OnceCell<Vec<f64>>,
@@ -24,7 +26,7 @@ pub struct Drawn {
 }
 
 /// The snapshot being drawn.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Frames {
     /// As it is.
     pub actual: Frame,
@@ -50,11 +52,12 @@ impl Of {
 }
 
 impl Drawn {
-    /// Follows what is on show, at the snapshot nearest to the one wished for. Returns that one.
-    pub(super) fn follow(&mut self, shared: &Shared, snapshot: usize) -> usize {
+    /// Follows the test set on show and the network's `result` on it, at the snapshot nearest to the one wished for.
+    /// Returns that one.
+    pub(super) fn follow(&mut self, shared: &Shared, result: Option<&RunResult>, snapshot: usize) -> usize {
         let Some(test) = shared.test() else { return snapshot };
         let snapshot = test.nearest_snapshot(snapshot);
-        let decoupled_mm = shared.result().map(|result| &result.decoupled_mm);
+        let decoupled_mm = result.map(|result| &result.decoupled_mm);
         let is_same = self.of.as_ref().is_some_and(|of| of.is(test, decoupled_mm));
         if is_same && self.snapshot == snapshot {
             return snapshot;
@@ -69,6 +72,7 @@ impl Drawn {
             };
         }
         self.snapshot = snapshot;
+        self.drops_percent = test.drops_percent(&test.readings_ohm(snapshot));
         let actual = test.frame(test.set.targets(), snapshot);
         let decoupled = decoupled_mm.map(|decoupled_mm| test.frame(decoupled_mm.view(), snapshot));
         self.frames = Frames {
@@ -93,7 +97,7 @@ impl Drawn {
     }
 
     /// Actual and decoupled z of the nodes of the test set, in millimetres, once there is a result.
-    pub(super) fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
+    pub fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
         let (test, decoupled_mm) = self.result()?;
         Some(self.pairs_mm.get_or_init(|| z_pairs_mm(test, decoupled_mm)))
     }
@@ -104,7 +108,7 @@ mod tests {
     use super::*;
     use crate::{
         app::{
-            shared::{RunResult, RunView},
+            shared::RunView,
             training_worker::{Began, RunId},
         },
         evaluation::{Run, SimulatedSettings},
@@ -121,7 +125,8 @@ mod tests {
             starts_ended: 0,
             wall_time: None,
             frame_time: None,
-            networks: None,
+            is_standing: true,
+            networks: Arc::new(run.network()),
         }
     }
 
@@ -143,16 +148,20 @@ mod tests {
             baselines: *run.baselines().unwrap(),
         }));
         let mut drawn = Drawn::default();
-        drawn.follow(&shared, 0);
+        drawn.follow(&shared, shared.result(), 0);
         assert!(drawn.pairs_mm().is_none() && drawn.frames.decoupled.is_none());
 
         shared.run.as_mut().unwrap().result = Some(result(&run));
-        assert_eq!(drawn.follow(&shared, 0), 0);
+        assert_eq!(drawn.follow(&shared, shared.result(), 0), 0);
         let first = z_pairs_mm(run.test(), &run.decouple_test());
         assert_eq!(drawn.pairs_mm(), Some(&first[..]));
         let (pairs, spread) = (drawn.pairs_mm().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
         let actual = drawn.frames.actual.nodes_mm.clone();
-        assert_eq!(drawn.follow(&shared, 1_000_000), 3, "the last of four snapshots");
+        assert_eq!(
+            drawn.follow(&shared, shared.result(), 1_000_000),
+            3,
+            "the last of four snapshots"
+        );
         assert_ne!(drawn.frames.actual.nodes_mm, actual);
         assert_eq!(
             drawn.pairs_mm().unwrap().as_ptr(),
@@ -163,7 +172,7 @@ mod tests {
 
         run.step();
         shared.run.as_mut().unwrap().result = Some(result(&run));
-        drawn.follow(&shared, 3);
+        drawn.follow(&shared, shared.result(), 3);
         let next = z_pairs_mm(run.test(), &run.decouple_test());
         assert_ne!(next, first);
         assert_eq!(drawn.pairs_mm(), Some(&next[..]));

@@ -1,13 +1,19 @@
+use std::sync::Arc;
+
+use ndarray::Array2;
+
 use super::{
     chart::BottomTab,
     decoders::{DecoderMeasuring, DecodersState},
-    drawn::Drawn,
+    drawn::{Drawn, Frames},
     paper_figure::PaperFigure,
+    press::PressState,
+    scrub::ScrubState,
 };
 use crate::{
     app::{
         job::Wake,
-        shared::{Effect, Look, RightCard, RunView, Shared},
+        shared::{Effect, Look, RightCard, RunResult, RunView, Shared},
     },
     evaluation::NodeAddress,
     training::StopReason,
@@ -28,6 +34,10 @@ pub struct TrainView {
     pub has_error_bars: bool,
     /// Drawings of the test set.
     pub drawn: Drawn,
+    /// The finger on the actual surface.
+    pub press: PressState,
+    /// The past epoch on show.
+    pub scrub: ScrubState,
     /// Results of other decoders on the test set.
     pub decoders: DecodersState,
     pub(super) measuring: DecoderMeasuring,
@@ -43,6 +53,8 @@ impl TrainView {
             node: None,
             has_error_bars: false,
             drawn: Drawn::default(),
+            press: PressState::new(&wake),
+            scrub: ScrubState::new(Arc::clone(&wake)),
             decoders: DecodersState::default(),
             measuring: DecoderMeasuring::new(wake),
         }
@@ -50,8 +62,35 @@ impl TrainView {
 
     /// Draws what is on show.
     pub(super) fn follow(&mut self, shared: &Shared) {
-        self.snapshot = self.drawn.follow(shared, self.snapshot);
-        self.node = self.node.filter(|&node| node < self.drawn.frames.actual.nodes_mm.len());
+        self.scrub.follow(shared);
+        let result = result_of(&self.scrub, shared);
+        self.snapshot = self.drawn.follow(shared, result, self.snapshot);
+        self.press.follow(shared, result);
+        self.node = self.node.filter(|&node| node < self.frames().actual.nodes_mm.len());
+    }
+
+    /// The result on show: of the training so far, or of the past epoch that was brought back.
+    pub fn result<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
+        result_of(&self.scrub, shared)
+    }
+
+    /// The surfaces on show: those under the finger, or those of the test set.
+    pub fn frames(&self) -> &Frames {
+        self.press.frames().unwrap_or(&self.drawn.frames)
+    }
+
+    /// Drops of the readings of the surface on show below those at rest, in percent: rows read × M4.
+    pub fn drops_percent(&self) -> Option<&Array2<f64>> {
+        match self.press.shown() {
+            Some(shown) => shown.drops_percent.as_ref(),
+            None => self.drawn.drops_percent.as_ref(),
+        }
+    }
+
+    /// Goes to a snapshot of the test set.
+    pub(super) fn show_snapshot(&mut self, snapshot: usize) {
+        self.snapshot = snapshot;
+        self.press.let_go();
     }
 
     /// Returns the root mean square error of each node, where error bars are on and there is a result.
@@ -61,7 +100,7 @@ impl TrainView {
 
     /// Goes to this node and marks it.
     pub(super) fn go_to(&mut self, address: NodeAddress, shared: &Shared) {
-        self.snapshot = address.snapshot;
+        self.show_snapshot(address.snapshot);
         self.node = shared.test().and_then(|test| test.node(address));
     }
 
@@ -82,4 +121,9 @@ impl TrainView {
             effects.push(Effect::Train);
         }
     }
+}
+
+fn result_of<'a>(scrub: &'a ScrubState, shared: &'a Shared) -> Option<&'a RunResult> {
+    let latest = shared.result()?;
+    Some(scrub.result().unwrap_or(latest))
 }

@@ -1,17 +1,32 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
-use super::{drawn::Frames, state::TrainView};
+use super::{
+    drawn::Frames,
+    press::{Hand, Shown},
+    state::TrainView,
+};
 use crate::{
     app::{
         shared::{Effect, Look, RightCard, Shared},
         surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, placeholder_ui, segmented_ui},
+        widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
     },
     export::format_number,
     figure::surface::{Surface, SurfaceFigure, ViewMode},
 };
+
+/// Work of the pointer on the actual surface.
+const HANDS: [(Hand, &str, &str); 2] = [
+    (
+        Hand::Press,
+        "Press",
+        "Drag on the surface to press it; the wheel sets the depth. Drag with Shift or another button to move the picture, \
+         and the surface beside it to turn it.",
+    ),
+    (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
+];
 
 /// Both surfaces side by side, and the scale of their colours.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -28,7 +43,7 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
 
 /// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
-    let (frames, mode) = (&view.drawn.frames, shared.look.mode);
+    let (frames, mode) = (view.frames(), shared.look.mode);
     let surfaces = shared.test().into_iter().flat_map(|test| {
         let actual = test.heights("Actual", &frames.actual, mode);
         let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
@@ -44,8 +59,32 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     }
 }
 
+/// The invitation of a card without a network: to press, which a small one answers, or to train.
+fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let text = if view.press.is_pressing() {
+        view.press.waiting_text(shared)
+    } else {
+        "Press the surface on the left: what a network makes of its readings appears here. Or train your own, which \
+         takes shape here while it learns."
+    };
+    placeholder_ui(ui, text);
+    if view.press.is_pressing() {
+        return;
+    }
+    if let Some(test) = shared.test() {
+        ui.vertical_centered(|ui| {
+            ui.add_space(space(3));
+            let hint = "Presses a ball onto the middle of the surface.";
+            if ui.add(ghost_button("Press it")).on_hover_text(hint).clicked() {
+                view.press.press_middle(test);
+                ui.request_repaint();
+            }
+        });
+    }
+}
+
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.
-fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
+fn title_ui(ui: &mut Ui, title: &str, note: &str, options_width: f32) {
     let font = semibold(type_size().title);
     let galley = ui
         .painter()
@@ -54,6 +93,9 @@ fn title_ui(ui: &mut Ui, title: &str, options_width: f32) {
         return;
     }
     ui.label(RichText::new(title).font(semibold(type_size().title)));
+    if galley.size().x + options_width + space(14) <= ui.available_width() + galley.size().x && !note.is_empty() {
+        dim_ui(ui, note);
+    }
 }
 
 fn actual_card_ui(
@@ -65,16 +107,23 @@ fn actual_card_ui(
 ) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        title_ui(ui, "Actual", space(29));
+        title_ui(
+            ui,
+            "Actual",
+            if view.press.is_pressing() { "pressed" } else { "" },
+            space(56),
+        );
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
             let look = shared.look;
             let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
             effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+            let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
+            view.press.hand = picked.unwrap_or(view.press.hand);
         });
     });
     if let Some(surface) = figure.surfaces.first() {
-        surface_ui(ui, surface, view, shared, effects);
+        surface_ui(ui, surface, Role::Actual, view, shared, effects);
     }
 }
 
@@ -87,7 +136,8 @@ fn right_card_ui(
 ) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        title_ui(ui, "Network", space(36));
+        let time = view.press.shown().and_then(Shown::network_time);
+        title_ui(ui, "Network", time.as_deref().unwrap_or_default(), space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
             let picked = segmented_ui(ui, "Network card", &options, view.right, false);
@@ -95,11 +145,8 @@ fn right_card_ui(
         });
     });
     match figure.surfaces.get(1) {
-        Some(surface) => surface_ui(ui, surface, view, shared, effects),
-        None => placeholder_ui(
-            ui,
-            "Press Train: the decoupled surface takes shape here while the network learns.",
-        ),
+        Some(surface) => surface_ui(ui, surface, Role::Network, view, shared, effects),
+        None => invitation_ui(ui, view, shared),
     }
 }
 
@@ -117,17 +164,43 @@ fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
     }
 }
 
-fn surface_ui(ui: &mut Ui, surface: &Surface, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+/// Which of the two surfaces.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Actual,
+    Network,
+}
+
+fn surface_ui(
+    ui: &mut Ui,
+    surface: &Surface,
+    role: Role,
+    view: &mut TrainView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     let (Some(test), look) = (shared.test(), shared.look) else {
         return;
     };
-    let shown = SurfaceView {
+    let theme = Theme::of(ui);
+    let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
         marked_node: view.node,
-        theme: Theme::of(ui),
+        theme,
+    };
+    let is_touched = role == Role::Actual && view.press.hand == Hand::Press;
+    let shown = if is_touched {
+        surface_view.show_touched(ui, look.camera)
+    } else {
+        surface_view.show(ui, look.camera)
+    };
+    if role == Role::Actual {
+        view.press.take_target(&shown, surface);
+        let painter = ui.painter();
+        view.press
+            .outline_ui(painter, &theme.palette, shown.response.hover_pos(), test.stroke_mm);
     }
-    .show(ui, look.camera);
     if shown.camera != look.camera {
         let camera = shown.camera;
         effects.push(Effect::Look(Look { camera, ..look }));
@@ -137,7 +210,7 @@ fn surface_ui(ui: &mut Ui, surface: &Surface, view: &mut TrainView, shared: &Sha
         view.node = shown.hovered_node;
         ui.ctx().request_repaint();
     }
-    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, &view.drawn.frames, test, node));
+    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, view.frames(), test, node));
 }
 
 /// The node under the pointer and its values, in two lines that hide little.

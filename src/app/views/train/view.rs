@@ -1,4 +1,4 @@
-use eframe::egui::{Key, Modifiers, Ui};
+use eframe::egui::{Context, Key, Modifiers, Ui};
 
 use super::{
     TrainView,
@@ -47,7 +47,7 @@ impl View for TrainView {
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
         let has_next = self.snapshot + 1 < snapshots;
         if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {
-            self.snapshot += 1;
+            self.show_snapshot(self.snapshot + 1);
         }
         if offers.offer_keys(
             "Previous test snapshot",
@@ -55,8 +55,14 @@ impl View for TrainView {
             Key::PageUp,
             self.snapshot > 0,
         ) {
-            self.snapshot -= 1;
+            self.show_snapshot(self.snapshot - 1);
         }
+    }
+
+    fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
+        let frames = self.frames().clone();
+        self.press.take_pointer(ctx, shared.test(), &frames);
+        self.follow(shared);
     }
 
     fn columns(&self, window_width: f32) -> Columns {
@@ -71,7 +77,9 @@ impl View for TrainView {
         run_buttons_ui(ui, shared, effects);
         ui.add_space(space(4));
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        self.snapshot = snapshot_ui(ui, self.snapshot, snapshots).unwrap_or(self.snapshot);
+        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, snapshots) {
+            self.show_snapshot(snapshot);
+        }
     }
 
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {

@@ -1,6 +1,8 @@
 use eframe::egui::{Sense, Ui};
 
-use super::{charts_card::charts_card_ui, report::report_ui, state::TrainView, surfaces::surfaces_ui};
+use super::{
+    charts_card::charts_card_ui, press::readings_card_ui, report::report_ui, state::TrainView, surfaces::surfaces_ui,
+};
 use crate::app::{
     shared::{Effect, Shared},
     theme::space,
@@ -41,15 +43,22 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
     let lower_height = (share * whole.height()).clamp(least, space(75));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
     surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), view, shared, effects);
-    let charts = match layout {
-        WorkbenchLayout::ReportBeside => lower,
+    let (charts, has_readings) = match layout {
+        WorkbenchLayout::ReportBeside => {
+            let width = (0.4 * lower.width()).floor();
+            let (charts, readings) = lower.split_left_right_at_x(lower.right() - width);
+            card_ui(ui, readings, |ui| {
+                readings_card_ui(ui, view.drops_percent(), shared.test())
+            });
+            (charts.with_max_x(charts.max.x - gap), false)
+        }
         WorkbenchLayout::ReportBelow => {
             let width = (0.45 * lower.width()).clamp(space(82), space(96));
             let (charts, report) = lower.split_left_right_at_x(lower.right() - width);
             card_ui(ui, report, |ui| report_ui(ui, view, shared, effects));
-            charts.with_max_x(charts.max.x - gap)
+            (charts.with_max_x(charts.max.x - gap), true)
         }
     };
-    card_ui(ui, charts, |ui| charts_card_ui(ui, view, shared));
+    card_ui(ui, charts, |ui| charts_card_ui(ui, view, shared, has_readings));
     ui.allocate_rect(whole, Sense::hover());
 }

@@ -45,7 +45,9 @@ impl DecoderMeasuring {
         self.take_news(state);
         let standing = shared.run.as_ref().and_then(|run| {
             let result = run.result.as_ref()?;
-            Some((run, (run.id, result.epochs_run), result.networks.as_ref()?))
+            result
+                .is_standing
+                .then_some((run, (run.id, result.epochs_run), &result.networks))
         });
         let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
         if is_other || shared.phase == Phase::Training {

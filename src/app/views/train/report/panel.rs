@@ -10,6 +10,7 @@ use crate::{
         views::train::{
             decoders::{REFERENCE, decoders_ui},
             exports::open_task,
+            press::press_section_ui,
             state::TrainView,
         },
         widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
@@ -21,12 +22,19 @@ use crate::{
 /// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
+        press_section_ui(ui, &mut view.press, shared);
         section_heading_ui(ui, "Errors on the test set");
-        let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+        let result = view.result(shared).cloned();
+        let shown = shared.shown_run().zip(result.as_ref());
         if let Some((run, result)) = shown {
             let baselines = &run.baselines;
             error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
-            verdict_ui(ui, shared, run, result);
+            match view.scrub.epoch() {
+                Some(_) => {
+                    dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+                }
+                None => verdict_ui(ui, shared, run, result),
+            }
             conditioning_ui(ui, &run.test);
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
@@ -45,7 +53,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
-            cost_ui(ui, run, result);
+            cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
         }
     });
 }

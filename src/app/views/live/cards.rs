@@ -1,0 +1,115 @@
+use std::sync::Arc;
+
+use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
+
+use super::{LiveView, engine::LiveFrame};
+use crate::{
+    app::{
+        shared::{Effect, Look, Shared},
+        surface_view::{ColourBar, SurfaceView},
+        test_view::Frame,
+        theme::{Theme, semibold, space, type_size},
+        widgets::{card_ui, segmented_ui},
+    },
+    export::format_number,
+    figure::surface::{Quantity, Surface, SurfaceFigure, ViewMode},
+};
+
+/// The decoupled surface, the actual one beside it where it is known, and the scale of their colours.
+pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(frame) = &view.shown.frame else { return };
+    let figure = surface_figure(frame, view.node, shared.look);
+    let gap = space(2);
+    let (cards, scale) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
+    let count = figure.surfaces.len() as f32;
+    let width = (cards.width() - gap * (count - 1.0)) / count;
+    let mut node = view.node;
+    for (index, surface) in figure.surfaces.iter().enumerate() {
+        let left = cards.left() + (width + gap) * index as f32;
+        let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
+        card_ui(ui, card, |ui| {
+            ui.horizontal(|ui| {
+                ui.set_min_height(space(7));
+                ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    if index == 0 {
+                        modes_ui(ui, shared.look, effects);
+                    }
+                });
+            });
+            surface_ui(ui, surface, frame, shared.look, &mut node, effects);
+        });
+    }
+    if let [colours, ..] = &figure.scales()[..] {
+        let (slot, theme) = (scale.shrink2(Vec2::new(0.0, space(4))), Theme::of(ui));
+        let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+        let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
+        bar.on_hover_text(figure.note());
+    }
+    view.node = node;
+}
+
+/// The surfaces of a frame with one scale.
+pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
+    let surface = |title: &str, heights: &Frame| Surface {
+        title: title.to_owned(),
+        map: Arc::clone(&frame.surface),
+        values: Arc::clone(&heights.grid_mm),
+        nodes: Arc::clone(&heights.nodes_mm),
+        quantity: Quantity::Height,
+        range: frame.z_range_mm.clone(),
+        mode: look.mode,
+    };
+    let actual = frame.actual.as_ref().map(|actual| surface("Actual", actual));
+    SurfaceFigure {
+        surfaces: std::iter::once(surface("Decoupled", &frame.decoupled))
+            .chain(actual)
+            .collect(),
+        camera: look.camera,
+        marked_node,
+    }
+}
+
+fn modes_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
+    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+    let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
+    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+}
+
+fn surface_ui(
+    ui: &mut Ui,
+    surface: &Surface,
+    frame: &LiveFrame,
+    look: Look,
+    node: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) {
+    let shown = SurfaceView {
+        label: &format!("Live {} surface", surface.title.to_lowercase()),
+        surface,
+        marked_node: *node,
+        theme: Theme::of(ui),
+    }
+    .show(ui, look.camera);
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
+    }
+    if shown.response.contains_pointer() && shown.hovered_node != *node {
+        *node = shown.hovered_node;
+        ui.ctx().request_repaint();
+    }
+    shown.node_tooltip_ui(|ui, node| {
+        let per_row = frame.sensor.scale.nodes_per_row();
+        let (Some(decoupled), Some(row)) = (frame.decoupled.nodes_mm.get(node), frame.rows.get(node / per_row)) else {
+            return;
+        };
+        let name = format!("Row {}, node {}", row + 1, node % per_row + 1);
+        ui.label(RichText::new(name).font(semibold(type_size().note)));
+        let mut text = format!("decoupled z {} mm", format_number(decoupled.z));
+        if let Some(actual) = frame.actual.as_ref().and_then(|actual| actual.nodes_mm.get(node)) {
+            text += &format!(", actual {} mm", format_number(actual.z));
+        }
+        ui.label(RichText::new(text).size(type_size().note));
+    });
+}

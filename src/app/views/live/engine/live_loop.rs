@@ -1,0 +1,76 @@
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError},
+    time::{Duration, Instant},
+};
+
+use super::{
+    message::{Command, LiveEvent, LivePlan},
+    session::Session,
+};
+use crate::app::job::Report;
+
+/// Shortest time between frames that are shown.
+const BETWEEN_SHOWN: Duration = Duration::from_micros(16_600);
+/// Longest wait for a line of a device between looks at commands.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+/// Longest wait for a command of a source that stands still.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
+/// Decodes what `plan` says until its source ends, the sender of the commands is gone, or the work is cancelled.
+///
+/// # Errors
+/// If decoding cannot begin or go on, with the reason.
+pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
+    let send = |event| report.send(event);
+    let Some(mut session) = Session::open(plan, &|| !report.is_cancelled())? else {
+        return Ok(());
+    };
+    let end = decode(&mut session, commands, report);
+    session.end_recording(None, &send);
+    // What came last stays in view.
+    show(&mut session, report);
+    end
+}
+
+fn decode(session: &mut Session, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
+    let send = |event| report.send(event);
+    let mut is_drawn = true;
+    let mut shown = Instant::now().checked_sub(BETWEEN_SHOWN);
+    while !report.is_cancelled() {
+        let now = Instant::now();
+        let may_show_at = shown.map_or(now, |shown| shown + BETWEEN_SHOWN);
+        if session.has_news && is_drawn && may_show_at <= now {
+            show(session, report);
+            (is_drawn, shown) = (false, Some(now));
+        }
+        let mut until = session.source().due(now).unwrap_or(now + LONGEST_WAIT);
+        if session.has_news && is_drawn {
+            until = until.min(may_show_at);
+        }
+        // A stream waits for its lines instead.
+        let command = if until <= now || session.source().is_stream() {
+            commands.try_recv().map_err(|error| match error {
+                TryRecvError::Empty => RecvTimeoutError::Timeout,
+                TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
+            })
+        } else {
+            commands.recv_timeout(until - now)
+        };
+        match command {
+            Ok(Command::Drawn) => is_drawn = true,
+            Ok(command) => session.obey(command, &send)?,
+            Err(RecvTimeoutError::Timeout) => {
+                if let Some(end) = session.take_next(now + BETWEEN_LOOKS, &send) {
+                    return end;
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    Ok(())
+}
+
+fn show(session: &mut Session, report: &Report<LiveEvent>) {
+    session.has_news = false;
+    report.progress(LiveEvent::Shown(Box::new(session.shown())), |_, _| {});
+}

@@ -1,0 +1,22 @@
+//! The thread that decodes: a source gives frames, each is decoded as it comes, and the window is shown the latest.
+//!
+//! [`run`] is the loop; a [`LivePlan`] says what it decodes and by what, [`Command`]s change it on the way, and
+//! [`LiveEvent`]s tell of it. A [`LiveShown`] goes to the window only once the one before has been drawn, so that nothing
+//! queues up and no frame is drawn for nobody.
+
+mod counts;
+mod decoding;
+mod frame_source;
+mod live_loop;
+mod message;
+mod opening;
+mod recording_file;
+mod replay;
+mod replay_file;
+mod session;
+mod simulated;
+mod stream;
+mod watch;
+
+pub use live_loop::run;
+pub use message::{Command, LiveEvent, LiveFrame, LivePlan, LiveShown, Recorded, SourcePlan, Watched};

@@ -1,0 +1,22 @@
+//! The Live view: frames decoded as they come, from a simulated source, a file, a serial port or a socket.
+//!
+//! `engine` decodes on a thread of its own; `state` starts it, takes its news and tells it what the user wants; the other
+//! files show the form on the left and the cards in the middle.
+
+mod cards;
+mod drop_scale;
+mod engine;
+mod fault_form;
+mod figures_card;
+mod files;
+mod form;
+mod invitation;
+mod network_choice;
+mod readings_card;
+mod replay_bar;
+mod source_form;
+mod state;
+mod tools;
+mod view;
+
+pub use state::LiveView;

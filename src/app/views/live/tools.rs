@@ -1,0 +1,80 @@
+use eframe::egui::{Button, Context, Key, Modifiers, Ui};
+
+use super::{LiveView, engine::Command};
+use crate::app::{
+    shared::{Effect, Shared},
+    theme::{Theme, space},
+    widgets::{ghost_button, pressed, primary_button},
+};
+
+/// The buttons that run the source, from right to left.
+pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let is_running = view.running.is_some();
+    let stop = ui.add_enabled(is_running, ghost_button("■ Stop"));
+    if stop.on_hover_text("Ends live decoding (Ctrl+.).").clicked() {
+        view.stop();
+    }
+    let obstacle = view.obstacle(shared);
+    let start = ui.add_enabled(!is_running && obstacle.is_none(), primary_button("▶ Start"));
+    let why_not = obstacle.as_deref().unwrap_or("Frames are being decoded.");
+    if start
+        .on_hover_text("Decodes the frames of the source as they come (Ctrl+Enter).")
+        .on_disabled_hover_text(why_not)
+        .clicked()
+    {
+        view.start(shared, effects);
+    }
+    ui.add_space(space(2));
+    record_ui(ui, view);
+    let zero = ui.add_enabled(is_running, ghost_button("Re-zero"));
+    let hint = "Takes the latest half second as the unloaded state and divides readings by its gains, which removes the \
+                drift of amplifiers and temperature. A contact that is held on fewer than half of the rows is kept.";
+    if zero.on_hover_text(hint).clicked() {
+        view.re_zero();
+    }
+}
+
+fn record_ui(ui: &mut Ui, view: &LiveView) {
+    let is_recording = view.recording.is_some();
+    let text = if is_recording {
+        "■ End recording"
+    } else {
+        "● Record"
+    };
+    let mut button: Button<'_> = ghost_button(text);
+    if is_recording {
+        button = button.fill(Theme::of(ui).palette.selected);
+    }
+    let button = ui.add_enabled(view.can_record(), button);
+    let why_not = if view.running.is_some() {
+        "This is a recording already."
+    } else {
+        "Start a source first."
+    };
+    if button
+        .on_hover_text("Writes every frame with its time to a file of its own, as it comes (Ctrl+R).")
+        .on_disabled_hover_text(why_not)
+        .clicked()
+    {
+        view.toggle_recording();
+    }
+}
+
+/// Does what the keys mean.
+pub fn take_shortcuts(ctx: &Context, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let is_running = view.running.is_some();
+    if pressed(ctx, Modifiers::COMMAND, Key::Enter) && !is_running {
+        view.start(shared, effects);
+    }
+    if pressed(ctx, Modifiers::COMMAND, Key::Period) && is_running {
+        view.stop();
+    }
+    if pressed(ctx, Modifiers::COMMAND, Key::R) && view.can_record() {
+        view.toggle_recording();
+    }
+    if pressed(ctx, Modifiers::COMMAND, Key::P)
+        && let Some(replay) = view.shown.replay
+    {
+        view.command(Command::Play(!replay.is_playing));
+    }
+}

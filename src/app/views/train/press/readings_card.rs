@@ -1,0 +1,55 @@
+use eframe::egui::{RichText, Ui};
+use ndarray::Array2;
+
+use crate::{
+    app::{
+        plotting::cells_ui,
+        test_view::TestView,
+        theme::{semibold, space, type_size},
+        widgets::{dim_ui, placeholder_ui},
+    },
+    export::format_number,
+    figure::{HeatMap, readings_figure, ticks::round_steps},
+};
+
+/// The card of the readings: [`readings_ui`] under a title.
+pub fn readings_card_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Option<&TestView>) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(6));
+        ui.label(RichText::new("Readings").font(semibold(type_size().title)));
+        if let Some(drops_percent) = drops_percent {
+            let (rows, columns) = drops_percent.dim();
+            dim_ui(ui, &format!("{rows} row-wires × {columns} column-wires"));
+        }
+    });
+    readings_ui(ui, drops_percent, test);
+}
+
+/// Readings of the surface on show as a map of row-wires and column-wires; `drops_percent` are their drops below those at
+/// rest.
+pub fn readings_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Option<&TestView>) {
+    let Some((drops_percent, test)) = drops_percent.zip(test) else {
+        placeholder_ui(ui, "The readings of the surface appear here.");
+        return;
+    };
+    let map = readings_map(drops_percent, &test.rows);
+    let Some(([row, column], cell)) = cells_ui(ui, "Readings of the actual surface", &map, (&[], &[])) else {
+        return;
+    };
+    let value = format_number(map.values[[row, column]]);
+    let row = test.rows.get(row).map_or(0, |row| row + 1);
+    cell.on_hover_text_at_pointer(format!(
+        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
+        column + 1
+    ));
+}
+
+/// Colours from none to the largest drop, up to a round number so that they hold while the finger moves a little.
+fn readings_map(drops_percent: &Array2<f64>, rows: &[usize]) -> HeatMap {
+    /// The end of the colours of a sensor at rest.
+    const LEAST_PERCENT: f64 = 0.01;
+    let largest = drops_percent.iter().copied().filter(|drop| drop.is_finite());
+    let largest = largest.fold(LEAST_PERCENT, f64::max);
+    let end = round_steps(largest).next().unwrap_or(largest);
+    readings_figure(drops_percent.clone(), rows, end)
+}

@@ -1,0 +1,160 @@
+use std::sync::Arc;
+
+use crate::{
+    app::{
+        job::{Job, JobError, Wake},
+        shared::{RunResult, RunView, Shared},
+        training_worker::RunId,
+    },
+    dataset::Dataset,
+    evaluation::{Errors, PastNetworks},
+    network::Networks,
+};
+
+/// Time of a replay, in seconds.
+const REPLAY_SECONDS: f64 = 6.0;
+
+/// The past epoch on show, if one is.
+#[derive(Debug)]
+pub struct ScrubState {
+    /// The training that it is of.
+    of: Option<RunId>,
+    /// The epoch wished for; `None` for the latest.
+    wanted: Option<usize>,
+    /// Result of the network of an epoch.
+    result: Option<RunResult>,
+    job: Job<Result<Option<RunResult>, JobError>>,
+    /// When the replay began, in seconds, and at which epoch.
+    replay: Option<(f64, usize)>,
+}
+
+impl ScrubState {
+    /// On the latest epoch. `wake` is called when a result is there.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            of: None,
+            wanted: None,
+            result: None,
+            job: Job::prompt("past network", wake),
+            replay: None,
+        }
+    }
+
+    /// The result of the past epoch on show; `None` while the latest is.
+    pub fn result(&self) -> Option<&RunResult> {
+        self.result.as_ref().filter(|_| self.wanted.is_some())
+    }
+
+    /// The epoch wished for; `None` for the latest.
+    pub fn epoch(&self) -> Option<usize> {
+        self.wanted
+    }
+
+    /// Returns true while epochs follow each other.
+    pub fn is_replaying(&self) -> bool {
+        self.replay.is_some()
+    }
+
+    /// Shows the network of the epoch at or before this one.
+    pub fn show(&mut self, epoch: usize, past: &PastNetworks) {
+        let latest = past.epochs().next_back();
+        self.wanted = past.nearest(epoch).filter(|epoch| Some(*epoch) != latest);
+    }
+
+    /// Shows the latest network again.
+    pub fn show_latest(&mut self) {
+        (self.wanted, self.replay) = (None, None);
+    }
+
+    /// Replays from the epoch on show, or from the first one; or stops there.
+    pub fn toggle_replay(&mut self, now_seconds: f64, past: &PastNetworks) {
+        self.replay = match self.replay {
+            Some(_) => None,
+            None => {
+                let begin = self.wanted.or_else(|| past.epochs().next());
+                begin.map(|epoch| (now_seconds, epoch))
+            }
+        };
+    }
+
+    /// Shows the epoch that the replay has come to. Early epochs change most, so it runs by their logarithm.
+    pub fn replay(&mut self, now_seconds: f64, past: &PastNetworks) {
+        let (Some((begun, first)), Some(last)) = (self.replay, past.epochs().next_back()) else {
+            return;
+        };
+        let share = (now_seconds - begun) / REPLAY_SECONDS;
+        if share >= 1.0 {
+            return self.show_latest();
+        }
+        let [first, last] = [first, last].map(|epoch| (epoch as f64).ln_1p());
+        let epoch = (first + share.max(0.0) * (last - first)).exp_m1();
+        self.show(epoch.round() as usize, past);
+    }
+
+    /// Leaves an epoch of another training, and computes what the one wished for makes of the test set.
+    pub fn follow(&mut self, shared: &Shared) {
+        let run = shared.shown_run();
+        let id = run.map(|run| run.id);
+        if self.of != id {
+            self.show_latest();
+            self.job.abandon();
+            (self.of, self.result) = (id, None);
+        }
+        while let Some(computed) = self.job.next_event() {
+            match computed {
+                Ok(Some(result)) => self.result = Some(result),
+                // A defect in the program, or an epoch thinned out meanwhile.
+                Ok(None) | Err(_) => self.show_latest(),
+            }
+        }
+        let Some((run, epoch)) = run.zip(self.wanted) else {
+            return;
+        };
+        let is_there = self.result.as_ref().is_some_and(|result| result.epochs_run == epoch);
+        if !is_there && !self.job.is_under_way() {
+            self.compute(run, epoch);
+        }
+    }
+
+    fn compute(&mut self, run: &RunView, epoch: usize) {
+        let Some(present) = &run.result else { return };
+        let (past, networks, test) = (
+            run.past.clone(),
+            Arc::clone(&present.networks),
+            Arc::clone(&run.test.set),
+        );
+        let (stroke_mm, is_standing) = (run.test.stroke_mm, present.is_standing);
+        // Some of the epochs wished for may be thinned out by now.
+        let epoch = past.nearest(epoch).unwrap_or(epoch);
+        self.job.start(
+            move |_| {
+                let result = result_at(epoch, &past, &networks, &test, stroke_mm)?;
+                Some(RunResult { is_standing, ..result })
+            },
+            |computed| computed,
+        );
+    }
+}
+
+fn result_at(
+    epoch: usize,
+    past: &PastNetworks,
+    present: &Networks,
+    test: &Dataset,
+    stroke_mm: f64,
+) -> Option<RunResult> {
+    let (networks, best_epoch) = past.at(epoch, present)?;
+    let decoupled_mm = networks.decouple(test);
+    Some(RunResult {
+        errors: Errors::measure(test, &decoupled_mm, stroke_mm),
+        decoupled_mm: Arc::new(decoupled_mm),
+        best_epoch,
+        flaw: None,
+        epochs_run: epoch,
+        starts_ended: 0,
+        wall_time: None,
+        frame_time: None,
+        is_standing: true,
+        networks: Arc::new(networks),
+    })
+}

@@ -1,0 +1,224 @@
+use std::sync::Arc;
+
+use super::Run;
+use crate::network::{DecouplingNetwork, Mlp, Networks};
+
+/// Networks of past epochs: what a run stopped at each of them would have kept, its best by then.
+///
+/// There are at most [`Self::MOST`], whose weights take at most [`Self::MOST_BYTES`]; beyond that every second of them
+/// is dropped, so that those of every 2ᵏ-th epoch stay. The latest is always there.
+#[derive(Clone, Debug, Default)]
+pub struct PastNetworks {
+    /// k: the epochs kept are multiples of 2ᵏ, but for the latest.
+    halvings: u32,
+    /// In the order of their epochs.
+    kept: Vec<Arc<Past>>,
+    /// Memory of their weights, each counted once.
+    bytes: usize,
+}
+
+/// The network of a past epoch.
+#[derive(Debug)]
+struct Past {
+    epoch: usize,
+    best_epoch: usize,
+    /// Weights of each row-wire's network, or of the one for all. Networks that stayed the best share them.
+    weights: Vec<Arc<[f64]>>,
+}
+
+impl Past {
+    /// Memory of the weights that it does not share with the network before.
+    fn bytes_after(&self, before: Option<&Arc<Self>>) -> usize {
+        let of_row = |(row, weights): (usize, &Arc<[f64]>)| {
+            let shared = before.and_then(|before| before.weights.get(row));
+            let is_shared = shared.is_some_and(|shared| Arc::ptr_eq(shared, weights));
+            if is_shared { 0 } else { size_of_val(&**weights) }
+        };
+        self.weights.iter().enumerate().map(of_row).sum()
+    }
+}
+
+impl PastNetworks {
+    /// Largest memory of the weights: 64 MiB.
+    pub const MOST_BYTES: usize = 64 << 20;
+
+    /// Largest number of networks: a slider has not as many points.
+    pub const MOST: usize = 4096;
+
+    /// Takes the present state of `run`, once after each of its steps.
+    pub fn record(&mut self, run: &Run) {
+        self.record_within(run, Self::MOST_BYTES, Self::MOST);
+    }
+
+    fn record_within(&mut self, run: &Run, most_bytes: usize, most: usize) {
+        let leader = run.leader();
+        let epoch = run
+            .trainers()
+            .iter()
+            .map(|start| start.latest().epoch)
+            .max()
+            .unwrap_or(0);
+        // What is not the latest any more stays only if it is one of every 2ᵏ-th.
+        let latest = self.kept.last().cloned();
+        let stays = |latest: &&Past| latest.epoch < epoch && latest.epoch.is_multiple_of(self.stride());
+        if let Some(latest) = latest.as_deref().filter(|latest| !stays(latest)) {
+            self.kept.pop();
+            self.bytes -= latest.bytes_after(self.kept.last());
+        }
+        let weights = leader.best().enumerate().map(|(row, mlp)| {
+            let before = latest.as_ref().and_then(|latest| latest.weights.get(row));
+            let same = before.filter(|before| ***before == *mlp.weights());
+            same.map_or_else(|| mlp.weights().into(), Arc::clone)
+        });
+        let past = Past {
+            epoch,
+            best_epoch: leader.best_epoch(),
+            weights: weights.collect(),
+        };
+        self.bytes += past.bytes_after(self.kept.last());
+        self.kept.push(Arc::new(past));
+        while (self.bytes > most_bytes || self.kept.len() > most) && self.kept.len() > 1 {
+            if self.kept.len() == 2 {
+                self.kept.remove(0);
+            } else {
+                self.halvings += 1;
+                let stride = self.stride();
+                let stays = |past: &Arc<Past>| past.epoch == epoch || past.epoch.is_multiple_of(stride);
+                self.kept.retain(stays);
+            }
+            let before = std::iter::once(None).chain(self.kept.iter().map(Some));
+            self.bytes = before
+                .zip(&self.kept)
+                .map(|(before, past)| past.bytes_after(before))
+                .sum();
+        }
+    }
+
+    /// The epochs whose networks are there, in ascending order.
+    pub fn epochs(&self) -> impl ExactSizeIterator<Item = usize> + DoubleEndedIterator + '_ {
+        self.kept.iter().map(|past| past.epoch)
+    }
+
+    /// Number of epochs between two networks, but for the latest.
+    pub fn stride(&self) -> usize {
+        1 << self.halvings
+    }
+
+    /// The epoch at or before this one whose network is there; the first if there is none before.
+    pub fn nearest(&self, epoch: usize) -> Option<usize> {
+        let after = self.kept.partition_point(|past| past.epoch <= epoch);
+        self.kept.get(after.saturating_sub(1)).map(|past| past.epoch)
+    }
+
+    /// The networks at this epoch and the epoch that they are of; `present` are those of the same run at any time.
+    pub fn at(&self, epoch: usize, present: &Networks) -> Option<(Networks, usize)> {
+        let place = self.kept.binary_search_by_key(&epoch, |past| past.epoch).ok()?;
+        let past = &self.kept[place];
+        let rows = present.values().iter().zip(&past.weights);
+        let networks = rows.map(|(network, weights)| {
+            let mlp = Mlp::from_weights(network.mlp().shape(), weights.to_vec());
+            DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone())
+        });
+        Some((Networks::each(networks.collect()), past.best_epoch))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::{evaluation::SimulatedSettings, scene::Rows, training::Method};
+
+    const NO_BOUND: [usize; 2] = [usize::MAX; 2];
+
+    fn settings() -> SimulatedSettings {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "3x4_2x12".parse().unwrap();
+        (
+            settings.hidden,
+            settings.source.samples,
+            settings.training.stopping.epochs,
+        ) = (3, 60, 40);
+        settings
+    }
+
+    /// Trains to the end, recording; calls `each` after every epoch.
+    fn record(
+        settings: SimulatedSettings,
+        [most_bytes, most]: [usize; 2],
+        mut each: impl FnMut(&PastNetworks, usize),
+    ) -> (Run, PastNetworks) {
+        let (mut run, mut past) = (Run::prepare(settings).unwrap(), PastNetworks::default());
+        past.record_within(&run, most_bytes, most);
+        let mut epoch = 0;
+        while run.stop_reason().is_none() {
+            run.step();
+            epoch += 1;
+            past.record_within(&run, most_bytes, most);
+            each(&past, epoch);
+        }
+        (run, past)
+    }
+
+    #[test]
+    fn the_network_of_an_epoch_is_that_of_a_training_stopped_there() {
+        let mut several = settings();
+        several.starts = 3;
+        let mut known = settings();
+        known.source.scene.rows = Rows::Known;
+        for settings in [settings(), several, known] {
+            let (run, past) = record(settings, NO_BOUND, |_, _| {});
+            for epoch in [0, 1, 7, 23] {
+                let mut stopped = Run::prepare(settings).unwrap();
+                (0..epoch).for_each(|_| {
+                    stopped.step();
+                });
+                let (networks, best_epoch) = past.at(epoch, &run.network()).unwrap();
+                assert_eq!(networks, stopped.network(), "epoch {epoch}");
+                assert_eq!(best_epoch, stopped.leader().best_epoch());
+            }
+        }
+    }
+
+    #[test]
+    fn memory_stays_within_its_bound_and_every_second_to_the_k_th_epoch_is_kept() {
+        let mut settings = settings();
+        settings.training.method = Method::all()
+            .into_iter()
+            .find(|method| method.short_name() == "scg")
+            .unwrap();
+        let weights = Run::prepare(settings).unwrap().leader().weights();
+        let most_bytes = 10 * 8 * weights;
+        // Either bound keeps about ten.
+        for bounds in [[most_bytes, usize::MAX], [usize::MAX, 10]] {
+            let (_, past) = record(settings, bounds, |past, epoch| {
+                assert!(past.bytes <= bounds[0] && past.kept.len() <= bounds[1], "at {epoch}");
+                let epochs: Vec<usize> = past.epochs().collect();
+                let expected = (0..epoch).step_by(past.stride()).chain([epoch]);
+                assert_eq!(epochs, expected.collect::<Vec<_>>(), "every {}", past.stride());
+                let shared: HashSet<*const f64> = past
+                    .kept
+                    .iter()
+                    .flat_map(|past| &past.weights)
+                    .map(|w| w.as_ptr())
+                    .collect();
+                assert_eq!(past.bytes, shared.len() * 8 * weights, "each network is counted once");
+            });
+            assert!(past.stride() >= 4 && past.epochs().len() > 5, "{past:?}");
+            assert_eq!(past.nearest(past.stride() + 1), Some(past.stride()));
+            assert_eq!(past.nearest(usize::MAX), past.epochs().next_back());
+        }
+    }
+
+    #[test]
+    fn a_network_too_large_for_the_bound_is_still_there_itself() {
+        let (run, past) = record(settings(), [1, usize::MAX], |past, epoch| {
+            assert_eq!(past.epochs().collect::<Vec<_>>(), [epoch]);
+        });
+        let epoch = run.leader().latest().epoch;
+        assert_eq!(past.at(epoch, &run.network()).unwrap().0, run.network());
+        assert!(past.at(epoch + 1, &run.network()).is_none());
+        assert_eq!(PastNetworks::default().nearest(3), None);
+    }
+}

@@ -1,0 +1,218 @@
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use ndarray::Array2;
+
+use super::machine::node_pairs_per_row;
+use crate::{
+    decoupling::{DecodeError, Decoder},
+    scene::Touch,
+    sensor::{SensorError, SensorModel},
+};
+
+/// A sensor touched by hand: where its nodes are and what its wires read, without noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pressed {
+    /// Rows read × 3·M2.
+    coordinates_mm: Vec<f64>,
+    /// Rows read × M4, by Eq. (2).
+    readings_ohm: Array2<f64>,
+}
+
+/// Answer of a decoder to the readings of a touched sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PressedAnswer {
+    /// Rows read × 3·M2.
+    pub coordinates_mm: Vec<f64>,
+    /// Mean |decoupled z − z| of the nodes.
+    pub mean_mm: f64,
+    /// Largest |decoupled z − z|.
+    pub worst_mm: f64,
+    /// Time to decode the frame: the median of a few, where one is too short for the clock.
+    pub time: Duration,
+}
+
+impl Pressed {
+    /// Touches `sensor`, of which `rows` are read and whose nodes can travel `stroke_mm`.
+    ///
+    /// # Errors
+    /// A resistance that is not a positive finite number.
+    pub fn new(sensor: &SensorModel, rows: &[usize], touch: &Touch, stroke_mm: f64) -> Result<Self, SensorError> {
+        let deformation = touch.deformation(sensor, stroke_mm);
+        let mut readings_ohm = Array2::zeros((rows.len(), sensor.scale.columns()));
+        let mut coordinates_mm = Vec::with_capacity(rows.len() * sensor.scale.coordinates_per_row());
+        for (&row, mut readings) in rows.iter().zip(readings_ohm.rows_mut()) {
+            let readings = readings
+                .as_slice_mut()
+                .expect("a row of a standard array is contiguous");
+            sensor.row_resistances_into(row, deformation.row_mm(row), readings)?;
+            let places = deformation.row_positions_mm(sensor, row);
+            coordinates_mm.extend(places.flat_map(|place| place.to_array()));
+        }
+        Ok(Self {
+            coordinates_mm,
+            readings_ohm,
+        })
+    }
+
+    /// Pairs of nodes that [`Self::new`] goes through, each a nanosecond or two.
+    pub fn node_pairs(sensor: &SensorModel, rows: &[usize]) -> f64 {
+        rows.len() as f64 * node_pairs_per_row(sensor)
+    }
+
+    /// Positions of the nodes of the rows read, row by row.
+    pub fn nodes_mm(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.coordinates_mm.chunks_exact(3).map(DVec3::from_slice)
+    }
+
+    /// Resistances: rows read × M4.
+    pub fn readings_ohm(&self) -> &Array2<f64> {
+        &self.readings_ohm
+    }
+
+    /// Decodes the readings; `None` once `is_stale` says that nobody waits for the answer any more.
+    ///
+    /// # Errors
+    /// A reading that cannot be decoded.
+    ///
+    /// # Panics
+    /// If the decoder is of other rows.
+    pub fn answer(
+        &self,
+        decoder: &mut dyn Decoder,
+        is_stale: &dyn Fn() -> bool,
+    ) -> Result<Option<PressedAnswer>, DecodeError> {
+        /// Frames decoded for the median.
+        const FRAMES: usize = 5;
+        /// Longest time of a frame that is decoded again.
+        const SHORT: Duration = Duration::from_micros(100);
+        let mut coordinates_mm = vec![0.0; self.coordinates_mm.len()];
+        let Some(first) = self.decode(decoder, &mut coordinates_mm, is_stale)? else {
+            return Ok(None);
+        };
+        let mut times = vec![first];
+        while first < SHORT && times.len() < FRAMES {
+            times.extend(self.decode(decoder, &mut coordinates_mm, &|| false)?);
+        }
+        times.sort();
+        let errors = coordinates_mm.iter().zip(&self.coordinates_mm).skip(2).step_by(3);
+        let errors = errors.map(|(decoded, actual)| (decoded - actual).abs());
+        let (total_mm, worst_mm, nodes) = errors.fold((0.0, 0.0_f64, 0), |(total, worst, nodes), error| {
+            // NaN stays: an answer that is no number has no error that is one.
+            (
+                total + error,
+                if error > worst || error.is_nan() { error } else { worst },
+                nodes + 1,
+            )
+        });
+        Ok(Some(PressedAnswer {
+            mean_mm: total_mm / f64::from(nodes),
+            worst_mm,
+            time: times[times.len() / 2],
+            coordinates_mm,
+        }))
+    }
+
+    /// Decodes row by row, so that slow decoders can be left; returns the time.
+    fn decode(
+        &self,
+        decoder: &mut dyn Decoder,
+        coordinates_mm: &mut [f64],
+        is_stale: &dyn Fn() -> bool,
+    ) -> Result<Option<Duration>, DecodeError> {
+        let begun = Instant::now();
+        let answers = coordinates_mm.chunks_exact_mut(decoder.outputs());
+        for (row_index, (readings, answer)) in self.readings_ohm.rows().into_iter().zip(answers).enumerate() {
+            if is_stale() {
+                return Ok(None);
+            }
+            let readings = readings.to_slice().expect("a row of a standard array is contiguous");
+            decoder
+                .decode_row(row_index, readings, answer)
+                .map_err(|error| DecodeError { row_index, ..error })?;
+        }
+        Ok(Some(begun.elapsed()))
+    }
+}
+
+impl PressedAnswer {
+    /// Decoded positions of the nodes, row by row.
+    pub fn nodes_mm(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.coordinates_mm.chunks_exact(3).map(DVec3::from_slice)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::{
+        dataset::Dataset,
+        decoupling::{NewtonDecoder, NewtonRules, TrainingMean},
+        evaluation::{Errors, Run, SimulatedSettings},
+        scene::{Indenter, Print, Scene},
+    };
+
+    fn sensor() -> SensorModel {
+        SensorModel::new("10x6_3x18".parse().unwrap())
+    }
+
+    fn touch() -> Touch {
+        Touch {
+            print: Some(Print {
+                indenter: Indenter::default(),
+                place_mm: DVec2::new(11.3, 8.2),
+                depth_mm: 0.7,
+            }),
+            nodes_mm: [((8, 1), 0.35)].into(),
+        }
+    }
+
+    #[test]
+    fn newton_finds_the_nodes_where_the_hand_put_them() {
+        let (sensor, rows) = (sensor(), Vec::from_iter(0..10));
+        let pressed = Pressed::new(&sensor, &rows, &touch(), 1.0).unwrap();
+        let moved = pressed.nodes_mm().nth(8 * 6 + 1).unwrap();
+        assert_eq!(moved, sensor.displaced_mm(8, 1, DVec3::Z * 0.35));
+        let mut newton = NewtonDecoder::new(&sensor, &Scene::default(), &rows, NewtonRules::default()).unwrap();
+        let answer = pressed.answer(&mut newton, &|| false).unwrap().unwrap();
+        assert!(
+            answer.worst_mm < 1e-9 && answer.mean_mm <= answer.worst_mm,
+            "{answer:?}"
+        );
+        assert!(pressed.answer(&mut newton, &|| true).unwrap().is_none());
+    }
+
+    /// The test set's own measure, on a set of this one snapshot.
+    #[test]
+    fn errors_are_those_of_a_test_set_of_one_snapshot() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor = sensor();
+        settings.source.samples = 100;
+        let run = Run::prepare(settings).unwrap();
+        let rows = [2, 5, 7];
+        let pressed = Pressed::new(&sensor(), &rows, &touch(), 1.0).unwrap();
+        let targets = Array2::from_shape_vec((3, 18), pressed.coordinates_mm.clone()).unwrap();
+        let set = Dataset::new(pressed.readings_ohm.clone(), targets, Some(&rows), vec![0; 3]).unwrap();
+        let mut mean = TrainingMean::fit(run.test());
+        let answer = pressed.answer(&mut mean, &|| false).unwrap().unwrap();
+        let decoded = Array2::from_shape_vec((3, 18), answer.coordinates_mm.clone()).unwrap();
+        let errors = Errors::measure(&set, &decoded, 1.0);
+        assert!(
+            (answer.mean_mm - errors.z_mm).abs() < 1e-15,
+            "{} {}",
+            answer.mean_mm,
+            errors.z_mm
+        );
+        assert_eq!(answer.worst_mm, errors.worst_mm);
+    }
+
+    #[test]
+    fn an_untouched_sensor_reads_what_it_reads_at_rest() {
+        let sensor = sensor();
+        let pressed = Pressed::new(&sensor, &[3], &Touch::default(), 1.0).unwrap();
+        let at_rest = sensor.row_resistances(3, &[DVec3::ZERO; 6]).unwrap();
+        assert_eq!(pressed.readings_ohm().row(0).to_vec(), at_rest);
+    }
+}
