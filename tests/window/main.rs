@@ -12,6 +12,7 @@ mod experiments;
 mod exporting;
 mod extremes;
 mod identifying;
+mod live;
 mod looking;
 mod pictures;
 mod remembering;

@@ -154,7 +154,7 @@ impl SourceForm {
                 (SourceKind::Serial, "Serial"),
                 (SourceKind::Tcp, "TCP"),
             ];
-            self.kind = segmented_ui(ui, "Source", &kinds, self.kind, true).unwrap_or(self.kind);
+            self.kind = segmented_ui(ui, "Source", &kinds, self.kind, false).unwrap_or(self.kind);
             ui.add_space(space(1));
             match self.kind {
                 SourceKind::Simulated => {
