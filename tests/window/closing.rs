@@ -24,7 +24,7 @@ fn asked(driver: &mut Driver, command: &ViewportCommand) -> bool {
 }
 
 /// Clicks the button of the title bar; returns whether the window closes at once.
-fn close(driver: &mut Driver) -> bool {
+pub(crate) fn close(driver: &mut Driver) -> bool {
     let input = driver.harness().input_mut();
     let events = &mut input.viewports.get_mut(&ViewportId::ROOT).unwrap().events;
     events.push(ViewportEvent::Close);

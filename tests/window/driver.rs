@@ -104,6 +104,8 @@ impl Driver {
         for name in FOLDED {
             self.click(name);
         }
+        self.get("Hidden nodes").scroll_to_me();
+        self.harness.run_steps(SCROLLING);
     }
 
     /// What the window knows.
@@ -316,6 +318,14 @@ impl Driver {
     pub(crate) fn press_with(&mut self, modifiers: Modifiers, key: Key) {
         self.harness.key_press_modifiers(modifiers, key);
         self.harness.run_steps(2);
+    }
+
+    /// Does the action of this name by the list of all actions.
+    pub(crate) fn act(&mut self, action: &str) {
+        self.press_with(Modifiers::COMMAND, Key::K);
+        self.type_into("Action", action);
+        self.press(Key::Enter);
+        self.settle();
     }
 
     /// A small network on the smallest array of the paper, trained in a moment.

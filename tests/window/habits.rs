@@ -41,6 +41,8 @@ fn the_settings_of_a_training_that_runs_are_not_taken_back() {
     pause(&mut driver);
     driver.configure_small();
     pause(&mut driver);
+    driver.enter("Epochs", "100000");
+    driver.click("▶ Train");
     driver.wait_for_hold();
     let held = driver.state().draft;
     assert!(driver.state().phase.is_busy());
@@ -53,9 +55,9 @@ fn the_settings_of_a_training_that_runs_are_not_taken_back() {
 fn the_list_of_actions_finds_one_by_a_few_letters_and_does_it() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
-    assert!(driver.has("Show Compare") && driver.has("Stop training"));
-    driver.type_into("Search actions", "comp");
-    assert!(driver.has("Show Compare") && !driver.has("Stop training"));
+    assert!(driver.has("Show Compare") && driver.has("Show Trade-off"));
+    driver.type_into("Action", "comp");
+    assert!(driver.has("Show Compare") && !driver.has("Show Trade-off"));
     driver.press(Key::Enter);
     driver.settle();
     assert_eq!(driver.shown(), "Compare");
@@ -66,13 +68,13 @@ fn the_list_of_actions_finds_one_by_a_few_letters_and_does_it() {
 fn the_list_marks_the_next_action_with_an_arrow_and_closes_with_escape() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Search actions", "show");
+    driver.type_into("Action", "show");
     driver.press(Key::ArrowDown);
     driver.press(Key::Escape);
     assert_eq!(driver.shown(), "Train");
     assert!(!driver.has("Show Compare"));
     driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Search actions", "show");
+    driver.type_into("Action", "show");
     driver.press(Key::ArrowDown);
     driver.press(Key::Enter);
     driver.settle();

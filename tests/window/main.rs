@@ -13,6 +13,7 @@ mod exporting;
 mod extremes;
 mod habits;
 mod identifying;
+mod live;
 mod looking;
 mod pictures;
 mod pressing;

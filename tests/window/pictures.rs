@@ -39,7 +39,7 @@ fn album(size: Vec2, is_dark: bool) {
     let theme = if is_dark { "dark" } else { "light" };
     let mut driver = Driver::open_sized(size);
     if !is_dark {
-        driver.click_button("Light");
+        driver.act("Light theme");
     }
     let prefix = format!("{}x{}-{theme}", size.x, size.y);
     let mut album = Album { driver, prefix };

@@ -22,7 +22,7 @@ fn theme_view_and_settings_are_as_they_were_and_nothing_is_trained() {
     assert_eq!(driver.state().draft, SimulatedSettings::default(), "the first start");
     assert!(driver.state().look.is_dark && driver.shown() == "Train");
     driver.configure_small();
-    driver.click("Light");
+    driver.click("Light theme");
     driver.click_button("Compare");
     assert_eq!(driver.shown(), "Compare");
     drop(driver);
@@ -56,7 +56,7 @@ fn a_place_that_cannot_be_written_is_told_once() {
     let mut driver = Driver::open_remembering(&path);
     driver.wait("the reason", |driver| driver.says("will not be found again"));
     driver.click("Dismiss");
-    driver.click("Light");
+    driver.click("Light theme");
     driver.settle();
     assert_eq!(driver.notice(), None);
 }

@@ -51,7 +51,7 @@ fn compare(driver: &mut Driver, name: &str, results: &mut SnapshotResults) {
             format!("{name}-{theme}"),
             &options,
         ));
-        driver.click_button(if theme == "dark" { "Light" } else { "Dark" });
+        driver.act(if theme == "dark" { "Light theme" } else { "Dark theme" });
         driver.settle();
     }
 }
@@ -123,6 +123,11 @@ fn identifiability_view() {
 #[test]
 fn trade_off_view() {
     looks_as_before(&mut open_view("Trade-off"), "trade-off");
+}
+
+#[test]
+fn live_view() {
+    looks_as_before(&mut open_view("Live"), "live");
 }
 
 #[test]

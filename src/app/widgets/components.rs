@@ -271,21 +271,6 @@ pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-/// A figure with its name, and its meaning under the pointer.
-pub fn fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    ui.horizontal(|ui| {
-        let text = |text: &str| RichText::new(text).size(type_size().note);
-        ui.label(text(name).color(dim)).on_hover_text(meaning);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let response = ui.add(Label::new(text(value)).truncate());
-            let label = format!("{name}: {value}");
-            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
-            response.on_hover_text(meaning);
-        });
-    });
-}
-
 /// Shows a state behind a dot of its colour; what follows in the line keeps its distance.
 pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.spacing_mut().item_spacing.x = space(4);

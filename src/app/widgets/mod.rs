@@ -1,15 +1,17 @@
 //! The few components that egui lacks. They know no view.
 
 mod components;
+mod fact;
 pub mod fields;
 mod fold;
 mod snapshot;
 mod table;
 
 pub use components::{
-    card_ui, dim_ui, explained_options_ui, fact_ui, ghost_button, note_ui, placeholder_ui, primary_button,
-    progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
+    card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button, progress_bar_ui,
+    scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
 };
+pub use fact::{coloured_fact_ui, fact_ui};
 pub use fold::fold_ui;
 pub use snapshot::snapshot_ui;
 pub use table::{Column, Row, table_ui};

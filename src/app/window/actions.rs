@@ -4,8 +4,9 @@ use super::{
     DecouplerWindow,
     keys_list::keys_list_ui,
     palette::{Palette, Reply, palette_ui},
+    top_bar::{DARK, LIGHT},
 };
-use crate::app::shared::{Action, Effect, Offers};
+use crate::app::shared::{Action, Effect, ExportGroup, Offers};
 
 /// What lies over the window for a moment.
 #[derive(Debug, Default)]
@@ -43,7 +44,10 @@ impl DecouplerWindow {
         // These have no keys, and take longer to list.
         if is_listed {
             for export in self.views.all()[self.shown].exports(&self.shared) {
-                let name = format!("Export {}", export.label());
+                let name = match export.group {
+                    ExportGroup::Copies => export.label(),
+                    _ => format!("Export {}", export.label()),
+                };
                 if offers.offer(name, export.ask.is_ok())
                     && let Ok(ask) = export.ask
                 {
@@ -58,11 +62,7 @@ impl DecouplerWindow {
                 self.show(place);
             }
         }
-        let theme = if self.shared.look.is_dark {
-            "Light theme"
-        } else {
-            "Dark theme"
-        };
+        let theme = if self.shared.look.is_dark { LIGHT } else { DARK };
         if offers.offer(theme, true) {
             self.choose_theme(!self.shared.look.is_dark);
         }

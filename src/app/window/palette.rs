@@ -49,7 +49,7 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
             .desired_width(f32::INFINITY);
         let field = ui.add(field);
         field.widget_info(|| {
-            eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::SearchInput, true, "Search actions")
+            eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::SearchInput, true, "Action")
         });
         field.request_focus();
         if field.changed() {

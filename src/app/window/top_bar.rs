@@ -6,6 +6,16 @@ use crate::app::{
     widgets::{ghost_button, segmented_ui},
 };
 
+/// Width from which on there is room for everything, in points.
+const WIDE: f32 = 1280.0;
+
+/// Width below which every point counts.
+const NARROW: f32 = 1000.0;
+
+/// Names of the actions that change the theme.
+pub(super) const LIGHT: &str = "Light theme";
+pub(super) const DARK: &str = "Dark theme";
+
 /// What the user reaches for in the top bar.
 pub(super) enum Reach {
     /// The view in this place.
@@ -26,24 +36,39 @@ pub(super) fn top_bar_ui(
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         let width = ui.available_width();
-        mark_ui(ui);
-        // The title of the window says it too: where there is little room the buttons go first.
-        if width > 2.0 * space(150) {
+        // Where there is little room, what the list of actions does too goes first.
+        let (is_wide, is_narrow) = (width >= WIDE, width < NARROW);
+        if !is_narrow {
+            mark_ui(ui);
+        }
+        // The title of the window says it too.
+        if is_wide {
             ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
         }
-        ui.add_space(space(4));
+        ui.add_space(space(2));
         let picked = segmented_ui(ui, "View", views, shown, false).map(Reach::View);
         let reached = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.add_space(space(1));
-            let keys = action_button_ui(ui, actions, "Keys", "?");
-            let theme = theme_ui(ui);
-            let search = if width > 2.0 * space(165) { "Search" } else { "…" };
-            let search = action_button_ui(ui, actions, "Search actions", search);
-            let redo = action_button_ui(ui, actions, "Redo change of settings", "↻");
-            let undo = action_button_ui(ui, actions, "Undo change of settings", "↺");
-            ui.add_space(space(2));
+            let mut reached = None;
+            let mut button_ui = |ui: &mut Ui, name: &str, text: &str| {
+                reached = reached.take().or(action_button_ui(ui, actions, name, text));
+            };
+            button_ui(ui, "Keys", "?");
+            if is_wide {
+                let (text, name) = if Theme::of(ui).is_dark {
+                    ("Light", LIGHT)
+                } else {
+                    ("Dark", DARK)
+                };
+                button_ui(ui, name, text);
+            }
+            button_ui(ui, "Search actions", if is_wide { "Search" } else { "…" });
+            if is_wide {
+                button_ui(ui, "Redo change of settings", "↻");
+                button_ui(ui, "Undo change of settings", "↺");
+                ui.add_space(space(2));
+            }
             tools_ui(ui);
-            keys.or(theme).or(search).or(redo).or(undo)
+            reached
         });
         picked.or(reached.inner)
     })
@@ -75,14 +100,4 @@ fn mark_ui(ui: &mut Ui) {
         painter.vline(inner.left() + share * inner.width(), inner.y_range(), stroke);
     }
     painter.circle_filled(inner.center(), 3.5, theme.palette.accent);
-}
-
-fn theme_ui(ui: &mut Ui) -> Option<Reach> {
-    let (text, label, action) = if Theme::of(ui).is_dark {
-        ("Light", "Switch to the light theme", "Light theme")
-    } else {
-        ("Dark", "Switch to the dark theme", "Dark theme")
-    };
-    let button = ui.add(ghost_button(text)).on_hover_text(label);
-    button.clicked().then(|| Reach::Action(action.to_owned()))
 }

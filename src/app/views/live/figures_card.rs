@@ -2,36 +2,32 @@ use eframe::egui::{RichText, Ui};
 
 use super::{
     LiveView,
-    cards::surface_figure,
     engine::{LiveFrame, Recorded, Watched},
     files::{save_recording, save_zero},
-    readings_card::figure_of,
 };
 use crate::{
     app::{
-        shared::{Effect, FileTask, FileWords, SURFACES, Shared},
+        shared::{Effect, Shared},
         theme::{Theme, space, type_size},
-        widgets::{dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
+        widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
     },
     export::{format_duration, format_number, format_percent},
-    figure::Figure,
     live::{FaultyWire, ZeroGains},
 };
 
-/// Figures of the stream, confidence, faults, the unloaded state and the recording.
+/// Confidence, faults, the stream, the unloaded state and the recording.
 pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(frame) = view.shown.frame.clone() else { return };
     warnings_ui(ui, &frame);
-    section_heading_ui(ui, "Stream");
-    stream_ui(ui, view);
     section_heading_ui(ui, "Confidence");
     confidence_ui(ui, view, &frame, shared);
+    section_heading_ui(ui, "Stream");
+    stream_ui(ui, view);
     section_heading_ui(ui, "Zero");
     zero_ui(ui, view, effects);
     section_heading_ui(ui, "Recording");
     recording_ui(ui, view, shared, effects);
-    section_heading_ui(ui, "Export");
-    export_ui(ui, view, &frame, shared, effects);
+    ui.add_space(space(2));
 }
 
 /// What the user should weigh, above everything else.
@@ -64,12 +60,12 @@ fn stream_ui(ui: &mut Ui, view: &LiveView) {
     let rate = if counts.is_waiting {
         "waiting".to_owned()
     } else {
-        format!("{:.0}", counts.frames_per_second)
+        format!("{:.0} frames a second", counts.frames_per_second)
     };
-    fact_ui(ui, "Frames a second", "Frames decoded in a second, lately.", &rate);
+    fact_ui(ui, "Rate", "Frames decoded in a second, lately.", &rate);
     let latency = counts.latency.map_or_else(
         || format_number(None),
-        |[median, high]| format!("{}, p99 {}", format_duration(median), format_duration(high)),
+        |[median, high]| format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
     );
     let hint = "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred \
                 exceeds.";
@@ -100,10 +96,7 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
                 mean square). It needs no ground truth: as small as the noise of a reading if the answer explains \
                 everything.";
     fact_ui(ui, "Residual of Eq. (2)", hint, &residual);
-    let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
-                than all of it: there the network extrapolates.";
-    let outside = outside_in_words(frame);
-    fact_ui(ui, "Outside training", hint, &outside);
+    outside_ui(ui, frame);
     let hint = "A broken, shorted, drifting or stuck wire, named once four frames in a row contradict Eq. (2).";
     match &frame.watched {
         Watched::Off(reason) => {
@@ -128,17 +121,28 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
     }
 }
 
-fn outside_in_words(frame: &LiveFrame) -> String {
-    let count = |number: usize, one: &str, many: &str| match number {
+fn outside_ui(ui: &mut Ui, frame: &LiveFrame) {
+    let count = |number: usize, one: &str| match number {
         1 => format!("1 {one}"),
-        number => format!("{number} {many}"),
+        number => format!("{number} {one}s"),
     };
-    let coordinates = count(frame.coordinates_outside, "coordinate", "coordinates");
-    match frame.readings_outside {
-        None => format!("readings not known, {coordinates}"),
-        Some(0) if frame.coordinates_outside == 0 => "none".to_owned(),
-        Some(readings) => format!("{}, {coordinates}", count(readings, "reading", "readings")),
-    }
+    let (readings, coordinates) = (frame.readings_outside, frame.coordinates_outside);
+    let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
+                than all of it. There the network extrapolates: check these readings, or train with a scene that covers \
+                them, for the simulated source with an indenter as the loading.";
+    let value = match readings {
+        None => "readings not known".to_owned(),
+        Some(0) if coordinates == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {}", count(readings, "reading"), frame.drops_percent.len()),
+    };
+    let is_outside = readings.unwrap_or(0) + coordinates > 0;
+    let value = match coordinates {
+        0 => value,
+        number => format!("{value}, {}", count(number, "coordinate")),
+    };
+    let palette = Theme::of(ui).palette;
+    let colour = if is_outside { palette.warning } else { palette.text };
+    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
 }
 
 fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
@@ -165,7 +169,7 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
     );
     ui.horizontal(|ui| {
         let task = save_zero(&zero);
-        let save = ui.add(ghost_button(task.words.name));
+        let save = ui.add(ghost_button("Save zero…"));
         if save.on_hover_text(task.words.description).clicked() {
             effects.push(Effect::ChooseFile(task));
         }
@@ -211,36 +215,9 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
             view.replay_recorded(shared, effects);
         }
         let task = save_recording(&recorded);
-        let save = ui.add(ghost_button(task.words.name));
+        let save = ui.add(ghost_button("Save recording…"));
         if save.on_hover_text(task.words.description).clicked() {
             effects.push(Effect::ChooseFile(task));
         }
     });
-}
-
-const READINGS: FileWords = FileWords {
-    name: "Readings, PNG or SVG…",
-    kind: "picture of the readings",
-    description: "The readings as shown, on a light background for print. The extension of the file name selects PNG \
-                  or SVG.",
-    extensions: &["png", "svg"],
-};
-
-fn export_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Shared, effects: &mut Vec<Effect>) {
-    let mut button = |ui: &mut Ui, words: FileWords, name: &str, figure: &dyn Fn() -> Figure| {
-        if ui
-            .add(ghost_button(words.name))
-            .on_hover_text(words.description)
-            .clicked()
-        {
-            effects.push(Effect::ChooseFile(FileTask::picture(words, name.to_owned(), figure())));
-        }
-    };
-    button(ui, SURFACES, "live-surfaces.png", &|| {
-        surface_figure(frame, None, shared.look).into()
-    });
-    button(ui, READINGS, "live-readings.png", &|| {
-        figure_of(frame, view.drops.largest_percent()).into()
-    });
-    ui.add_space(space(2));
 }

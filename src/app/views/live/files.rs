@@ -4,27 +4,24 @@ use std::{fs::File, io, path::Path, path::PathBuf, sync::mpsc::Sender};
 
 use super::engine::Recorded;
 use crate::{
-    app::shared::{FileTask, FileWords, Purpose},
+    app::shared::{Contents, FileTask, FileWords, Purpose},
     export::{WriteError, atomic_write},
     live::ZeroGains,
 };
 
 const NETWORK: FileWords = FileWords {
-    name: "Open network file…",
     kind: "network",
     description: "A network saved by the Train view or by train --out in a terminal.",
     extensions: &["json"],
 };
 
 const FRAMES: FileWords = FileWords {
-    name: "Choose file…",
     kind: "frames",
     description: "A recording made here, or lines of resistances in ohm as the terminal command decode reads them.",
     extensions: &["csv"],
 };
 
 const RECORDING: FileWords = FileWords {
-    name: "Save recording…",
     kind: "recording",
     description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the \
                   terminal command decode reads it.",
@@ -32,7 +29,6 @@ const RECORDING: FileWords = FileWords {
 };
 
 const ZERO: FileWords = FileWords {
-    name: "Save zero…",
     kind: "unloaded state",
     description: "Gain of every reading in the unloaded state, and the rows that were in contact, as JSON.",
     extensions: &["json"],
@@ -48,7 +44,15 @@ pub enum LiveFile {
 }
 
 impl LiveFile {
-    /// Words on its button.
+    /// Name of its button.
+    pub fn button(self) -> &'static str {
+        match self {
+            Self::Network => "Open network file…",
+            Self::Frames => "Choose file…",
+        }
+    }
+
+    /// Words that describe it.
     pub fn words(self) -> FileWords {
         match self {
             Self::Network => NETWORK,
@@ -84,7 +88,7 @@ pub fn save_recording(recorded: &Recorded) -> FileTask {
         }
         atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop))
     };
-    FileTask::save(RECORDING, "recording.csv".to_owned(), write)
+    FileTask::save(RECORDING, "recording", Contents::new(write))
 }
 
 /// Saves the unloaded state.
@@ -95,5 +99,5 @@ pub fn save_zero(zero: &ZeroGains) -> FileTask {
             serde_json::to_writer_pretty(file, &zero).map_err(Into::into)
         })
     };
-    FileTask::save(ZERO, "zero.json".to_owned(), write)
+    FileTask::save(ZERO, "zero", Contents::new(write))
 }

@@ -6,6 +6,7 @@
 mod cards;
 mod drop_scale;
 mod engine;
+mod exports;
 mod fault_form;
 mod figures_card;
 mod files;

@@ -130,15 +130,17 @@ impl NetworkChoice {
                     soon as another one is chosen.";
         combo.response.labelled_by(label.id).on_hover_text(hint);
         if let Some((_, network)) = self.network(runs) {
-            dim_ui(ui, &in_words(network));
+            let (array, error) = in_words(network);
+            dim_ui(ui, &array);
+            dim_ui(ui, &error);
         }
         ui.add_space(space(1));
-        let words = LiveFile::Network.words();
-        let button = ui.add(ghost_button(words.name));
-        if button.on_hover_text(words.description).clicked() {
+        let file = LiveFile::Network;
+        let button = ui.add(ghost_button(file.button()));
+        if button.on_hover_text(file.words().description).clicked() {
             let (send, chosen) = channel();
             self.chosen = Some(chosen);
-            effects.push(Effect::ChooseFile(LiveFile::Network.choose(send)));
+            effects.push(Effect::ChooseFile(file.choose(send)));
         }
         if let Some(problem) = &self.problem {
             note_ui(ui, problem);
@@ -147,17 +149,18 @@ impl NetworkChoice {
     }
 }
 
-/// Array, rows and error of a network in a line.
-fn in_words(file: &NetworkFile) -> String {
+/// Array and rows of a network, and its error, each in a line.
+fn in_words(file: &NetworkFile) -> (String, String) {
     let settings = &file.settings;
     let rows = match settings.source.scene.rows {
         Rows::All => "all rows".to_owned(),
         Rows::Known => "known rows".to_owned(),
         Rows::One(row) => format!("row {} alone", row + 1),
     };
-    let error = format_percent(file.errors.z_percent);
-    format!(
-        "{}, {} hidden, {rows}, Z {error}",
+    let array = format!(
+        "{}, {} hidden nodes, {rows}",
         settings.source.sensor.scale, settings.hidden
-    )
+    );
+    let error = format_percent(file.errors.z_percent);
+    (array, format!("Z error on its test set {error}"))
 }

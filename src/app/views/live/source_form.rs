@@ -154,7 +154,7 @@ impl SourceForm {
                 (SourceKind::Serial, "Serial"),
                 (SourceKind::Tcp, "TCP"),
             ];
-            self.kind = segmented_ui(ui, "Source", &kinds, self.kind, true).unwrap_or(self.kind);
+            self.kind = segmented_ui(ui, "Source", &kinds, self.kind, false).unwrap_or(self.kind);
             ui.add_space(space(1));
             match self.kind {
                 SourceKind::Simulated => {
@@ -212,15 +212,15 @@ impl SourceForm {
         let hint = "CSV of frames: a recording made here, or lines of resistances in ohm as the terminal command decode \
                     reads them.";
         text_ui(ui, "Frames", hint, &mut self.path);
-        let words = LiveFile::Frames.words();
+        let file = LiveFile::Frames;
         if ui
-            .add(ghost_button(words.name))
-            .on_hover_text(words.description)
+            .add(ghost_button(file.button()))
+            .on_hover_text(file.words().description)
             .clicked()
         {
             let (send, chosen) = channel();
             self.chosen = Some(chosen);
-            effects.push(Effect::ChooseFile(LiveFile::Frames.choose(send)));
+            effects.push(Effect::ChooseFile(file.choose(send)));
         }
         dim_ui(ui, "Frames without a column time_s come 50 times a second.");
     }

@@ -1,10 +1,10 @@
-use eframe::egui::{Button, Context, Key, Modifiers, Ui};
+use eframe::egui::{Button, Key, Modifiers, Ui};
 
 use super::{LiveView, engine::Command};
 use crate::app::{
-    shared::{Effect, Shared},
+    shared::{Effect, Offers, Shared},
     theme::{Theme, space},
-    widgets::{ghost_button, pressed, primary_button},
+    widgets::{ghost_button, primary_button},
 };
 
 /// The buttons that run the source, from right to left.
@@ -60,21 +60,25 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
     }
 }
 
-/// Does what the keys mean.
-pub fn take_shortcuts(ctx: &Context, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+/// Offers what can be done with the source.
+pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_running = view.running.is_some();
-    if pressed(ctx, Modifiers::COMMAND, Key::Enter) && !is_running {
+    let can_start = !is_running && view.obstacle(shared).is_none();
+    if offers.offer_keys("Start live decoding", Modifiers::COMMAND, Key::Enter, can_start) {
         view.start(shared, effects);
     }
-    if pressed(ctx, Modifiers::COMMAND, Key::Period) && is_running {
+    if offers.offer_keys("Stop live decoding", Modifiers::COMMAND, Key::Period, is_running) {
         view.stop();
     }
-    if pressed(ctx, Modifiers::COMMAND, Key::R) && view.can_record() {
+    if offers.offer_keys("Start or end recording", Modifiers::COMMAND, Key::R, view.can_record()) {
         view.toggle_recording();
     }
-    if pressed(ctx, Modifiers::COMMAND, Key::P)
-        && let Some(replay) = view.shown.replay
-    {
+    if offers.offer("Re-zero", is_running) {
+        view.re_zero();
+    }
+    let replay = view.shown.replay;
+    let is_pressed = offers.offer_keys("Pause or resume replay", Modifiers::COMMAND, Key::P, replay.is_some());
+    if let Some(replay) = replay.filter(|_| is_pressed) {
         view.command(Command::Play(!replay.is_playing));
     }
 }

@@ -1,9 +1,10 @@
-use eframe::egui::{Context, RichText, Sense, Ui};
+use eframe::egui::{RichText, Sense, Ui};
 
 use super::{
     LiveView,
     cards::surfaces_ui,
     engine::{SourcePlan, Watched},
+    exports::live_exports,
     figures_card::figures_ui,
     form,
     invitation::invitation_ui,
@@ -12,7 +13,7 @@ use super::{
     tools,
 };
 use crate::app::{
-    shared::{Effect, Shared, View},
+    shared::{Effect, Export, Offers, Shared, View},
     theme::{Theme, space, type_size},
     widgets::{card_ui, scrolled_ui, state_ui},
 };
@@ -34,12 +35,16 @@ impl View for LiveView {
         self.running.is_some()
     }
 
-    fn take_shortcuts(&mut self, ctx: &Context, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::take_shortcuts(ctx, self, shared, effects);
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        tools::offer_actions(self, offers, shared, effects);
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         tools::tools_ui(ui, self, shared, effects);
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        live_exports(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -1,14 +1,18 @@
-use eframe::egui::Ui;
+use eframe::egui::{Response, Ui, WidgetInfo, accesskit::Role};
 
 use crate::app::{
     shared::{Effect, Phase, Shared},
+    theme::space,
     widgets::{ghost_button, primary_button},
 };
 
 /// The buttons that run the training, from right to left.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_busy = shared.phase.is_busy();
-    let stop = ui.add_enabled(is_busy, ghost_button("■ Stop"));
+    // In a narrow window the signs must do.
+    let is_short = ui.available_width() < 2.0 * space(120);
+    let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
+    name(&stop, "■ Stop");
     if stop
         .on_hover_text("Ends the training; the best network so far is kept (Ctrl+.).")
         .clicked()
@@ -22,8 +26,10 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         ("⏸ Pause", Effect::Pause)
     };
     let can_pause = matches!(shared.phase, Phase::Training | Phase::Paused);
-    if ui
-        .add_enabled(can_pause, ghost_button(text))
+    let sign = text.split(' ').next().unwrap_or(text);
+    let pause = ui.add_enabled(can_pause, ghost_button(if is_short { sign } else { text }));
+    name(&pause, text);
+    if pause
         .on_hover_text("Pauses or resumes the training (Ctrl+P).")
         .clicked()
     {
@@ -48,4 +54,10 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
             effects.push(Effect::Continue);
         }
     }
+}
+
+/// Gives the button its whole name, for assistive technology.
+fn name(button: &Response, name: &str) {
+    let is_enabled = button.enabled();
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, name));
 }

@@ -3,7 +3,10 @@ use std::{ops::RangeInclusive, sync::Arc, time::Instant};
 use glam::DVec3;
 use ndarray::Array2;
 
-use super::{message::TruthErrors, watch::Watch};
+use super::{
+    message::{TruthErrors, Watched},
+    watch::Watch,
+};
 use crate::{
     app::test_view::Frame,
     decoupling::{CompiledNetworks, Decoder, resistance_residual},
@@ -147,7 +150,7 @@ impl Decoding {
     /// Errors where the truth is known; `shown_mm` are those of late.
     pub(super) fn truth_errors(&self, shown_mm: Option<f64>) -> TruthErrors {
         let (sums, count) = self.since_named;
-        let is_named = matches!(self.watch.state(), super::Watched::Named(_));
+        let is_named = matches!(self.watch.state(), Watched::Named(_));
         TruthErrors {
             shown_mm,
             since_named_mm: (is_named && count > 0).then(|| sums.map(|sum| sum / count as f64)),

@@ -69,10 +69,9 @@ pub(super) fn of_inputs(draft: &SimulatedSettings) -> String {
     format!("{quantity}, {scaling}")
 }
 
-/// The rules that mostly end a training.
+/// The rule that ends every training.
 pub(super) fn of_stopping(draft: &SimulatedSettings) -> String {
-    let stopping = &draft.training.stopping;
-    format!("{} epochs, {} failures", stopping.epochs, stopping.max_fail)
+    format!("{} epochs", draft.training.stopping.epochs)
 }
 
 /// The first of the method's own settings, and the number of starts.

@@ -1,0 +1,384 @@
+//! Frames decoded as they come: from the simulated source, a recording, and a socket.
+
+use std::{
+    cell::RefCell,
+    collections::BTreeMap,
+    fs::{self, File},
+    io::{BufReader, Write},
+    net::TcpListener,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use decoupler::{
+    app::Phase,
+    dataset::Seed,
+    decoupling::{CompiledNetworks, Decoder},
+    export::NetworkFile,
+    live::{Recording, Simulated, ZeroGains},
+    scene::{Noise, Scene},
+};
+use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
+use egui_kittest::kittest::{By, Queryable as _};
+use glam::DVec3;
+
+use crate::{closing::close, driver::Driver};
+
+/// The window with a small network in its run list, at the Live view.
+fn open(folder: &Path) -> Driver {
+    let mut driver = Driver::open_keeping(&folder.join("runs"));
+    driver.configure_small();
+    train(&mut driver, 1);
+    driver.click_button("Live");
+    driver
+}
+
+fn train(driver: &mut Driver, runs: usize) {
+    driver.train();
+    driver.wait("the run in the list", |driver| {
+        driver.state().runs.workspace.runs.len() == runs
+    });
+}
+
+fn start(driver: &mut Driver) {
+    driver.click("▶ Start");
+    driver.wait("the first frame", |driver| driver.has("Live decoupled surface"));
+}
+
+fn network(driver: &Driver, place: usize) -> Arc<NetworkFile> {
+    Arc::clone(&driver.state().runs.workspace.runs[place].file)
+}
+
+fn decoded(driver: &Driver) -> u64 {
+    driver.views().live.shown.counts.decoded
+}
+
+/// Waits until this many more frames are decoded.
+fn wait_for_frames(driver: &mut Driver, more: u64) {
+    let wanted = decoded(driver) + more;
+    driver.wait("more frames", |driver| decoded(driver) >= wanted);
+}
+
+/// Time and nodes of the frame on show.
+fn on_show(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
+    let frame = driver.views().live.shown.frame.as_ref()?;
+    Some((frame.time_s, frame.decoupled.nodes_mm.to_vec()))
+}
+
+/// What the library decodes.
+fn by_library(file: &NetworkFile, frame_ohm: &[f64]) -> Vec<DVec3> {
+    let scale = file.settings.source.sensor.scale;
+    let mut decoder = CompiledNetworks::<f64>::new(&file.network, scale.rows());
+    let mut answer_mm = vec![0.0; scale.rows() * scale.coordinates_per_row()];
+    decoder.decode(frame_ohm, &mut answer_mm).unwrap();
+    answer_mm.chunks_exact(3).map(DVec3::from_slice).collect()
+}
+
+/// Picks from a list that opens.
+fn pick(driver: &mut Driver, list: &str, choice: &str) {
+    driver.click(list);
+    let choices = By::new().label(choice).predicate(|node| node.role() != Role::ComboBox);
+    driver.harness().get(choices).click();
+    driver.harness().run_steps(3);
+}
+
+#[test]
+fn without_a_network_one_click_trains_one_and_another_shows_it_live() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click_button("Live");
+    assert!(driver.has("No network yet") && !driver.is_enabled("▶ Start"));
+    driver.click("Train a network now");
+    assert_eq!(driver.shown(), "Train");
+    driver.wait("the run", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_)) && !driver.state().runs.workspace.runs.is_empty()
+    });
+    driver.click_button("Live");
+    driver.enter("Relative noise", "0");
+    driver.click("Start the simulated source");
+    driver.wait("surfaces and readings", |driver| {
+        ["Live decoupled surface", "Live actual surface", "Live readings"]
+            .iter()
+            .all(|label| driver.has(label))
+    });
+    wait_for_frames(&mut driver, 3);
+
+    let file = network(&driver, 0);
+    let (time_s, nodes) = on_show(&driver).unwrap();
+    let scene = Scene {
+        noise: Noise::default(),
+        ..file.settings.source.scene
+    };
+    let mut source = Simulated::new(&file.settings.source.sensor, &scene, Seed(0), 50.0).unwrap();
+    let mut ohm = vec![0.0; source.readings()];
+    while source.next_frame(&mut ohm).unwrap() < time_s {}
+    assert_eq!(nodes, by_library(&file, &ohm), "at {time_s} s");
+    let actual = driver
+        .views()
+        .live
+        .shown
+        .frame
+        .as_ref()
+        .unwrap()
+        .actual
+        .clone()
+        .unwrap();
+    let truth = (0..10).flat_map(|row| source.deformation().row_mm(row).to_vec());
+    assert!(actual.nodes_mm.iter().zip(truth).all(|(node, u)| node.z == 5.0 - u.z));
+
+    driver.click("■ Stop");
+    assert!(
+        driver.comes_to_rest() && driver.has("Live decoupled surface"),
+        "the last frame stays"
+    );
+    assert!(driver.says("Stopped after") && driver.is_enabled("▶ Start"));
+}
+
+#[test]
+fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open(folder.path());
+    start(&mut driver);
+    assert!(driver.has("Fault: none"));
+    pick(&mut driver, "Injected fault", "Broken column-wire");
+    driver.enter("Column-wire", "7");
+    driver.wait("the name of the wire", |driver| driver.has("Fault: column-wire 7"));
+    assert!(driver.says("Column-wire 7: no signal") && driver.says("Its readings are left out"));
+    wait_for_frames(&mut driver, 20);
+    let errors = driver.views().live.shown.frame.as_ref().unwrap().errors.unwrap();
+    let [by_all, left_out] = errors.since_named_mm.unwrap();
+    assert!(left_out < 0.5 * by_all, "{left_out} mm instead of {by_all} mm");
+    assert!(driver.says("Error with all wires: ") && driver.says("Error without the fault: "));
+    pick(&mut driver, "Injected fault", "None");
+    driver.wait("recovery", |driver| driver.has("Fault: none"));
+    assert!(!driver.says("Error with all wires"));
+}
+
+#[test]
+fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open(folder.path());
+    driver.enter("Frames a second", "0.1");
+    start(&mut driver);
+    driver.click_button("Re-zero");
+    driver.wait("the reason", |driver| {
+        driver.says("Not re-zeroed: ") && driver.says("and 25 are needed")
+    });
+    driver.click("■ Stop");
+    driver.enter("Frames a second", "50");
+    start(&mut driver);
+    driver.click_button("Lift");
+    pick(&mut driver, "Injected fault", "Gain drift");
+    driver.wait("the drift", |driver| driver.has("Fault: column-wire 3"));
+    wait_for_frames(&mut driver, 30);
+    driver.click_button("Re-zero");
+    driver.wait("the gains", |driver| driver.has("Rows in contact: 0 of 10"));
+    driver.wait("sound readings", |driver| driver.has("Fault: none"));
+    let zero = driver.views().live.zero.clone().unwrap();
+    for (index, gain) in zero.gains.iter().enumerate() {
+        let expected = if index % 18 == 2 { 1.05 } else { 1.0 };
+        assert!((gain / expected - 1.0).abs() < 2e-3, "{index}: {gain}");
+    }
+    driver.click_button("Zero");
+    assert!(driver.has("Gains of the unloaded state"));
+    driver.click("■ Stop");
+    driver.settle();
+    let path = folder.path().join("zero.json");
+    driver.save("Save zero…", &path);
+    let saved: ZeroGains = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    assert_eq!(saved, zero);
+    driver.click("Clear zero");
+    assert!(driver.views().live.zero.is_none() && !driver.has("Gains of the unloaded state"));
+}
+
+/// Draws frames until `ends`; returns all that were shown, by the bits of their times.
+fn collect(driver: &mut Driver, what: &str, ends: impl Fn(&Driver) -> bool) -> BTreeMap<u64, Vec<DVec3>> {
+    let shown = RefCell::new(BTreeMap::new());
+    driver.wait(what, |driver| {
+        if let Some((time_s, nodes)) = on_show(driver) {
+            shown.borrow_mut().insert(time_s.to_bits(), nodes);
+        }
+        ends(driver)
+    });
+    shown.into_inner()
+}
+
+fn recordings(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder.join("recordings")).unwrap();
+    entries.map(|entry| entry.unwrap().path()).collect()
+}
+
+fn read(path: &Path) -> Recording {
+    let rows = Vec::from_iter(0..10);
+    Recording::read(BufReader::new(File::open(path).unwrap()), &rows, 10, 18).unwrap()
+}
+
+#[test]
+fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
+    driver.configure_small();
+    train(&mut driver, 1);
+    driver.enter("Hidden nodes", "4");
+    train(&mut driver, 2);
+    driver.click_button("Live");
+    assert!(!driver.is_enabled("● Record"));
+    start(&mut driver);
+    driver.press_with(Modifiers::COMMAND, Key::R);
+    let live = collect(&mut driver, "a recording", |driver| {
+        driver
+            .views()
+            .live
+            .shown
+            .recording
+            .is_some_and(|(frames, _)| frames >= 40)
+    });
+    driver.press_with(Modifiers::COMMAND, Key::R);
+    driver.wait("its end", |driver| driver.says("Recorded "));
+    let recording = read(&recordings(folder.path())[0]);
+
+    driver.click("Replay");
+    let ended = |driver: &Driver| {
+        let replay = driver.views().live.shown.replay;
+        replay.is_some_and(|replay| !replay.is_playing)
+    };
+    let replayed = collect(&mut driver, "the end of the replay", ended);
+    assert!(driver.comes_to_rest(), "a replay that stands still");
+    let file = network(&driver, 1);
+    let answers = recording.times_s().iter().enumerate().map(|(frame, time_s)| {
+        let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
+        (time_s.to_bits(), by_library(&file, &frame_ohm))
+    });
+    let answers: BTreeMap<_, _> = answers.collect();
+    for (shown, least) in [(&live, 1), (&replayed, 2)] {
+        let recorded: Vec<_> = shown.iter().filter(|(time, _)| answers.contains_key(time)).collect();
+        assert!(recorded.len() >= least, "{} of {}", recorded.len(), shown.len());
+        assert!(recorded.iter().all(|(time, nodes)| answers[time] == **nodes));
+    }
+    let check = |driver: &Driver, place: usize| {
+        let (time_s, nodes) = on_show(driver).unwrap();
+        let frame = recording.frame_at(time_s);
+        let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
+        assert_eq!(nodes, by_library(&network(driver, place), &frame_ohm));
+        (frame, recording.times_s().len() - 1)
+    };
+    let (frame, last) = check(&driver, 1);
+    assert_eq!(frame, last);
+
+    driver.get("Replay position").set_value_accesskit(0.0);
+    driver.harness().run_steps(2);
+    driver.wait("the first frame", |driver| {
+        driver
+            .views()
+            .live
+            .shown
+            .replay
+            .is_some_and(|replay| replay.at_s == 0.0)
+    });
+    assert_eq!(check(&driver, 1).0, 0);
+    let name = driver.state().runs.workspace.runs[0].name.clone();
+    pick(&mut driver, "Decode with", &name);
+    driver.wait("the other network's answer", |driver| {
+        let running = driver.views().live.running.as_ref();
+        running.is_some_and(|running| running.network == name) && decoded(driver) == 1
+    });
+    assert_eq!(check(&driver, 0).0, 0);
+    driver.click("■ Stop");
+    driver.settle();
+    let copy = folder.path().join("copy.csv");
+    driver.save("Save recording…", &copy);
+    assert_eq!(read(&copy), recording);
+}
+
+#[test]
+fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open(folder.path());
+    start(&mut driver);
+    driver.click("● Record");
+    driver.wait("a few frames", |driver| {
+        driver
+            .views()
+            .live
+            .shown
+            .recording
+            .is_some_and(|(frames, _)| frames >= 5)
+    });
+    assert!(close(&mut driver));
+    let (frames, _) = driver.views().live.shown.recording.unwrap();
+    drop(driver);
+    let recording = read(&recordings(folder.path())[0]);
+    assert!(recording.times_s().len() >= frames as usize);
+}
+
+#[test]
+fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open(folder.path());
+    let file = network(&driver, 0);
+    let sensor = file.settings.source.sensor;
+    let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
+    let rows = (0..10).map(|row| sensor.row_resistances(row, &at_rest).unwrap());
+    let frame_ohm: Vec<f64> = rows.flatten().collect();
+    let line = frame_ohm
+        .iter()
+        .map(|ohm| format!("{ohm:?}"))
+        .collect::<Vec<_>>()
+        .join(",");
+
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    driver.click_button("TCP");
+    driver.enter("Address", "nowhere");
+    assert!(driver.says("tcp:HOST:PORT") && !driver.is_enabled("▶ Start"));
+    driver.enter("Address", &listener.local_addr().unwrap().to_string());
+    driver.click("▶ Start");
+    let (mut sender, _) = listener.accept().unwrap();
+    writeln!(sender, "{line}\n#!?\n{line}").unwrap();
+    driver.wait("both frames", |driver| driver.has("Decoded: 2"));
+    assert!(
+        driver.has("Bad: 1") && driver.says("Last: line 2"),
+        "{:#?}",
+        driver.texts()
+    );
+    assert_eq!(on_show(&driver).unwrap().1, by_library(&file, &frame_ohm));
+    assert!(!driver.has("Live actual surface"), "nobody knows it");
+    driver.wait("silence", |driver| driver.has("No frame for two seconds"));
+    assert!(driver.comes_to_rest(), "nothing comes");
+    drop(sender);
+    driver.wait("the end", |driver| driver.says("The source has ended."));
+    assert!(driver.is_enabled("▶ Start"));
+
+    driver.click("▶ Start");
+    drop(listener);
+    driver.wait("the end of a source that is gone", |driver| {
+        driver.views().live.running.is_none()
+    });
+}
+
+#[test]
+fn everything_keeps_to_a_narrow_window() {
+    let folder = tempfile::tempdir().unwrap();
+    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {
+        let mut driver = open(&folder.path().join(format!("{}", size.x)));
+        driver.harness().set_size(size);
+        start(&mut driver);
+        driver.harness().run_steps(3);
+        let tools = ["Live", "Re-zero", "● Record", "▶ Start", "■ Stop"];
+        let places = tools.map(|label| driver.harness().get(By::new().role(Role::Button).label(label)).rect());
+        assert!(
+            places.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
+            "{size}: {places:?}"
+        );
+        for label in ["Live decoupled surface", "Live actual surface", "Live readings"] {
+            let rect = driver.get(label).rect();
+            assert!(
+                rect.right() <= size.x && rect.bottom() <= size.y,
+                "{label} at {size}: {rect}"
+            );
+            assert!(
+                rect.width() > 120.0 && rect.height() > 90.0,
+                "{label} at {size}: {rect}"
+            );
+        }
+    }
+}
