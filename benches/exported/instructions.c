@@ -56,7 +56,7 @@ void start(void)
     SYSTICK_VALUE = 0;
     SYSTICK_CONTROL = 5;
     const uint32_t loop = ticks(0);
-    print((ticks(1) - loop) / ROUNDS * NANOSECONDS_A_TICK);
+    print((ticks(1) - loop) * NANOSECONDS_A_TICK / ROUNDS);
     print((uint32_t)decoded[2]);
     host(0x18, (const void *)0x20026);
     for (;;) {

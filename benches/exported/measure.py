@@ -1,10 +1,11 @@
-"""Time of a frame of 10 row-wires by exported networks, and the size of the decoder in whole numbers on ARM.
+"""Time of a frame of 10 row-wires by exported networks, and size and instructions of the decoder in whole numbers on ARM.
 
-Usage: measure.py PROGRAM, where PROGRAM is the release build; needs onnxruntime, gcc, and for the sizes
-arm-none-eabi-gcc. Prints Markdown tables.
+Usage: measure.py PROGRAM, where PROGRAM is the release build; needs onnxruntime, gcc, for the sizes arm-none-eabi-gcc, and for
+the instructions qemu-system-arm as well. Prints Markdown tables.
 """
 
 import csv
+import itertools
 import json
 import pathlib
 import re
@@ -85,9 +86,28 @@ def arm_size(folder, cpu):
     return int(text) + int(data), int(data) + int(bss), own + max(map(int, usage.values()), default=0)
 
 
+def arm_instructions(folder, cpu, optimisation, readings, scale):
+    """Instructions for a row-wire, and the last z_1 in nm, by an emulated processor that takes 1 ns for each of them."""
+    source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}{optimisation}.elf"
+    rows = ", ".join("{" + ", ".join(str(round(value * scale)) for value in row) + "}" for row in readings)
+    sizes = f"#define ROWS {len(readings)}\n#define DECODED 30\n"
+    (folder / "readings.h").write_text(f"{sizes}static const int32_t readings[ROWS][{len(readings[0])}] = {{{rows}}};\n")
+    flags = [f"-mcpu=cortex-{cpu}", "-mthumb", "-std=c99", optimisation, f"-I{folder}", f'-DHEADER="{source.stem}.h"']
+    flags.append(f"-DBUNDLE={source.name.removesuffix('_decode.c')}")
+    if "int row" in source.read_text():
+        flags.append("-DTAKES_ROW")
+    link = ["-nostartfiles", "-ffunction-sections", "-Wl,--gc-sections", f"-Wl,-T,{HERE / 'instructions.ld'}"]
+    run("arm-none-eabi-gcc", *flags, *link, "--specs=nosys.specs", HERE / "instructions.c", source, "-o", image)
+    machine = ["qemu-system-arm", "-machine", "mps2-an386", "-icount", "shift=0", "-kernel", image]
+    quiet = ["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"]
+    # What a program says to its host comes on standard error.
+    said = subprocess.run([str(part) for part in machine + quiet], capture_output=True, text=True, timeout=300).stderr
+    return tuple(map(int, said.split()))
+
+
 with tempfile.TemporaryDirectory() as home:
     home = pathlib.Path(home)
-    times, sizes = [], []
+    times, sizes, instructions = [], [], []
     for name, arguments in NETWORKS.items():
         network = home / f"{name}.json"
         report = json.loads(run(PROGRAM, "train", *arguments.split(), "--decoder", "network", "--out", network, "--json"))
@@ -110,9 +130,16 @@ with tempfile.TemporaryDirectory() as home:
                 times.append((name, f"C, gcc -O2, {precision}", time_c(home, name, precision, folder, readings, scale)))
                 if precision == "fixed16" and shutil.which("arm-none-eabi-gcc"):
                     sizes += [(name, f"Cortex-{cpu.upper()}", *arm_size(folder, cpu)) for cpu in ["m0", "m4"]]
+                    if shutil.which("qemu-system-arm"):
+                        for cpu, optimisation in itertools.product(["m0", "m4"], ["-Os", "-O2"]):
+                            counted = arm_instructions(folder, cpu, optimisation, readings, scale)
+                            instructions.append((name, f"Cortex-{cpu.upper()}", optimisation, *counted))
     print("| network | decoder | µs a frame |\n|---|---|---|")
     for name, decoder, microseconds in times:
         print(f"| {name} | {decoder} | {microseconds:.2f} |")
     print("\n| network | processor | flash, bytes | static RAM, bytes | stack, bytes |\n|---|---|---|---|---|")
     for row in sizes:
+        print("| " + " | ".join(map(str, row)) + " |")
+    print("\n| network | processor | compiled with | instructions a row-wire | z_1 of the last row-wire, nm |\n|---|---|---|---|---|")
+    for row in instructions:
         print("| " + " | ".join(map(str, row)) + " |")

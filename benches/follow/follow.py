@@ -35,7 +35,9 @@ class Decoder:
         tty.setraw(self.master)
         tty.setraw(slave)
         command = [PROGRAM, "decode", "--network", network, "--follow", "--input", f"{os.ttyname(slave)}:115200"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        # A shell lets what it runs in the background ignore interruptions.
+        listens = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=listens)
         self.answers, self.last = 0, time.monotonic()
         self.warnings = []
         self.slave = slave

@@ -23,7 +23,7 @@ pub fn error_table(rows: &[ErrorRow]) -> Table {
         std::iter::once(row.name.into()).chain(values).collect()
     };
     Table {
-        columns: std::iter::once(TableColumn::new("decoder", "Decoder", ""))
+        columns: std::iter::once(TableColumn::new("decoupler", "Decoder", ""))
             .chain(figures)
             .collect(),
         rows: rows.iter().map(row).collect(),

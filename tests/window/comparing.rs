@@ -66,7 +66,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
     // What is compared is saved as it is in view, by the names of the runs.
     let saved = folder.path().join("compared.svg");
-    driver.save("Surfaces, PNG or SVG…", &saved);
+    driver.save("Surfaces, SVG", &saved);
     driver.click("Dismiss");
     let svg = fs::read_to_string(saved).unwrap();
     let titles = [
@@ -95,7 +95,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     };
     check(&driver);
     let picture = folder.path().join("losses.svg");
-    driver.save("Chart, PNG or SVG…", &picture);
+    driver.save("Loss chart, SVG", &picture);
     driver.click("Dismiss");
     let picture = fs::read_to_string(picture).unwrap();
     for curve in ["A: Six hidden nodes, test", &format!("B: {SECOND}, training")] {

@@ -143,7 +143,10 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     let [checkpoint, network] = ["run.checkpoint", "network.json"].map(|name| folder.path().join(name));
     let mut driver = Driver::open();
     start_endless(&mut driver);
-    assert!(!driver.is_enabled("Save checkpoint…"), "a training is held first");
+    driver.open_menu();
+    assert!(!driver.is_enabled(SAVE), "a training is held first");
+    assert!(driver.says("A training under way cannot be saved"));
+    driver.press(eframe::egui::Key::Escape);
     pause(&mut driver);
     save(&mut driver, SAVE, &checkpoint);
     let (held, history) = (driver.epochs(), driver.state().run.as_ref().unwrap().history.clone());

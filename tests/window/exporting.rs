@@ -225,6 +225,8 @@ fn tables_are_copied_as_they_are_shown() {
     for form in ["Markdown", "LaTeX", "tab-separated"] {
         driver.open_menu();
         let name = format!("Copy error table as {form}");
+        driver.get(&name).scroll_to_me();
+        driver.harness().run_steps(5);
         driver.get(&name).click();
         let mut copied = None;
         for _ in 0..3 {

@@ -61,7 +61,7 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     driver.settle();
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("values.svg");
-    driver.save("Chart, PNG or SVG…", &picture);
+    driver.save("Singular values, SVG", &picture);
     driver.click("Dismiss");
     let picture = std::fs::read_to_string(picture).unwrap();
     for word in ["worst row", "other rows", "deformation pattern, best seen first"] {
@@ -160,7 +160,7 @@ fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("identifiability.svg");
     let mut driver = open();
-    driver.save("Surfaces, PNG or SVG…", &path);
+    driver.save("Surfaces, SVG", &path);
     let svg = std::fs::read_to_string(path).unwrap();
     let says = |text: &str| svg.matches(&format!(">{text}</text>")).count();
     assert_eq!(

@@ -1,7 +1,7 @@
 //! The Export menu: everything that the view on show can hand out, drawn from one list.
 
 use eframe::egui::{
-    Align, Button, Layout, RichText, ScrollArea, TextWrapMode, Ui, WidgetInfo, accesskit::Role,
+    Align, Button, Frame, Layout, Margin, RichText, ScrollArea, TextWrapMode, Ui, WidgetInfo, accesskit::Role,
     containers::menu::MenuButton,
 };
 
@@ -16,13 +16,21 @@ const WIDTH: f32 = space(88);
 /// The button that opens the menu. `exports` lists what there is; it is called only while the menu is open.
 pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
     let (button, _) = MenuButton::from_button(ghost_button("Export")).ui(ui, |ui| {
-        ui.set_width(WIDTH);
-        // What the screen cannot hold is scrolled to.
+        // What the window cannot hold is scrolled to.
         let most = ui.ctx().content_rect().height() - space(20);
-        ScrollArea::vertical().max_height(most).show(ui, |ui| {
-            ui.set_width(WIDTH);
-            let asked = exports_ui(ui, exports());
-            effects.extend(asked.map(|ask| ask()));
+        let scroll = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+        let margin = Margin {
+            left: 8,
+            right: 8,
+            top: 0,
+            bottom: 8,
+        };
+        scroll.show(ui, |ui| {
+            Frame::new().inner_margin(margin).show(ui, |ui| {
+                ui.set_width(WIDTH);
+                let asked = exports_ui(ui, exports());
+                effects.extend(asked.map(|ask| ask()));
+            });
         });
     });
     button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
@@ -38,7 +46,6 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     while let Some(first) = exports.next() {
         if group.replace(first.group) != Some(first.group) {
             section_heading_ui(ui, first.group.heading());
-            told.clear();
         }
         let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
         if reason != told && !reason.is_empty() {
@@ -61,7 +68,6 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
             };
             ui.label(RichText::new(name).color(colour));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.add_space(space(2));
                 // From right to left.
                 for form in forms.into_iter().rev() {
                     asked = asked.take().or(form_ui(ui, form));

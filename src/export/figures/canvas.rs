@@ -236,19 +236,21 @@ impl Canvas {
     }
 
     pub fn finish(self) -> Picture {
-        let [width, height] = [self.width, self.height].map(number);
+        let size = [self.width, self.height];
+        let [width, height] = size.map(number);
         let body = self.body;
-        Picture::new(format!(
+        let svg = format!(
             r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-linejoin="round">
 <rect width="{width}" height="{height}" fill="#ffffff"/>
 {body}</svg>
 "##
-        ))
+        );
+        Picture::new(svg, size)
     }
 }
 
 /// Formats a length to a hundredth of a point, without trailing zeros.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

@@ -1,8 +1,10 @@
 //! Figures inside an HTML page that follows the reader's dark theme.
 
 use super::{
+    canvas::number,
     colours::{DIM, GRID, INK, MISSING, Rgb, rgb},
     picture::Picture,
+    plot_figure::PAGE_WIDTH,
 };
 use crate::figure::Hue;
 
@@ -41,17 +43,18 @@ pub(crate) fn dark_style() -> String {
 }
 
 impl Picture {
-    /// The figure as part of an HTML page: without outside references, and with names that no figure of another `number`
-    /// has. `label` is read aloud in its place.
-    pub(crate) fn inline_svg(&self, number: usize, label: &str) -> String {
+    /// The figure as part of an HTML page, as wide in proportion as on a printed one: without outside references, and with
+    /// names that no figure in another `place` has. `label` is read aloud in its place.
+    pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
         let label = super::canvas::escaped(label).replace('"', "&quot;");
+        let [width, height] = self.size();
+        let share = number(100.0 * width / PAGE_WIDTH);
+        let [width, height] = [width, height].map(number);
+        let own = format!("xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\"");
+        let here = format!("role=\"img\" aria-label=\"{label}\" width=\"{share}%\"");
         self.svg()
-            .replacen(
-                "xmlns=\"http://www.w3.org/2000/svg\"",
-                &format!("role=\"img\" aria-label=\"{label}\""),
-                1,
-            )
-            .replace("id=\"c", &format!("id=\"f{number}c"))
-            .replace("url(#c", &format!("url(#f{number}c"))
+            .replacen(&own, &here, 1)
+            .replace("id=\"c", &format!("id=\"f{place}c"))
+            .replace("url(#c", &format!("url(#f{place}c"))
     }
 }

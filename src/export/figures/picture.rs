@@ -10,9 +10,11 @@ use thiserror::Error;
 use crate::export::{WriteError, atomic_write};
 
 /// A finished figure.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     svg: String,
+    /// Width and height in points.
+    size: [f64; 2],
 }
 
 /// File format of a figure.
@@ -66,8 +68,13 @@ impl PictureFormat {
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
-    pub(super) fn new(svg: String) -> Self {
-        Self { svg }
+    pub(super) fn new(svg: String, size: [f64; 2]) -> Self {
+        Self { svg, size }
+    }
+
+    /// Width and height in points.
+    pub(super) fn size(&self) -> [f64; 2] {
+        self.size
     }
 
     /// The figure as SVG. Its text names the program's font and common ones to stand in for it.

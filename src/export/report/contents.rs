@@ -149,6 +149,15 @@ impl RunReport<'_> {
         let reason = file.training.stop_reason;
         let of_rows = error_remarks(&file.settings, &file.errors, &file.baselines, reason);
         remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
+        let (ours, linear) = (&file.errors, &file.baselines.linear);
+        if ours.z_mm > linear.z_mm
+            && let Some(reason) = reason
+        {
+            let remedy = reason.remedy(&file.settings.training.method);
+            remarks.push(format!(
+                "a linear map of the resistances is better on z than this network: {remedy}"
+            ));
+        }
         remarks.extend(ReferenceNote::of(&file.baselines).map(|note| note.to_string()));
         if file.baselines.reference.as_ref().is_some_and(Errors::is_rounding) {
             let text = "the reference is nothing but rounding: the readings determine the deformation, and no ratio to \

@@ -3,7 +3,7 @@
 use crate::{
     evaluation::SimulatedSettings,
     export::{NetworkFile, format_number},
-    scene::{Movement, Noise, NoisySets},
+    scene::{IndenterShape, Loading, Movement, Noise, NoisySets},
 };
 
 /// Names and values of all settings.
@@ -45,7 +45,7 @@ pub(super) fn settings_facts(file: &NetworkFile) -> Vec<(&'static str, String)> 
                 Movement::Xyz { largest_shift_mm } => format!("x, y, z; sideways by up to {largest_shift_mm} mm"),
             },
         ),
-        ("Loading", scene.loading.to_string()),
+        ("Loading", loading_words(&scene.loading)),
         (
             "Largest compression",
             format!(
@@ -85,6 +85,32 @@ pub(super) fn settings_facts(file: &NetworkFile) -> Vec<(&'static str, String)> 
         ("Seed", file.settings.seed.to_string()),
     ]);
     facts
+}
+
+fn loading_words(loading: &Loading) -> String {
+    let Loading::Indenter(indenter) = loading else {
+        return loading.to_string();
+    };
+    let (radius, tilt_degrees) = match indenter.shape {
+        IndenterShape::Sphere { radius_mm } => (Some(radius_mm), 0.0),
+        IndenterShape::FlatPunch {
+            radius_mm,
+            largest_tilt_degrees,
+        }
+        | IndenterShape::Cylinder {
+            radius_mm,
+            largest_tilt_degrees,
+        } => (Some(radius_mm), largest_tilt_degrees),
+        IndenterShape::Edge { largest_tilt_degrees } => (None, largest_tilt_degrees),
+    };
+    let mut words = indenter.name().to_owned();
+    if let Some(radius) = radius {
+        words += &format!(", radius {} to {} mm", radius.smallest, radius.largest);
+    }
+    if tilt_degrees > 0.0 {
+        words += &format!(", tilted by up to {tilt_degrees}°");
+    }
+    format!("{words}, decay length {} mm", indenter.spread_mm)
 }
 
 fn noise_words(noise: &Noise) -> String {
