@@ -2,6 +2,8 @@
 //!
 //! Panels take colours, sizes and distances from here and write none of their own.
 
+#[cfg(test)]
+mod contrast;
 mod fonts;
 mod style;
 mod tokens;

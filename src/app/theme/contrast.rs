@@ -1,0 +1,97 @@
+//! Contrast of text and marks in both themes, after WCAG 2.2.
+
+use eframe::egui::Color32;
+
+use super::Palette;
+
+/// Least contrast of text (WCAG 2.2, 1.4.3).
+const TEXT: f64 = 4.5;
+/// Least contrast of marks that carry meaning (WCAG 2.2, 1.4.11).
+const MARKS: f64 = 3.0;
+
+#[test]
+fn contrast_of_black_and_white_is_21_and_of_equal_colours_1() {
+    assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-12);
+    assert!((contrast(Color32::RED, Color32::RED) - 1.0).abs() < 1e-12);
+    // The greys that WebAIM gives as the last to pass and the first to fail on white.
+    assert!(contrast(Color32::from_gray(0x76), Color32::WHITE) > TEXT);
+    assert!(contrast(Color32::from_gray(0x77), Color32::WHITE) < TEXT);
+}
+
+#[test]
+fn all_text_can_be_read_on_all_that_lies_behind_it() {
+    for (theme, palette) in themes() {
+        for (ink, colour) in inks(&palette) {
+            for (ground, behind) in grounds(&palette) {
+                let found = contrast(colour, behind);
+                assert!(found >= TEXT, "{theme}: {ink} on {ground} has a contrast of {found:.2}");
+            }
+        }
+        for (ground, behind) in [("accent", palette.accent), ("accent hovered", palette.accent_hovered)] {
+            let found = contrast(palette.on_accent, behind);
+            assert!(found >= TEXT, "{theme}: text on {ground} has a contrast of {found:.2}");
+        }
+    }
+}
+
+#[test]
+fn all_marks_stand_out_from_the_card() {
+    for (theme, palette) in themes() {
+        let ends = [
+            ("least error", palette.error_stops[0]),
+            ("largest error", palette.error_stops[4]),
+        ];
+        for (mark, colour) in inks(&palette).into_iter().chain(ends) {
+            let found = contrast(colour, palette.panel);
+            assert!(found >= MARKS, "{theme}: {mark} has a contrast of {found:.2}");
+        }
+    }
+}
+
+fn themes() -> [(&'static str, Palette); 2] {
+    [("dark", Palette::DARK), ("light", Palette::LIGHT)]
+}
+
+/// Colours of text, which are also those of curves and symbols.
+fn inks(palette: &Palette) -> [(&'static str, Color32); 8] {
+    [
+        ("text", palette.text),
+        ("dim", palette.dim),
+        ("accent", palette.accent),
+        ("good", palette.good),
+        ("warning", palette.warning),
+        ("bad", palette.bad),
+        ("violet", palette.violet),
+        ("cyan", palette.cyan),
+    ]
+}
+
+fn grounds(palette: &Palette) -> [(&'static str, Color32); 6] {
+    [
+        ("background", palette.background),
+        ("panel", palette.panel),
+        ("raised", palette.raised),
+        ("hovered", palette.hovered),
+        ("selected", palette.selected),
+        ("warning tint", palette.warning_tint),
+    ]
+}
+
+/// Contrast of two opaque colours, 1 to 21.
+fn contrast(a: Color32, b: Color32) -> f64 {
+    let (a, b) = (luminance(a), luminance(b));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+/// Relative luminance of an sRGB colour.
+fn luminance(colour: Color32) -> f64 {
+    let linear = |channel: u8| {
+        let value = f64::from(channel) / 255.0;
+        if value <= 0.04045 {
+            value / 12.92
+        } else {
+            ((value + 0.055) / 1.055).powf(2.4)
+        }
+    };
+    0.2126 * linear(colour.r()) + 0.7152 * linear(colour.g()) + 0.0722 * linear(colour.b())
+}
