@@ -7,7 +7,7 @@ pub enum Notice {
     Failed(String),
 }
 
-/// What a notice is about. What works takes the failures of the same kind along.
+/// Subject of a notice. Work that succeeds takes the failures of the same subject along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matter {
     /// The training on show, or one that was to be shown.
@@ -26,6 +26,6 @@ pub enum Matter {
     TradeOff,
     /// The view with two trainings side by side.
     Comparison,
-    /// What the next window finds again.
+    /// The file by which the next window opens as this one was left.
     Memory,
 }
