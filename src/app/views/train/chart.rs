@@ -1,6 +1,6 @@
-use super::state::TrainView;
+use super::{export_kind::file_name, state::TrainView};
 use crate::{
-    app::shared::Shared,
+    app::shared::{CHART, FileTask, Shared},
     figure::{PlotFigure, error_histogram_figure, loss_figure, node_figure, regression_figure, training_state_figure},
 };
 
@@ -55,4 +55,11 @@ pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigu
             node_figure(&frames.actual.nodes_mm, decoupled_mm, bars_mm, nodes_per_row)
         }
     })
+}
+
+/// The file of the chart as it is in view; `None` before a training.
+pub(super) fn chart_task(view: &TrainView, shared: &Shared) -> Option<FileTask> {
+    let run = shared.shown_run().filter(|run| run.result.is_some())?;
+    let name = file_name(view.tab.file_word(), CHART, &run.settings);
+    Some(FileTask::picture(CHART, name, chart_figure(view, shared)?))
 }

@@ -9,7 +9,6 @@ mod export_kind;
 mod paper_figure;
 mod report;
 mod run_buttons;
-mod shown_figure;
 mod state;
 mod surfaces;
 mod view;

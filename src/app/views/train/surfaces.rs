@@ -1,9 +1,9 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
 
-use super::{drawn::Frames, state::TrainView};
+use super::{drawn::Frames, export_kind::file_name, state::TrainView};
 use crate::{
     app::{
-        shared::{Effect, Look, RightCard, Shared},
+        shared::{Effect, FileTask, Look, RightCard, SURFACES, Shared},
         surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
@@ -42,6 +42,17 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
         camera: shared.look.camera,
         marked_node: view.node,
     }
+}
+
+/// The file of the surfaces as they are in view; `None` before a training.
+pub fn surfaces_task(view: &TrainView, shared: &Shared) -> Option<FileTask> {
+    let run = shared.shown_run().filter(|run| run.result.is_some())?;
+    let what = match shared.look.mode {
+        ViewMode::ThreeD => "surfaces",
+        ViewMode::Top => "surfaces-top",
+    };
+    let name = file_name(what, SURFACES, &run.settings);
+    Some(FileTask::picture(SURFACES, name, surface_figure(view, shared)))
 }
 
 /// The card's title, where the options beside it, `options_width` wide, leave room for it.

@@ -5,13 +5,14 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        shared::{Effect, FileTask, FileWords, Phase, Purpose, RunResult, RunView, Shared},
+        shared::{CHART, Effect, FileTask, FileWords, Phase, Purpose, RunResult, RunView, SURFACES, Shared},
         theme::{Theme, space, type_size},
         views::train::{
+            chart::chart_task,
             decoders::{REFERENCE, decoders_ui},
             export_kind::{ExportKind, OPEN_CHECKPOINT, file_name},
-            shown_figure::ShownPicture,
             state::TrainView,
+            surfaces::surfaces_task,
         },
         widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
     },
@@ -50,11 +51,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
                 file_ui(ui, kind.words(), false, || run.map(|run| kind.task(run)), effects);
             });
         }
-        for picture in [ShownPicture::Surfaces, ShownPicture::Chart] {
-            ui.add_enabled_ui(shown.is_some(), |ui| {
-                file_ui(ui, picture.words(), false, || picture.task(view, shared), effects);
-            });
-        }
+        ui.add_enabled_ui(shown.is_some(), |ui| {
+            file_ui(ui, SURFACES, false, || surfaces_task(view, shared), effects);
+            file_ui(ui, CHART, false, || chart_task(view, shared), effects);
+        });
         section_heading_ui(ui, "Open");
         let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
         ui.add_enabled_ui(can_open, |ui| {
