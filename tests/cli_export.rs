@@ -3,11 +3,14 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "support/folders.rs"]
+mod folders;
 #[path = "support/terminal.rs"]
 mod terminal;
 
 use std::{fs, path::Path};
 
+use folders::names;
 use serde_json::Value;
 use tempfile::TempDir;
 use terminal::decoupler;
@@ -34,13 +37,6 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
         "{arguments}: {message}"
     );
     message
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// The golden vectors of an exported network, decoded by `decode`, give its golden coordinates.

@@ -21,6 +21,8 @@ mod samples;
 mod sealed;
 mod soundness;
 mod tables;
+#[cfg(test)]
+mod test_folder;
 mod trade_file;
 mod unfinished;
 mod workload_words;

@@ -1,14 +1,15 @@
 //! Files written from the window.
 
-use std::{fs, path::Path};
-
 use decoupler::{
     export::{NetworkFile, format_number},
     network::Networks,
 };
 use eframe::egui::{Key, Modifiers};
 
-use crate::driver::{Driver, small, trained};
+use crate::{
+    driver::{Driver, small, trained},
+    folders::names,
+};
 
 const NETWORK: &str = "Type a path for the network";
 const ERRORS: &str = "Type a path for the error table";
@@ -19,15 +20,6 @@ fn trained_driver() -> Driver {
     driver.configure_small();
     driver.train();
     driver
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
 }
 
 #[test]

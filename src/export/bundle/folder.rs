@@ -112,13 +112,7 @@ fn is_empty_folder(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        let entries = fs::read_dir(folder).unwrap();
-        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
+    use crate::export::test_folder::names;
 
     #[test]
     fn it_is_there_whole_or_not_at_all() {
