@@ -155,3 +155,31 @@ fn help_tells_formats_precisions_and_units() {
         assert!(text.contains(expected), "{expected}: {text}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn the_folder_of_an_export_that_was_killed_is_removed_by_the_next_and_no_other() {
+    let folder = trained("");
+    let path = |name: &str| folder.path().join(name);
+    for name in [
+        ".decoupler-abc123.part",
+        ".decoupler-atwork.part",
+        ".decoupler-folder",
+        ".other-abc123.part",
+    ] {
+        fs::create_dir(path(name)).unwrap();
+        fs::write(path(name).join("network.onnx"), "half").unwrap();
+    }
+    let at_work = fs::File::open(path(".decoupler-atwork.part")).unwrap();
+    at_work.lock().unwrap();
+    let output = decoupler("export --network n.json --format onnx --out bundle", folder.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let expected = [
+        ".decoupler-atwork.part",
+        ".decoupler-folder",
+        ".other-abc123.part",
+        "bundle",
+        "n.json",
+    ];
+    assert_eq!(names(folder.path()), expected);
+}
