@@ -15,8 +15,11 @@ mod notices;
 mod open;
 mod remembered;
 mod save_form;
+#[cfg(test)]
+mod tests;
 mod top_bar;
 
 pub use decoupler_window::DecouplerWindow;
 pub use dialogs::DialogKind;
 pub use open::{OpenError, open};
+pub use remembered::WindowFile;
