@@ -3,6 +3,7 @@
 mod components;
 pub mod fields;
 mod keys;
+mod scrolled_table;
 mod snapshot;
 mod table;
 
@@ -11,5 +12,6 @@ pub use components::{
     scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
 };
 pub use keys::pressed;
+pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;
 pub use table::{Column, Row, table_ui};
