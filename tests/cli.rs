@@ -3,6 +3,8 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "support/folders.rs"]
+mod folders;
 #[path = "support/terminal.rs"]
 mod terminal;
 
@@ -15,6 +17,7 @@ use decoupler::{
     scene::Scene,
     sensor::{ArrayScale, SensorModel},
 };
+use folders::names;
 use serde_json::Value;
 use terminal::decoupler;
 
@@ -42,13 +45,6 @@ fn train_json(arguments: &str, folder: &Path) -> Value {
     let text = success(&format!("train {arguments} --json"), folder);
     assert_eq!(text.lines().count(), 1);
     serde_json::from_str(&text).unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// The paper's main experiment: its Table 1 within the spread of seeds, and better with more epochs.

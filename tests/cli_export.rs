@@ -3,11 +3,14 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "support/folders.rs"]
+mod folders;
 #[path = "support/terminal.rs"]
 mod terminal;
 
 use std::{fs, path::Path};
 
+use folders::names;
 use serde_json::Value;
 use tempfile::TempDir;
 use terminal::decoupler;
@@ -34,13 +37,6 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
         "{arguments}: {message}"
     );
     message
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// The golden vectors of an exported network, decoded by `decode`, give its golden coordinates.
@@ -158,4 +154,32 @@ fn help_tells_formats_precisions_and_units() {
     for expected in ["ohm", "mm", "opset 13", "fixed16", "1e-12", "README.txt", "nanometres"] {
         assert!(text.contains(expected), "{expected}: {text}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn the_folder_of_an_export_that_was_killed_is_removed_by_the_next_and_no_other() {
+    let folder = trained("");
+    let path = |name: &str| folder.path().join(name);
+    for name in [
+        ".decoupler-abc123.part",
+        ".decoupler-atwork.part",
+        ".decoupler-folder",
+        ".other-abc123.part",
+    ] {
+        fs::create_dir(path(name)).unwrap();
+        fs::write(path(name).join("network.onnx"), "half").unwrap();
+    }
+    let at_work = fs::File::open(path(".decoupler-atwork.part")).unwrap();
+    at_work.lock().unwrap();
+    let output = decoupler("export --network n.json --format onnx --out bundle", folder.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let expected = [
+        ".decoupler-atwork.part",
+        ".decoupler-folder",
+        ".other-abc123.part",
+        "bundle",
+        "n.json",
+    ];
+    assert_eq!(names(folder.path()), expected);
 }

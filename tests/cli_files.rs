@@ -4,6 +4,8 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "support/folders.rs"]
+mod folders;
 #[path = "support/terminal.rs"]
 mod terminal;
 
@@ -13,6 +15,7 @@ use std::{
     path::Path,
 };
 
+use folders::names;
 use serde_json::Value;
 use tempfile::TempDir;
 use terminal::decoupler;
@@ -183,11 +186,6 @@ fn what_a_killed_program_left_is_removed_by_the_next_and_nothing_else() {
     }
     let output = decoupler("simulate --array 2x2_2x6 --samples 2 --out new.csv", folder.path());
     assert!(output.status.success());
-    let mut names: Vec<_> = fs::read_dir(folder.path())
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
     let expected = [
         ".decoupler-atwork.part",
         ".decoupler-notes.txt",
@@ -195,7 +193,7 @@ fn what_a_killed_program_left_is_removed_by_the_next_and_nothing_else() {
         "decoupler-abc123.part",
         "new.csv",
     ];
-    assert_eq!(names, expected);
+    assert_eq!(names(folder.path()), expected);
 }
 
 #[test]

@@ -3,6 +3,9 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "support/folders.rs"]
+mod folders;
+
 use std::{
     fs,
     path::Path,
@@ -15,6 +18,7 @@ use decoupler::{
     evaluation::Run,
     export::{CheckpointFile, NetworkFile},
 };
+use folders::names;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -72,13 +76,6 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
         assert!(begun.elapsed() < Duration::from_secs(60), "{what}");
         thread::sleep(Duration::from_millis(5));
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 /// Starts a training and waits until its checkpoint is some epochs along.

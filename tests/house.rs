@@ -8,13 +8,12 @@ use std::{
 };
 
 /// The rooms of `src/app`, each of which uses only those before it.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 11] = [
     "theme",
     "widgets",
     "plotting",
     "surface_view",
     "job",
-    "threads",
     "test_view",
     "preview",
     "training_worker",

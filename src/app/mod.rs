@@ -29,4 +29,4 @@ use crate::figure::ticks;
 
 pub use shared::{Effect, Matter, Notice, Phase, Shared};
 pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeOffEnding, TradeOffPlan, Views};
-pub use window::{DecouplerWindow, DialogKind, OpenError, open};
+pub use window::{DecouplerWindow, DialogKind, OpenError, WindowFile, open};

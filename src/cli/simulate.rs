@@ -92,7 +92,7 @@ impl Simulate {
             let samples = BLOCK.min(snapshots - first) * rows.len();
             let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
             if let Some(faulty) = &faulty {
-                set.break_before_noise(faulty);
+                set.break_before_noise(sensor, faulty);
             }
             set.disturb(sensor, &scene.noise.in_test(), &mut noise_rng)
                 .map_err(RunError::from)?;

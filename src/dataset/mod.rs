@@ -6,6 +6,8 @@
 //! divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
 
 mod csv_fields;
+#[cfg(feature = "cli")]
+mod faults;
 mod folds;
 mod frames;
 mod per_row;

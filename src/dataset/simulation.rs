@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{Dataset, LARGEST_SAMPLES};
 use crate::{
-    scene::{Deformation, FaultySensor, Noise, NoiseSource, Scene, SceneError},
+    scene::{Noise, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel},
 };
 
@@ -87,49 +87,6 @@ impl Dataset {
             self.disturb_by(noise.source(model)?, rng);
         }
         Ok(())
-    }
-
-    /// Replaces the readings of simulated snapshots by what the wires and amplifiers of a faulty sensor make of them, before
-    /// noise is added.
-    #[cfg_attr(
-        not(feature = "cli"),
-        allow(dead_code, reason = "only the terminal breaks the wires of a set")
-    )]
-    pub(crate) fn break_before_noise(&mut self, faulty: &FaultySensor) {
-        let deformations: Vec<Deformation> = (0..self.samples())
-            .step_by(self.row_count())
-            .map(|first| faulty.deformation(|row| self.simulated_row(first, row)))
-            .collect();
-        let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let length = read.len() * self.channels();
-        let snapshots = self.readings_mut().chunks_exact_mut(length);
-        for (snapshot, deformation) in snapshots.zip(&deformations) {
-            faulty.before_noise(&read, deformation, snapshot);
-        }
-    }
-
-    /// Replaces the readings of simulated snapshots by what the converter of a faulty sensor makes of them, after noise was
-    /// added.
-    #[cfg_attr(
-        not(feature = "cli"),
-        allow(dead_code, reason = "only the terminal breaks the wires of a set")
-    )]
-    pub(crate) fn break_after_noise(&mut self, faulty: &FaultySensor) {
-        let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let length = read.len() * self.channels();
-        for snapshot in self.readings_mut().chunks_exact_mut(length) {
-            faulty.after_noise(&read, snapshot);
-        }
-    }
-
-    /// Coordinates of a row-wire in the simulated snapshot that begins with sample `first`, if the row-wire is read.
-    #[cfg_attr(
-        not(feature = "cli"),
-        allow(dead_code, reason = "only the terminal breaks the wires of a set")
-    )]
-    fn simulated_row(&self, first: usize, row: usize) -> Option<&[f64]> {
-        let index = self.row_wires_read()?.iter().position(|&other| other == row)?;
-        Some(self.sample_targets(first + index))
     }
 
     /// Adds noise to the readings, snapshot by snapshot; see [`Self::disturb`].

@@ -244,13 +244,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        let entries = fs::read_dir(folder).unwrap();
-        entries
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect()
-    }
+    use crate::export::test_folder::names;
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {

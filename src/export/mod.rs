@@ -24,6 +24,8 @@ mod sealed;
 mod soundness;
 mod table;
 mod tables;
+#[cfg(test)]
+mod test_folder;
 #[cfg(feature = "figures")]
 mod trade_tables;
 mod unfinished;

@@ -33,19 +33,7 @@ pub(super) struct Unfinished {
 
 /// An entry of [`ALL`], while it lives.
 #[derive(Debug)]
-pub(super) struct Listed(PathBuf);
-
-#[cfg(feature = "bundle")]
-impl Listed {
-    /// Makes a temporary folder and lists it.
-    pub(super) fn begin(make: impl FnOnce() -> io::Result<tempfile::TempDir>) -> io::Result<(tempfile::TempDir, Self)> {
-        let mut all = all();
-        let folder = make()?;
-        all.insert(folder.path().to_owned());
-        let listed = Self(folder.path().to_owned());
-        Ok((folder, listed))
-    }
-}
+struct Listed(PathBuf);
 
 impl Drop for Listed {
     fn drop(&mut self) {
@@ -57,13 +45,7 @@ impl Unfinished {
     /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask). The first time
     /// it removes what killed programs left there.
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
-        let is_new = SWEPT
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .insert(folder.to_owned());
-        if is_new {
-            sweep(folder);
-        }
+        sweep_once(folder);
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
@@ -71,8 +53,6 @@ impl Unfinished {
             use std::{fs::Permissions, os::unix::fs::PermissionsExt};
             builder.permissions(Permissions::from_mode(0o666));
         }
-        // The default error repeats the temporary name, which means nothing to the user.
-        let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
         let mut all = all();
         let file = loop {
             let file = builder.tempfile_in(folder).map_err(plain)?;
@@ -116,6 +96,71 @@ impl Unfinished {
     }
 }
 
+/// The system's own words: the default error repeats the temporary name, which means nothing to the user.
+fn plain(error: io::Error) -> io::Error {
+    error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
+}
+
+/// A folder in the making, removed when dropped, and locked as [`Unfinished`] is. Windows cannot lock a folder, so none
+/// is swept there.
+#[cfg(feature = "bundle")]
+#[derive(Debug)]
+pub(super) struct UnfinishedFolder {
+    folder: tempfile::TempDir,
+    listed: Listed,
+    /// Held open while the folder is worked on.
+    lock: Option<File>,
+}
+
+#[cfg(feature = "bundle")]
+impl UnfinishedFolder {
+    /// Begins a temporary folder in `parent`, created with the default permissions (0777 minus the umask). The first time
+    /// it removes what killed programs left there.
+    pub(super) fn begin(parent: &Path) -> io::Result<Self> {
+        sweep_once(parent);
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        #[cfg(unix)]
+        {
+            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
+            builder.permissions(Permissions::from_mode(0o777));
+        }
+        let mut all = all();
+        let (folder, lock) = loop {
+            let folder = builder.tempdir_in(parent).map_err(plain)?;
+            let lock = locked_folder(folder.path());
+            // Another program may have swept it before it was locked.
+            if folder.path().exists() {
+                break (folder, lock);
+            }
+        };
+        all.insert(folder.path().to_owned());
+        let listed = Listed(folder.path().to_owned());
+        Ok(Self { folder, listed, lock })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Renames it to `target`, where nothing or an empty folder may be.
+    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
+        let Self { folder, listed, lock } = self;
+        fs::rename(folder.path(), target)?;
+        // It is not there any more under its temporary name.
+        let _ = folder.keep();
+        drop((listed, lock));
+        sync_folder(folder_of(target));
+        Ok(())
+    }
+}
+
+/// Opens and locks a folder that nobody else works on.
+fn locked_folder(path: &Path) -> Option<File> {
+    let folder = File::open(path).ok()?;
+    folder.try_lock().is_ok().then_some(folder)
+}
+
 /// Folder of the file `path`.
 pub(super) fn folder_of(path: &Path) -> &Path {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
@@ -130,17 +175,33 @@ fn sync_folder(folder: &Path) {
     }
 }
 
-/// Removes the files of [`Unfinished`] in `folder` that nobody works on. What cannot be removed stays.
+/// Sweeps `folder` the first time that this program writes there.
+fn sweep_once(folder: &Path) {
+    let is_new = SWEPT
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .insert(folder.to_owned());
+    if is_new {
+        sweep(folder);
+    }
+}
+
+/// Removes the unfinished files and folders in `folder` that nobody works on. What cannot be removed stays.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
-        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if !is_file || !is_our_name(&entry.file_name()) {
+        let Ok(kind) = entry.file_type() else { continue };
+        if !is_our_name(&entry.file_name()) {
             continue;
         }
-        let left = File::options().read(true).write(true).open(entry.path());
-        if left.is_ok_and(|left| left.try_lock().is_ok()) {
-            let _ = fs::remove_file(entry.path());
+        let path = entry.path();
+        if kind.is_file() {
+            let left = File::options().read(true).write(true).open(&path);
+            if left.is_ok_and(|left| left.try_lock().is_ok()) {
+                let _ = fs::remove_file(path);
+            }
+        } else if kind.is_dir() && locked_folder(&path).is_some() {
+            let _ = fs::remove_dir_all(path);
         }
     }
 }
@@ -164,4 +225,24 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
     std::process::exit(status)
+}
+
+#[cfg(all(test, feature = "bundle", unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_at_work_stays_and_one_that_was_left_is_removed() {
+        let home = tempfile::tempdir().unwrap();
+        let at_work = UnfinishedFolder::begin(home.path()).unwrap();
+        fs::write(at_work.path().join("half"), "1").unwrap();
+        sweep(home.path());
+        assert!(at_work.path().join("half").exists());
+        // As a killed program leaves it: neither removed nor locked.
+        let UnfinishedFolder { folder, lock, .. } = at_work;
+        let left = folder.keep();
+        drop(lock);
+        sweep(home.path());
+        assert!(!left.exists());
+    }
 }

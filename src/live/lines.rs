@@ -32,7 +32,7 @@ pub struct Line<'a> {
     pub read_at: Instant,
 }
 
-/// What [`Lines::next`] gives.
+/// Result of [`Lines::next`].
 #[derive(Debug)]
 pub enum NextLine<'a> {
     /// A line.

@@ -6,7 +6,7 @@ pub(super) struct Polished {
     pub(super) common: f64,
     pub(super) of_rows: Vec<f64>,
     pub(super) of_columns: Vec<f64>,
-    /// What remains: rows × columns.
+    /// Residuals: rows × columns.
     pub(super) rest: Vec<f64>,
 }
 

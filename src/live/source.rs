@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::lines::Keeping;
 use crate::dataset::system_cause;
 
-/// Where frames come from.
+/// Origin of frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Standard input.

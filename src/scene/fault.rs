@@ -1,6 +1,5 @@
 use std::{fmt, str::FromStr};
 
-use glam::DVec3;
 use thiserror::Error;
 
 use super::{Deformation, Noise};
@@ -220,20 +219,6 @@ impl FaultySensor {
             model: *model,
             fault,
             range_ohm: noise.range_ohm(model)?,
-        })
-    }
-
-    /// The deformation of coordinates in mm, 3·M2 of each row-wire; at rest where there are none.
-    #[cfg_attr(
-        not(feature = "cli"),
-        allow(dead_code, reason = "only the terminal breaks the wires of a set")
-    )]
-    pub(crate) fn deformation<'a>(&self, coordinates_mm: impl Fn(usize) -> Option<&'a [f64]>) -> Deformation {
-        Deformation::from_fn(self.model.scale, |row, node| {
-            coordinates_mm(row).map_or(DVec3::ZERO, |coordinates_mm| {
-                let position_mm = DVec3::from_slice(&coordinates_mm[3 * node..]);
-                self.model.displacement_mm(row, node, position_mm)
-            })
         })
     }
 

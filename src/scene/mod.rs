@@ -1,10 +1,12 @@
 //! The scene: rows read, movement, loading and noise. Nothing that does not vary in the scene is modelled further on.
 
+mod converter;
 mod deformation;
 mod fault;
 mod loading;
 mod movement;
 mod noise;
+mod noise_source;
 pub(crate) mod normal;
 mod relative_noise;
 mod rows;
@@ -14,7 +16,8 @@ pub use deformation::Deformation;
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
-pub use noise::{Noise, NoiseSource, NoisySets};
+pub use noise::{Noise, NoisySets};
+pub use noise_source::NoiseSource;
 pub use relative_noise::RelativeNoise;
 pub use rows::{RowModel, Rows};
 pub use touch::{Print, Touch};

@@ -1,5 +1,7 @@
 //! Choosing what to train.
 
+use std::time::Instant;
+
 use decoupler::{
     app::{Effect, Phase},
     evaluation::{Run, SimulatedSettings},
@@ -9,7 +11,7 @@ use decoupler::{
 use eframe::egui::{Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 
-use crate::driver::{Driver, small, table_of};
+use crate::driver::{Driver, PATIENCE, small, table_of};
 
 #[test]
 fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
@@ -240,15 +242,14 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
     assert!(driver.has("Decoupled surface"));
 
     // Faster than the worker draws the other array.
+    assert!(driver.comes_to_rest());
     let run = driver.state().run.as_ref().unwrap().settings;
     let mut other = run;
     other.source.sensor.scale = ArrayScale::PRESETS[1];
     driver.window_mut().apply(Effect::Configure(Box::new(other)));
     driver.window_mut().apply(Effect::Configure(Box::new(run)));
-    for _ in 0..40 {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-        driver.harness().step();
-    }
+    driver.wait_for_frame("the other array's surface", Instant::now() + PATIENCE);
+    driver.settle();
     assert_eq!(driver.state().draft, small());
     assert_eq!(
         driver.table(),

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views};
+use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views, WindowFile};
 use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
@@ -51,22 +51,26 @@ impl Driver {
 
     /// The window of `size` points, with the first surface drawn.
     pub(crate) fn open_sized(size: Vec2) -> Self {
-        Self::open_as(size, |window| window)
+        Self::open_as(size, None, |window| window)
     }
 
     /// The window that keeps its runs in a file.
     pub(crate) fn open_keeping(path: &Path) -> Self {
         let path = path.to_owned();
-        Self::open_as(vec2(1440.0, 900.0), |window| window.keeping_runs(path))
+        Self::open_as(vec2(1440.0, 900.0), None, |window| window.keeping_runs(path))
     }
 
     /// The window that remembers in a file what it shows.
     pub(crate) fn open_remembering(path: &Path) -> Self {
-        let path = path.to_owned();
-        Self::open_as(vec2(1440.0, 900.0), move |window| window.remembering(&path))
+        let file = WindowFile::read(path.to_owned());
+        Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window)
     }
 
-    fn open_as(size: Vec2, set_out: impl FnOnce(DecouplerWindow) -> DecouplerWindow + 'static) -> Self {
+    fn open_as(
+        size: Vec2,
+        file: Option<WindowFile>,
+        set_out: impl FnOnce(DecouplerWindow) -> DecouplerWindow + 'static,
+    ) -> Self {
         let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
         let place = Rc::clone(&made);
         let (asks, asked) = channel();
@@ -76,7 +80,7 @@ impl Driver {
             ctx.set_request_repaint_callback(move |info| {
                 let _ = asks.send(info.delay);
             });
-            let window = DecouplerWindow::new(ctx, DialogKind::None).unwrap();
+            let window = DecouplerWindow::new(ctx, DialogKind::None, file);
             *place.borrow_mut() = Some(set_out(window));
         };
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {

@@ -1,14 +1,15 @@
 //! Files written from the window.
 
-use std::{fs, path::Path};
-
 use decoupler::{
     export::{NetworkFile, format_number},
     network::Networks,
 };
 use eframe::egui::{Key, Modifiers, OutputCommand};
 
-use crate::driver::{Driver, small, trained};
+use crate::{
+    driver::{Driver, small, trained},
+    folders::names,
+};
 
 const NETWORK: &str = "Network file, JSON";
 const ERRORS: &str = "Error table, CSV";
@@ -19,15 +20,6 @@ fn trained_driver() -> Driver {
     driver.configure_small();
     driver.train();
     driver
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
 }
 
 #[test]

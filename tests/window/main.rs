@@ -24,5 +24,7 @@ mod snapshots;
 mod trading;
 mod training;
 
+#[path = "../support/folders.rs"]
+mod folders;
 #[path = "../support/mod.rs"]
 mod support;

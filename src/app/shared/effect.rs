@@ -41,6 +41,6 @@ pub enum Effect {
     RemoveRun(u64),
     /// Tell the user.
     Tell(Matter, Notice),
-    /// What the user was told about this has been dealt with.
+    /// Withdraw the failures told about this, which have been dealt with.
     Settle(Matter),
 }

@@ -7,7 +7,7 @@ pub enum Notice {
     Failed(String),
 }
 
-/// What a notice is about. What works takes the failures of the same kind along.
+/// Subject of a notice. Work that succeeds takes the failures of the same subject along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matter {
     /// The training on show, or one that was to be shown.
@@ -30,6 +30,6 @@ pub enum Matter {
     Comparison,
     /// Frames decoded as they come.
     Live,
-    /// What the next window finds again.
+    /// The file by which the next window opens as this one was left.
     Memory,
 }

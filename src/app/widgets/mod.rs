@@ -4,6 +4,7 @@ mod components;
 mod fact;
 pub mod fields;
 mod fold;
+mod scrolled_table;
 mod snapshot;
 mod table;
 
@@ -13,5 +14,6 @@ pub use components::{
 };
 pub use fact::{coloured_fact_ui, fact_ui};
 pub use fold::fold_ui;
+pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;
 pub use table::{Column, Row, table_ui};

@@ -17,7 +17,7 @@ const REPORT_POINTS: f32 = space(96);
 /// Widths of the column on the right at which its table is whole.
 const REPORT_LIMITS_POINTS: RangeInclusive<f32> = space(82)..=space(140);
 
-/// What columns drawn wider leave to the middle at least.
+/// Least width of the middle, which columns drawn wider leave to it.
 const LEAST_MIDDLE_POINTS: f32 = space(176);
 
 /// Widths of the columns in this window: those that the user has drawn, as far as the middle allows.

@@ -10,10 +10,11 @@ use super::{
     export_menu::export_menu_ui,
     files::Files,
     frames::changes_something,
+    interface_scale::SCALES,
     memory::Memory,
     notice::{self, notice_ui},
     notices::Notices,
-    remembered::Remembered,
+    remembered::{Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
     top_bar::{Reach, top_bar_ui},
     undoing::Undoing,
@@ -31,7 +32,7 @@ use crate::app::{
 pub struct DecouplerWindow {
     pub(super) shared: Shared,
     pub(super) views: Views,
-    /// Their places and names.
+    /// Places and names of the views.
     pub(super) names: Vec<(usize, &'static str)>,
     /// The place of the view on show among all.
     pub(super) shown: usize,
@@ -52,26 +53,29 @@ pub struct DecouplerWindow {
     pub(super) picked: Option<String>,
     pub(super) undoing: Undoing,
     pub(super) remembered: Remembered,
-    /// Where that is kept, if it is.
+    /// The file that keeps it, if there is one.
     pub(super) memory: Option<Memory>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
 }
 
 impl DecouplerWindow {
-    /// Opens on the default array and asks for its test set.
-    ///
-    /// # Errors
-    /// The system gives no thread for the worker.
-    pub fn new(ctx: &Context, dialogs: DialogKind) -> std::io::Result<Self> {
-        let is_dark = ctx.system_theme() != Some(egui::Theme::Light);
+    /// Opens as the last window was left that kept `file`, and keeps it from now on. Without a file it opens on the default
+    /// array.
+    pub fn new(ctx: &Context, dialogs: DialogKind, file: Option<WindowFile>) -> Self {
+        let woken = ctx.clone();
+        Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, dialogs, file)
+    }
+
+    /// As [`Self::new`]; `wake` is called whenever there is news to take.
+    pub(super) fn woken_by(wake: Wake, ctx: &Context, dialogs: DialogKind, file: Option<WindowFile>) -> Self {
+        let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
+        let is_dark = remembered
+            .is_dark
+            .unwrap_or(ctx.system_theme() != Some(egui::Theme::Light));
         theme::install(ctx, is_dark);
         // Ours keep to sizes at which the window is whole.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
-        let wake: Wake = {
-            let ctx = ctx.clone();
-            Arc::new(move || ctx.request_repaint())
-        };
         let mut views = Views::new(&wake);
         let names = views.all().into_iter().map(|view| view.name()).enumerate();
         let mut window = Self {
@@ -91,13 +95,22 @@ impl DecouplerWindow {
             overlay: Overlay::None,
             picked: None,
             undoing: Undoing::default(),
-            remembered: Remembered::default(),
-            memory: None,
+            memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
+            remembered,
             wake,
             ctx: ctx.clone(),
         };
+        if let Some(scale) = window.remembered.scale.filter(|scale| SCALES.contains(scale)) {
+            window.set_scale(scale);
+        }
+        if let Some(draft) = window.remembered.draft {
+            window.shared.draft = draft;
+        }
+        if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
+            window.show(place);
+        }
         window.ask_for_what_is_missing();
-        Ok(window)
+        window
     }
 
     /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
@@ -249,179 +262,5 @@ impl DecouplerWindow {
             Some(save_form::Reply::Cancel) => self.saving = None,
             None => {}
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        app::{
-            shared::{Contents, FileTask, FileWords},
-            test_view::TestView,
-        },
-        export::NetworkFile,
-    };
-
-    fn window() -> DecouplerWindow {
-        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
-        wait(&mut window, |window| window.shared.test().is_some());
-        let mut small = window.shared.draft;
-        small.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        (small.hidden, small.source.samples, small.training.stopping.epochs) = (3, 40, 5);
-        window.apply(Effect::Configure(Box::new(small)));
-        window.apply(Effect::Train);
-        wait(&mut window, |window| matches!(window.shared.phase, Phase::Ended(_)));
-        window
-    }
-
-    /// Saves the network on show.
-    fn export(window: &mut DecouplerWindow, path: PathBuf) {
-        let task = save_task(window);
-        window.answer(task, path);
-    }
-
-    /// Returns the task of saving the network on show.
-    fn save_task(window: &DecouplerWindow) -> FileTask {
-        let words = FileWords {
-            kind: "network",
-            description: "",
-            extensions: &["json"],
-        };
-        let run = window.shared.run.as_ref().unwrap().id;
-        FileTask::save_run(words, "network", run, |run| {
-            let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
-            Ok(Contents::new(move |path| file.save(path)))
-        })
-    }
-
-    /// Takes news until `holds`; at most a minute.
-    fn wait(window: &mut DecouplerWindow, holds: impl Fn(&DecouplerWindow) -> bool) {
-        for _ in 0..12_000 {
-            window.take_news();
-            if holds(window) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        panic!("it never came: {:?}", window.shared);
-    }
-
-    #[test]
-    fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
-        let mut window = window();
-        let ended = window.shared.phase;
-        window.worker = Worker::dead();
-        wait(&mut window, |window| window.shared.phase == Phase::Died);
-        assert!(window.shared.result().is_some());
-        window.restart_worker();
-        std::thread::sleep(Duration::from_millis(300));
-        window.take_news();
-        assert_eq!((window.shared.phase, window.notice()), (ended, None));
-        assert!(window.shared.result().is_some());
-
-        export(&mut window, "network.json".into());
-        wait(&mut window, |window| window.notice().is_some());
-        let lost = "the network was lost when the training thread ended: train again";
-        assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
-        window.apply(Effect::Settle(Matter::File));
-        window.apply(Effect::Continue);
-        wait(&mut window, |window| window.notice().is_some());
-        assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
-        assert_eq!(window.shared.phase, ended);
-        window.apply(Effect::Train);
-        wait(&mut window, |window| matches!(window.shared.phase, Phase::Ended(_)));
-    }
-
-    #[test]
-    fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
-        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
-        window.worker = Worker::dead();
-        wait(&mut window, |window| window.shared.phase == Phase::Died);
-        window.restart_worker();
-        wait(&mut window, |window| {
-            window
-                .shared
-                .preview
-                .as_ref()
-                .is_some_and(|preview| preview.baselines.is_some())
-        });
-    }
-
-    #[test]
-    fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
-        let mut window = window();
-        let settings = window.shared.draft;
-        let drawn = TestView::draw(&settings);
-        window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
-        assert!(window.shared.preview.is_none() && window.shared.result().is_some());
-    }
-
-    #[test]
-    fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("network.json");
-        let mut window = window();
-        let (ended, shown) = (window.shared.phase, window.shared.draft);
-        let mut impossible = shown;
-        impossible.training.stopping.goal_mse = f64::NAN;
-        window.apply(Effect::Configure(Box::new(impossible)));
-        window.apply(Effect::Train);
-        wait(&mut window, |window| window.notice().is_some());
-        assert!(matches!(window.notice(), Some(Notice::Failed(_))));
-        assert_eq!(window.shared.phase, ended, "the training on show has ended so");
-        assert!(window.shared.result().is_some());
-
-        window.apply(Effect::Settle(Matter::Settings));
-        export(&mut window, path.clone());
-        wait(&mut window, |window| window.notice().is_some());
-        assert_eq!(
-            window.notice(),
-            Some(&Notice::Done(format!("Saved {}", path.display())))
-        );
-        let file = NetworkFile::load(&path).unwrap();
-        assert_eq!(file.settings.hidden, shown.hidden);
-    }
-
-    #[test]
-    fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_the_other() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("network.json");
-        let mut window = window();
-        // The desktop's dialog is open.
-        let task = save_task(&window);
-        let mut other = window.shared.draft;
-        other.hidden = 4;
-        window.apply(Effect::Configure(Box::new(other)));
-        window.apply(Effect::Train);
-        wait(&mut window, |window| {
-            matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings.hidden == 4
-        });
-        window.answer(task, path.clone());
-        wait(&mut window, |window| window.notice().is_some());
-        let Some(Notice::Failed(reason)) = window.notice() else {
-            panic!("{:?}", window.notice())
-        };
-        assert!(reason.contains("another training has replaced"), "{reason}");
-        assert!(!path.exists());
-    }
-
-    #[test]
-    fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
-        let mut window = DecouplerWindow::new(&Context::default(), DialogKind::None).unwrap();
-        wait(&mut window, |window| window.shared.test().is_some());
-        let mut impossible = window.shared.draft;
-        impossible.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        impossible.training.stopping.goal_mse = f64::NAN;
-        window.apply(Effect::Configure(Box::new(impossible)));
-        // Before the new test set is there.
-        window.apply(Effect::Train);
-        wait(&mut window, |window| window.notice().is_some());
-        wait(&mut window, |window| {
-            window
-                .shared
-                .test()
-                .is_some_and(|test| test.sensor == impossible.source.sensor)
-        });
     }
 }

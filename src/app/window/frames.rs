@@ -2,8 +2,8 @@ use eframe::egui::{Context, Event, Ui};
 
 use super::DecouplerWindow;
 
-/// Whether the user did something in this frame that parts of the window already drawn may depend on: one frame more
-/// shows it everywhere. A pointer that merely moves changes nothing.
+/// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one
+/// frame more shows it everywhere. A pointer that merely moves changes nothing.
 pub(super) fn changes_something(ctx: &Context) -> bool {
     ctx.input(|input| {
         let is_change = |event: &Event| match event {

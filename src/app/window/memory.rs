@@ -1,10 +1,9 @@
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{path::PathBuf, time::Duration};
 
-use super::{DecouplerWindow, interface_scale::SCALES, remembered::Remembered};
+use super::{
+    DecouplerWindow,
+    remembered::{Remembered, WindowFile},
+};
 use crate::{
     app::{
         job::{Job, JobError, Wake},
@@ -22,7 +21,7 @@ type Written = Result<Result<(), WriteError>, JobError>;
 #[derive(Debug)]
 pub(super) struct Memory {
     path: PathBuf,
-    /// What is in the file, or is on its way there.
+    /// The contents of the file, or of the one on its way there.
     written: Remembered,
     latest: Remembered,
     job: Job<Written>,
@@ -30,7 +29,8 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    fn new(path: PathBuf, remembered: Remembered, wake: Wake) -> Self {
+    pub(super) fn new(file: WindowFile, wake: Wake) -> Self {
+        let WindowFile { path, remembered } = file;
         Self {
             path,
             written: remembered.clone(),
@@ -50,7 +50,7 @@ impl Memory {
         }
     }
 
-    /// Why nothing is remembered, told once.
+    /// Returns the reason for which nothing is remembered, once.
     fn next_failure(&mut self) -> Option<String> {
         let reason = match self.job.next_event()? {
             Ok(Ok(())) => return None,
@@ -73,28 +73,6 @@ impl Drop for Memory {
 }
 
 impl DecouplerWindow {
-    /// Opens as the last window did that remembered its theme, view and settings in the file `path`, and remembers them
-    /// there from now on.
-    #[must_use]
-    pub fn remembering(mut self, path: &Path) -> Self {
-        let remembered = Remembered::read(path);
-        if let Some(is_dark) = remembered.is_dark {
-            self.set_dark(is_dark);
-        }
-        if let Some(scale) = remembered.scale.filter(|scale| SCALES.contains(scale)) {
-            self.set_scale(scale);
-        }
-        if let Some(draft) = remembered.draft {
-            self.configure(draft);
-        }
-        if let Some(place) = self.place_of(remembered.view.as_deref()) {
-            self.show(place);
-        }
-        self.remembered = remembered.clone();
-        self.memory = Some(Memory::new(path.to_owned(), remembered, Arc::clone(&self.wake)));
-        self
-    }
-
     /// Remembers what the user sees.
     pub(super) fn remember(&mut self) {
         let Some(memory) = &mut self.memory else { return };
@@ -116,7 +94,7 @@ impl DecouplerWindow {
         }
     }
 
-    fn place_of(&self, view: Option<&str>) -> Option<usize> {
+    pub(super) fn place_of(&self, view: Option<&str>) -> Option<usize> {
         let mut names = self.names.iter();
         names.find_map(|&(place, name)| (Some(name) == view).then_some(place))
     }

@@ -20,9 +20,12 @@ mod open;
 mod palette;
 mod remembered;
 mod save_form;
+#[cfg(test)]
+mod tests;
 mod top_bar;
 mod undoing;
 
 pub use decoupler_window::DecouplerWindow;
 pub use dialogs::DialogKind;
 pub use open::{OpenError, open};
+pub use remembered::WindowFile;

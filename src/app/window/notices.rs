@@ -6,7 +6,7 @@ const MOST: usize = 4;
 /// Time after which a notice that something worked closes by itself, from when it was first shown.
 const DONE_SECONDS: f64 = 10.0;
 
-/// What the user is told, from oldest to newest.
+/// Notices to the user, from oldest to newest.
 #[derive(Debug, Default)]
 pub(super) struct Notices(Vec<Told>);
 

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     DecouplerWindow, DialogKind,
-    remembered::{LEAST_SIZE_POINTS, Remembered},
+    remembered::{LEAST_SIZE_POINTS, Remembered, WindowFile},
 };
 
 /// Reasons for which the window cannot open.
@@ -37,13 +37,18 @@ pub fn open() -> Result<(), OpenError> {
     }
     // Systems without a home folder keep no runs, which the run list says, and remember nothing.
     let folders = ProjectDirs::from("", "", "decoupler");
-    let memory = folders.as_ref().map(|folders| folders.data_dir().join("window.json"));
-    let remembered = memory.as_deref().map(Remembered::read).unwrap_or_default();
+    let file = folders
+        .as_ref()
+        .map(|folders| WindowFile::read(folders.data_dir().join("window.json")));
+    let size_points = match &file {
+        Some(file) => file.remembered.opening_size_points(),
+        None => Remembered::default().opening_size_points(),
+    };
     let icon = eframe::icon_data::from_png_bytes(include_bytes!("../../../assets/icon.png"));
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("Decoupler")
         .with_app_id("decoupler")
-        .with_inner_size(remembered.opening_size_points())
+        .with_inner_size(size_points)
         .with_min_inner_size(LEAST_SIZE_POINTS);
     if let Ok(icon) = icon {
         viewport = viewport.with_icon(icon);
@@ -55,10 +60,10 @@ pub fn open() -> Result<(), OpenError> {
         ..NativeOptions::default()
     };
     let create = |creation: &eframe::CreationContext<'_>| {
-        let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native)?;
-        let window = match (&folders, &memory) {
-            (Some(folders), Some(memory)) => window.keeping_runs(folders.data_dir().join("runs")).remembering(memory),
-            _ => window,
+        let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native, file);
+        let window = match &folders {
+            Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
+            None => window,
         };
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };

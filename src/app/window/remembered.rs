@@ -1,4 +1,7 @@
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
@@ -13,7 +16,7 @@ const DEFAULT_SIZE_POINTS: [f32; 2] = [1440.0, 900.0];
 /// The least size of a window, in points.
 pub(super) const LEAST_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
 
-/// What a window finds again when it next opens: each value only once the user has had it so.
+/// State of a window that the next one finds again: each value only once the user has had it so.
 ///
 /// In the file, a value that cannot be read or is out of its limits counts as missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,9 +45,23 @@ pub(super) struct Remembered {
     pub(super) report_points: Option<f32>,
 }
 
+/// The file in which a window remembers how it was left, as it is at the start.
+#[derive(Clone, Debug)]
+pub struct WindowFile {
+    pub(super) path: PathBuf,
+    pub(super) remembered: Remembered,
+}
+
+impl WindowFile {
+    /// Reads the file at `path`; one that is missing or of another kind tells nothing.
+    pub fn read(path: PathBuf) -> Self {
+        let remembered = Remembered::read(&path);
+        Self { path, remembered }
+    }
+}
+
 impl Remembered {
-    /// Reads the file at `path`.
-    pub(super) fn read(path: &Path) -> Self {
+    fn read(path: &Path) -> Self {
         let text = fs::read_to_string(path).unwrap_or_default();
         let mut read: Self = serde_json::from_str(&text).unwrap_or_default();
         read.draft = read.draft.filter(is_within_limits);
@@ -82,7 +99,7 @@ fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) 
     Ok(serde_json::from_value(value).ok())
 }
 
-/// Whether the settings could be trained with on this machine.
+/// Returns `true` if the settings could be trained with on this machine.
 pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
     settings.check_counts().is_ok()
         && settings.training.check().is_ok()
@@ -95,7 +112,7 @@ pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
 mod tests {
     use super::*;
 
-    /// What is read from a file with this in it.
+    /// Reads a file with this text in it.
     fn read(text: &str) -> Remembered {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("window.json");

@@ -54,7 +54,7 @@ pub enum BundleError {
         "{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle"
     )]
     Deviation {
-        /// What evaluated the bundle.
+        /// Name of the program that evaluated the bundle.
         evaluator: String,
         /// Largest deviation relative to the widest range of an output.
         deviation: f64,

@@ -4,7 +4,7 @@ use super::{
 };
 use crate::network::Quantity;
 
-/// What a network answers to a reading, and how much rounding can change it.
+/// Answer of a network to a reading, and how much rounding can change it.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
     /// Coordinates in mm, exact but for their own last digits.

@@ -1,20 +1,17 @@
 use std::{
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
 
-use tempfile::TempDir;
-
 use super::error::BundleError;
-use crate::export::{WriteError, unfinished::Listed};
+use crate::export::{WriteError, unfinished::UnfinishedFolder};
 
 /// A folder that is filled under a temporary name beside its target and then renamed, so that it is there whole or not at
 /// all. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub(super) struct AtomicFolder {
     target: PathBuf,
-    folder: TempDir,
-    listed: Listed,
+    folder: UnfinishedFolder,
 }
 
 impl AtomicFolder {
@@ -35,21 +32,10 @@ impl AtomicFolder {
         if fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
             return Err(BundleError::Exists(target.to_owned()));
         }
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".decoupler-").suffix(".part");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o777));
-        }
-        // The default error repeats the temporary name, which means nothing to the user.
-        let plain = |error: io::Error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
-        let (folder, listed) = Listed::begin(|| builder.tempdir_in(parent).map_err(plain))
-            .map_err(|error| WriteError::io(target, error))?;
+        let folder = UnfinishedFolder::begin(parent).map_err(|error| WriteError::io(target, error))?;
         Ok(Self {
             target: parent.join(name),
             folder,
-            listed,
         })
     }
 
@@ -93,15 +79,13 @@ impl AtomicFolder {
     /// # Errors
     /// Something came to be there meanwhile, or the operating system refuses.
     pub(super) fn commit(self) -> Result<(), BundleError> {
-        let Self { target, folder, listed } = self;
+        let Self { target, folder } = self;
         if is_empty_folder(&target) {
             fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
         }
-        fs::rename(folder.path(), &target).map_err(|error| WriteError::io(&target, error))?;
-        // It is not there any more under its temporary name.
-        let _ = folder.keep();
-        drop(listed);
-        Ok(())
+        Ok(folder
+            .persist(&target)
+            .map_err(|error| WriteError::io(&target, error))?)
     }
 }
 
@@ -112,13 +96,7 @@ fn is_empty_folder(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        let entries = fs::read_dir(folder).unwrap();
-        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
+    use crate::export::test_folder::names;
 
     #[test]
     fn it_is_there_whole_or_not_at_all() {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::export::NetworkFile;
 
-/// What is known of a network, for people and programs that have only the bundle: names of fields and JSON values.
+/// Facts about a network, for people and programs that have only the bundle: names of fields and JSON values.
 pub(super) type Metadata = Map<String, Value>;
 
 /// Names of the readings: r_1, r_2, …

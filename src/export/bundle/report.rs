@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use super::choice::{BundleFormat, BundlePrecision};
 
-/// What an export wrote, and how far it is from the network.
+/// Files that an export wrote, and how far they are from the network.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BundleReport {
@@ -26,7 +26,7 @@ pub struct BundleReport {
     pub program_deviation: f64,
     /// Proven bound on the error in fixed point, in mm.
     pub bound_mm: Option<f64>,
-    /// What the user should know, with cause and cure.
+    /// Remarks for the user, with cause and cure.
     pub remarks: Vec<String>,
 }
 
@@ -42,7 +42,7 @@ pub struct VectorCounts {
 /// An evaluation of a bundle as it was read back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundleCheck {
-    /// What evaluated it.
+    /// Name of the program that evaluated it.
     pub evaluator: &'static str,
     /// Largest deviation from the network, relative to the widest range of a coordinate.
     pub deviation: f64,

@@ -48,7 +48,7 @@ enum State {
     Unexplained,
 }
 
-/// What a frame has made known.
+/// News of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultEvent {
     /// A fault is named: its wires should be left out.

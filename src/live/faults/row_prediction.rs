@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::row_fit::RowFit;
 
-/// What a fit tells about readings that were left out.
+/// Predictions of readings that were left out of a fit.
 impl RowFit {
     /// Logarithm of the reading from which on the converter clips.
     pub(super) fn log_full_scale(&self) -> f64 {

@@ -17,4 +17,4 @@ mod worker;
 
 pub use axis_form::{AxisForm, AxisKind, ListError};
 pub use form::Form;
-pub use state::{Ending, ExperimentLook, ExperimentsView, Outcome, Running, SortBy, Topic};
+pub use state::{Ending, ExperimentLook, ExperimentsView, Outcome, Running, Topic};

@@ -12,6 +12,7 @@ use crate::{
     app::{
         job::{Job, Wake},
         shared::{Effect, Matter},
+        widgets::SortBy,
     },
     evaluation::{
         SimulatedSettings,
@@ -94,15 +95,6 @@ struct CheckedForm {
 /// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
 /// are trained again when they are to be seen.
 const MOST_KEPT_BYTES: usize = 400_000_000;
-
-/// The order of a table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SortBy {
-    /// By this column; none for the order of the cells.
-    pub column: Option<usize>,
-    /// The largest first.
-    pub is_descending: bool,
-}
 
 /// An experiment under way.
 #[derive(Clone, Copy, Debug)]

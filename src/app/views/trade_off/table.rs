@@ -1,14 +1,12 @@
 //! The points of a level of noise, fastest first.
 
-use eframe::egui::{
-    Align2, CursorIcon, FontId, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, TextWrapMode, Ui, WidgetInfo,
-    WidgetText, accesskit::Role, pos2, vec2,
-};
+use eframe::egui::Ui;
 
 use crate::{
     app::{
         plotting::hue_colour,
-        theme::{Theme, semibold, space, type_size},
+        theme::{Theme, space},
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
     },
     evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
     export::format_number,
@@ -17,14 +15,14 @@ use crate::{
 
 /// A column of figures.
 #[derive(Clone, Copy, PartialEq)]
-enum Column {
+enum Figure {
     Error,
     ToLimit,
     Frame,
     Training,
 }
 
-impl Column {
+impl Figure {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
     const WIDTH: f32 = space(18);
 
@@ -56,107 +54,70 @@ impl Column {
     }
 }
 
+const MEANING: &str = "Click to mark it in the charts. A blue time is on the Pareto front: no other point has as small \
+                       an error in as little time.";
+
 /// Lays out the table over the available space; a click marks a point.
 pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) {
-    let palette = Theme::of(ui).palette;
+    let palette = &Theme::of(ui).palette;
     let fronts = TradeOffCost::ALL.map(|cost| level.front(cost));
     // Without noise there is no limit to compare with.
-    let columns = Column::ALL.into_iter();
     let has_limit = level.points.iter().any(|point| point.to_reference().is_some());
-    let columns: Vec<Column> = columns
-        .filter(|column| has_limit || *column != Column::ToLimit)
+    let figures = Figure::ALL.into_iter();
+    let figures: Vec<Figure> = figures
+        .filter(|figure| has_limit || *figure != Figure::ToLimit)
         .collect();
+    let names = TableColumn {
+        heading: "",
+        is_figure: false,
+        width: ColumnWidth::Rest,
+    };
+    let columns = figures.iter().map(|figure| TableColumn {
+        heading: figure.heading(),
+        is_figure: true,
+        width: ColumnWidth::Points(Figure::WIDTH),
+    });
+    let columns: Vec<TableColumn<'_>> = [names].into_iter().chain(columns).collect();
+    let frame_us = |number: usize| level.points[number].report.cost.frame_us;
     let mut order: Vec<usize> = (0..level.points.len()).collect();
-    order.sort_by(|&a, &b| {
-        level.points[a]
-            .report
-            .cost
-            .frame_us
-            .total_cmp(&level.points[b].report.cost.frame_us)
-    });
-    ui.spacing_mut().item_spacing.y = 0.0;
-    // The strip of the scroll bar stays free.
-    let width = ui.available_width() - space(3);
-    let small = FontId::proportional(type_size().small);
-    let (line, _) = ui.allocate_exact_size(vec2(width, space(5)), Sense::hover());
-    for (number, column) in columns.iter().enumerate() {
-        let at = right_end(line, columns.len() - number);
-        ui.painter()
-            .text(at, Align2::RIGHT_CENTER, column.heading(), small.clone(), palette.dim);
-    }
-    ui.painter()
-        .hline(line.x_range(), line.bottom(), Stroke::new(1.0, palette.line));
-    let body = ScrollArea::vertical()
-        .id_salt("trade table")
-        .auto_shrink([false, false]);
-    body.show_rows(ui, space(6), order.len(), |ui, range| {
-        for &number in &order[range] {
-            let on_fronts = [fronts[0][number], fronts[1][number]];
-            let row = (&level.points[number], *marked == Some(number));
-            if row_ui(ui, row, on_fronts, (&columns, width)) {
-                *marked = Some(number);
+    order.sort_by(|&a, &b| frame_us(a).total_cmp(&frame_us(b)));
+    let row = |place: usize| {
+        let number = order[place];
+        let point = &level.points[number];
+        let on_fronts = [fronts[0][number], fronts[1][number]];
+        let is_chosen = on_fronts.contains(&true);
+        let text = if is_chosen { palette.text } else { palette.dim };
+        let name = point_name(point);
+        let name_cell = TableCell {
+            text: name.replace(" preset", ""),
+            colour: text,
+            is_strong: is_chosen,
+            label: None,
+            meaning: "",
+        };
+        let texts: Vec<String> = figures.iter().map(|figure| figure.text(point)).collect();
+        let label = format!("{name}: {}", texts.join(", "));
+        let cells = figures.iter().zip(texts).map(|(figure, cell)| {
+            // A cost is strong where nothing else costs as little for as small an error.
+            let is_strong = figure.cost().is_some_and(|cost| on_fronts[cost]);
+            TableCell {
+                text: cell,
+                colour: if is_strong { palette.accent } else { text },
+                is_strong,
+                label: None,
+                meaning: "",
             }
-        }
-    });
-}
-
-/// The right end of the column that is so many from the right.
-fn right_end(line: Rect, from_right: usize) -> Pos2 {
-    let left_of_it = (from_right - 1) as f32 * Column::WIDTH;
-    pos2(line.right() - left_of_it, line.center().y)
-}
-
-/// Shows a row. Returns true if it was clicked.
-fn row_ui(
-    ui: &mut Ui,
-    (point, is_marked): (&TradeOffPoint, bool),
-    on_fronts: [bool; 2],
-    (columns, width): (&[Column], f32),
-) -> bool {
-    let palette = Theme::of(ui).palette;
-    let (line, response) = ui.allocate_exact_size(vec2(width, space(6)), Sense::click());
-    let name = point_name(point);
-    response.widget_info(|| {
-        let figures: Vec<String> = columns.iter().map(|column| column.text(point)).collect();
-        let label = format!("{name}: {}", figures.join(", "));
-        WidgetInfo::selected(Role::Row, true, is_marked, label)
-    });
-    if is_marked {
-        ui.painter().rect_filled(line, 3.0, palette.selected);
-    } else if response.hovered() {
-        ui.painter().rect_filled(line, 3.0, palette.raised);
-    }
-    let dot = pos2(line.left() + space(2), line.center().y);
-    ui.painter()
-        .circle_filled(dot, 3.0, hue_colour(point.report.kind.colour().into(), &palette));
-    let is_chosen = on_fronts.contains(&true);
-    let font = |is_strong: bool| {
-        if is_strong {
-            semibold(type_size().note)
-        } else {
-            FontId::proportional(type_size().note)
+        });
+        TableRow {
+            label,
+            is_marked: *marked == Some(number),
+            meaning: MEANING,
+            dot: Some(hue_colour(point.report.kind.colour().into(), palette)),
+            cells: [name_cell].into_iter().chain(cells).collect(),
         }
     };
-    let text = if is_chosen { palette.text } else { palette.dim };
-    let name = RichText::new(name.replace(" preset", "")).color(text);
-    let room = line.width() - Column::WIDTH * columns.len() as f32 - space(4);
-    let galley = WidgetText::from(name).into_galley(ui, Some(TextWrapMode::Truncate), room, font(is_chosen));
-    let at = pos2(line.left() + space(4), line.center().y - 0.5 * galley.size().y);
-    ui.painter().galley(at, galley, text);
-    for (number, column) in columns.iter().enumerate() {
-        // A cost is strong where nothing else costs as little for as small an error.
-        let is_strong = column.cost().is_some_and(|cost| on_fronts[cost]);
-        let colour = if is_strong { palette.accent } else { text };
-        let at = right_end(line, columns.len() - number);
-        ui.painter()
-            .text(at, Align2::RIGHT_CENTER, column.text(point), font(is_strong), colour);
+    let click = scrolled_table_ui(ui, "trade table", &columns, None, order.len(), row);
+    if let Some(TableClick::Mark(place) | TableClick::Open(place)) = click {
+        *marked = Some(order[place]);
     }
-    ui.painter()
-        .hline(line.x_range(), line.bottom(), Stroke::new(0.5, palette.line));
-    let response = response.on_hover_cursor(CursorIcon::PointingHand);
-    let response = response.on_hover_text(
-        "Click to mark it in the charts. A blue time is on the Pareto front: no other point has as small an error in \
-         as little time.",
-    );
-    response.clicked()
 }

@@ -18,7 +18,7 @@ const FLAGS: [&str; 7] = [
     "-O2",
 ];
 
-/// What compiling and running a self-test gave.
+/// Outcome of compiling and running a self-test.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::export::bundle) enum Compiled {
     /// Largest deviation of the golden vectors, relative to the range of the outputs.

@@ -3,7 +3,7 @@ use std::fmt::Write;
 use super::literal::push_array;
 use crate::export::bundle::portable::Portable;
 
-/// What the header, source and self-test of a bundle in C have in common.
+/// Names and types that the header, source and self-test of a bundle in C have in common.
 pub(super) struct Header<'a> {
     /// Prefix of all names.
     pub(super) name: &'a str,

@@ -41,7 +41,7 @@ pub enum FixedPointError {
     /// Weights or coordinates beyond what the numbers hold.
     #[error("fixed16 cannot hold {what}: train with noise, which keeps weights small, or give --precision f32")]
     Range {
-        /// What is too large.
+        /// Name of the value that is too large.
         what: &'static str,
     },
     /// An error bound that says nothing.

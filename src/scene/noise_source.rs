@@ -1,0 +1,276 @@
+use rand::Rng;
+
+use super::{Noise, RelativeNoise, converter::Converter, normal::standard_normal};
+use crate::sensor::{SensorError, SensorModel};
+
+/// Noise of one sensor, ready to be drawn; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NoiseSource {
+    noise: Noise,
+    converter: Option<Converter>,
+}
+
+impl Noise {
+    /// Prepares to disturb readings of `model`.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance, hence the converter no range.
+    pub fn source(&self, model: &SensorModel) -> Result<NoiseSource, SensorError> {
+        let converter = self.converter_bits.map(|bits| Converter::new(bits, model));
+        Ok(NoiseSource {
+            noise: *self,
+            converter: converter.transpose()?,
+        })
+    }
+}
+
+impl NoiseSource {
+    /// True if no reading is changed.
+    pub fn is_none(&self) -> bool {
+        self.noise.is_none()
+    }
+
+    /// Disturbs the readings of one snapshot in place. Readings stay above 0 and finite: what noise would turn around is
+    /// drawn again.
+    pub fn disturb(&self, resistances_ohm: &mut [f64], rng: &mut impl Rng) {
+        let Noise {
+            relative,
+            additive_ohm,
+            drift,
+            ..
+        } = self.noise;
+        let gain = positive(|| {
+            if drift > 0.0 {
+                1.0 + drift * standard_normal(rng)
+            } else {
+                1.0
+            }
+        });
+        for value in resistances_ohm {
+            let true_ohm = *value;
+            let mut reading = positive(|| {
+                let mut reading = true_ohm * gain;
+                if relative > 0.0 {
+                    reading *= 1.0 + relative * standard_normal(rng);
+                }
+                if additive_ohm > 0.0 {
+                    reading += additive_ohm * standard_normal(rng);
+                }
+                reading
+            });
+            if let Some(converter) = self.converter {
+                reading = converter.round_ohm(reading);
+            }
+            *value = reading;
+        }
+    }
+
+    /// Standard deviation in proportion to the resistance.
+    pub(crate) fn relative(&self) -> f64 {
+        self.noise.relative
+    }
+
+    /// Standard deviation in ohm, whatever the resistance.
+    pub(crate) fn additive_ohm(&self) -> f64 {
+        self.noise.additive_ohm
+    }
+
+    /// Gain error shared by all readings of a snapshot (standard deviation, relative).
+    pub(crate) fn drift(&self) -> f64 {
+        self.noise.drift
+    }
+
+    /// The lowest and the highest value that the converter gives as `reading_ohm`; `None` without a converter. The last
+    /// step is open, for the converter clips.
+    pub(crate) fn rounded_from_ohm(&self, reading_ohm: f64) -> Option<(f64, f64)> {
+        Some(self.converter?.rounded_from_ohm(reading_ohm))
+    }
+
+    /// The noise of a reading of `resistance_ohm` relative to it, with own part
+    /// √(relative² + (additive² + step²/12)/R²); step/√12 is the standard deviation of rounding to steps.
+    pub fn relative_to(&self, resistance_ohm: f64) -> RelativeNoise {
+        let step_ohm = self.converter.map_or(0.0, |converter| converter.step_ohm);
+        let additive_ohm = libm::hypot(self.noise.additive_ohm, step_ohm / 12.0_f64.sqrt());
+        RelativeNoise {
+            own: libm::hypot(self.noise.relative, additive_ohm / resistance_ohm),
+            common: self.noise.drift,
+        }
+    }
+}
+
+/// The first of the values drawn that is above 0 and finite.
+fn positive(mut draw: impl FnMut() -> f64) -> f64 {
+    /// Half of the draws are positive, and at the largest noise, where sums overflow, a third is kept: all fail less than
+    /// once in 10⁴⁵ readings.
+    const MOST_DRAWS: usize = 256;
+    let mut value = draw();
+    for _ in 1..MOST_DRAWS {
+        if value > 0.0 && value.is_finite() {
+            break;
+        }
+        value = draw();
+    }
+    // Only a resistance that is none itself gets here with another value.
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::{NoisySets, normal::normal_cdf},
+    };
+
+    fn disturbed(noise: Noise, resistance_ohm: f64, count: usize) -> Vec<f64> {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let source = noise.source(&model).unwrap();
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let mut readings = vec![resistance_ohm; count];
+        source.disturb(&mut readings, &mut rng);
+        readings
+    }
+
+    fn spread(readings: &[f64]) -> (f64, f64) {
+        let mean = readings.iter().sum::<f64>() / readings.len() as f64;
+        let squares = readings.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        (mean, (squares / readings.len() as f64).sqrt())
+    }
+
+    #[test]
+    fn each_kind_has_its_documented_spread() {
+        let noise = Noise {
+            relative: 0.01,
+            additive_ohm: 0.5,
+            ..Noise::default()
+        };
+        let (mean, deviation) = spread(&disturbed(noise, 100.0, 100_000));
+        assert!((mean - 100.0).abs() < 0.02, "{mean}");
+        let expected = noise.source(&SensorModel::new("10x6_3x18".parse().unwrap())).unwrap();
+        assert!((deviation / (100.0 * expected.relative_to(100.0).own) - 1.0).abs() < 0.01);
+        assert!((deviation - (1.0 + 0.25_f64).sqrt()).abs() < 0.02, "{deviation}");
+    }
+
+    #[test]
+    fn drift_is_common_to_a_snapshot() {
+        let noise = Noise {
+            drift: 0.1,
+            ..Noise::default()
+        };
+        let readings = disturbed(noise, 50.0, 20);
+        assert!(readings.iter().all(|&r| r == readings[0]) && readings[0] != 50.0);
+    }
+
+    #[test]
+    fn a_converter_gives_whole_steps_and_never_zero() {
+        let noise = Noise {
+            converter_bits: Some(4),
+            ..Noise::default()
+        };
+        let step = disturbed(noise, 1e-9, 1)[0];
+        for ohm in [1.0, 30.0, 77.0, 1e9] {
+            let steps = disturbed(noise, ohm, 1)[0] / step;
+            assert_eq!(steps, steps.round());
+            assert!((1.0..=16.0).contains(&steps));
+        }
+    }
+
+    #[test]
+    fn enormous_noise_leaves_finite_positive_readings() {
+        for additive_ohm in [1e6, 1e308, f64::MAX] {
+            let noise = Noise {
+                relative: 1.0,
+                drift: 1.0,
+                additive_ohm,
+                ..Noise::default()
+            };
+            let readings = disturbed(noise, 10.0, 1000);
+            assert!(readings.iter().all(|&r| r > 0.0 && r.is_finite()), "{additive_ohm}");
+        }
+    }
+
+    /// Kolmogorov and Smirnov: with 20 000 readings the distance from their distribution exceeds 0.0138 once in 1000 times.
+    #[test]
+    fn readings_follow_the_normal_distribution_above_zero_and_do_not_tell_the_truth() {
+        let cases = [
+            (Noise::relative(1.0), 10.0, 10.0),
+            (Noise::relative(0.5), 10.0, 5.0),
+            (
+                Noise {
+                    additive_ohm: 300.0,
+                    ..Noise::default()
+                },
+                10.0,
+                300.0,
+            ),
+        ];
+        for (noise, mean_ohm, deviation_ohm) in cases {
+            let mut readings = disturbed(noise, mean_ohm, 20_000);
+            readings.sort_by(f64::total_cmp);
+            assert!(
+                readings.windows(2).all(|pair| pair[0] < pair[1]),
+                "no value is drawn twice"
+            );
+            let below = |ohm: f64| normal_cdf((ohm - mean_ohm) / deviation_ohm);
+            let count = readings.len() as f64;
+            let distance = readings.iter().enumerate().map(|(index, &ohm)| {
+                let expected = (below(ohm) - below(0.0)) / (1.0 - below(0.0));
+                ((index as f64 + 0.5) / count - expected).abs()
+            });
+            let distance = distance.fold(0.0, f64::max);
+            assert!(distance < 0.0138, "{noise:?}: {distance}");
+        }
+    }
+
+    #[test]
+    fn drift_turns_no_snapshot_around() {
+        let noise = Noise {
+            drift: 1.0,
+            ..Noise::default()
+        };
+        let source = noise.source(&SensorModel::new("10x6_3x18".parse().unwrap())).unwrap();
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let mut gains = Vec::new();
+        for _ in 0..2000 {
+            let mut readings = [10.0, 20.0];
+            source.disturb(&mut readings, &mut rng);
+            assert!((readings[1] / readings[0] - 2.0).abs() < 1e-12);
+            gains.push(readings[0] / 10.0);
+        }
+        // The mean of a normal value of mean and deviation 1 that is above 0 is 1 + φ(1)/Φ(1).
+        let (mean, _) = spread(&gains);
+        assert!((mean - 1.2876).abs() < 0.06, "{mean}");
+        assert!(
+            gains.iter().all(|&gain| gain > 0.0 && gain != 1e-6),
+            "the floor tells nothing"
+        );
+    }
+
+    /// The first draw is kept wherever it is positive, so ordinary noise has one draw for each reading.
+    #[test]
+    fn ordinary_noise_takes_one_draw_a_reading() {
+        let noise = Noise {
+            relative: 0.05,
+            additive_ohm: 0.1,
+            drift: 0.02,
+            ..Noise::default()
+        };
+        let readings = disturbed(noise, 10.0, 100);
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let gain = 1.0 + 0.02 * standard_normal(&mut rng);
+        for reading in readings {
+            let expected = 10.0 * gain * (1.0 + 0.05 * standard_normal(&mut rng)) + 0.1 * standard_normal(&mut rng);
+            assert_eq!(reading, expected);
+        }
+    }
+
+    #[test]
+    fn no_noise_changes_nothing_and_sets_choose() {
+        assert!(disturbed(Noise::default(), 12.5, 5).iter().all(|&r| r == 12.5));
+        let test_only = Noise {
+            sets: NoisySets::Test,
+            ..Noise::relative(0.1)
+        };
+        assert!(test_only.in_training().is_none() && !test_only.in_test().is_none());
+    }
+}
