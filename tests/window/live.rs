@@ -140,7 +140,7 @@ fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
     let mut driver = open(folder.path());
     start(&mut driver);
     assert!(driver.has("Fault: none"));
-    pick(&mut driver, "Injected fault", "Broken column-wire");
+    pick(&mut driver, "Wire fault", "Broken column-wire");
     driver.enter("Column-wire", "7");
     driver.wait("the name of the wire", |driver| driver.has("Fault: column-wire 7"));
     assert!(driver.says("Column-wire 7: no signal") && driver.says("Its readings are left out"));
@@ -148,8 +148,10 @@ fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
     let errors = driver.views().live.shown.frame.as_ref().unwrap().errors.unwrap();
     let [by_all, left_out] = errors.since_named_mm.unwrap();
     assert!(left_out < 0.5 * by_all, "{left_out} mm instead of {by_all} mm");
+    let residual = driver.views().live.shown.frame.as_ref().unwrap().residual;
+    assert!(residual < 5e-3, "{residual}: the broken wire's readings do not count");
     assert!(driver.says("Error with all wires: ") && driver.says("Error without the fault: "));
-    pick(&mut driver, "Injected fault", "None");
+    pick(&mut driver, "Wire fault", "None");
     driver.wait("recovery", |driver| driver.has("Fault: none"));
     assert!(!driver.says("Error with all wires"));
 }
@@ -168,7 +170,7 @@ fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
     driver.enter("Frames a second", "50");
     start(&mut driver);
     driver.click_button("Lift");
-    pick(&mut driver, "Injected fault", "Gain drift");
+    pick(&mut driver, "Wire fault", "Gain drift");
     driver.wait("the drift", |driver| driver.has("Fault: column-wire 3"));
     wait_for_frames(&mut driver, 30);
     driver.click_button("Re-zero");
@@ -237,7 +239,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     driver.wait("its end", |driver| driver.says("Recorded "));
     let recording = read(&recordings(folder.path())[0]);
 
-    driver.click("Replay");
+    driver.click("Replay recording");
     let ended = |driver: &Driver| {
         let replay = driver.views().live.shown.replay;
         replay.is_some_and(|replay| !replay.is_playing)

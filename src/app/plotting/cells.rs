@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use eframe::egui::{Mesh, Rect, Sense, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role, vec2};
+use eframe::egui::{Mesh, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use super::heat_map_frame::HeatMapFrame;
 use crate::{
@@ -17,7 +17,7 @@ pub fn cells_ui(
     label: &str,
     map: &HeatMap,
     marked: (&[usize], &[usize]),
-) -> Option<([usize; 2], eframe::egui::Response)> {
+) -> Option<([usize; 2], Response)> {
     let (palette, colours) = (Theme::of(ui).palette, ColourMap::viridis());
     let frame = HeatMapFrame::allocate_ui(ui, map);
     let (grid, size) = (frame.grid, frame.cell);

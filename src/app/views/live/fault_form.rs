@@ -74,7 +74,7 @@ impl FaultForm {
     /// Shows the form for an array of this scale, of which these row-wires are read.
     pub fn form_ui(&mut self, ui: &mut Ui, scale: ArrayScale, read: &[usize]) {
         let hint = "A fault of the simulated wires or electronics, which takes effect at once.";
-        if let Some(kind) = list_ui(ui, "Injected fault", hint, &KINDS, self.kind) {
+        if let Some(kind) = list_ui(ui, "Wire fault", hint, &KINDS, self.kind) {
             self.kind = kind;
         }
         let Some(kind) = self.kind else { return };

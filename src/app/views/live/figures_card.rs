@@ -207,7 +207,7 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
     let Recorded { path, frames, seconds } = &recorded;
     dim_ui(ui, &format!("Recorded {frames} frames, {seconds:.1} s.")).on_hover_text(path.display().to_string());
     ui.horizontal(|ui| {
-        let replay = ui.add_enabled(*frames > 0, ghost_button("Replay"));
+        let replay = ui.add_enabled(*frames > 0, ghost_button("Replay recording"));
         if replay
             .on_hover_text("Replays it with the network on the left.")
             .clicked()

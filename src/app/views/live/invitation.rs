@@ -63,7 +63,7 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
     let text = match view.source.kind {
         SourceKind::Simulated => format!(
             "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
-             hardware. To decode your own, choose a file, a serial port or a TCP address on the left."
+             hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
         ),
         _ => match view.obstacle(shared) {
             Some(obstacle) => obstacle,

@@ -157,10 +157,7 @@ fn in_words(file: &NetworkFile) -> (String, String) {
         Rows::Known => "known rows".to_owned(),
         Rows::One(row) => format!("row {} alone", row + 1),
     };
-    let array = format!(
-        "{}, {} hidden nodes, {rows}",
-        settings.source.sensor.scale, settings.hidden
-    );
+    let array = format!("{}, {} hidden, {rows}", settings.source.sensor.scale, settings.hidden);
     let error = format_percent(file.errors.z_percent);
     (array, format!("Z error on its test set {error}"))
 }

@@ -1,4 +1,4 @@
-use eframe::egui::{Align, Layout, RichText, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Label, Layout, RichText, Slider, Ui, WidgetInfo};
 
 use super::{LiveView, engine::Command};
 use crate::app::{
@@ -47,7 +47,7 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     let text = format!("{:.1}×", view.source.speed);
     ui.add_sized(
         [space(8), space(6)],
-        eframe::egui::Label::new(RichText::new(text).size(type_size().note).color(colour)),
+        Label::new(RichText::new(text).size(type_size().note).color(colour)),
     );
     ui.scope(|ui| {
         slider_style(ui);

@@ -46,8 +46,8 @@ pub struct SourceForm {
 pub enum SourceKind {
     /// Without hardware.
     Simulated,
-    /// A recording or another file.
-    File,
+    /// A recording, or another file of frames.
+    Replay,
     /// A serial port.
     Serial,
     /// A socket.
@@ -97,7 +97,7 @@ impl SourceForm {
                 motion: self.motion,
                 fault,
             },
-            SourceKind::File => {
+            SourceKind::Replay => {
                 let path = PathBuf::from(filled(&self.path, "Choose a file of frames, or record one.")?);
                 if path.exists() && !path.is_file() && !path.is_dir() {
                     // A named pipe or a device has no end to go back from.
@@ -150,7 +150,7 @@ impl SourceForm {
         ui.add_enabled_ui(!is_running, |ui| {
             let kinds = [
                 (SourceKind::Simulated, "Simulated"),
-                (SourceKind::File, "File"),
+                (SourceKind::Replay, "Replay"),
                 (SourceKind::Serial, "Serial"),
                 (SourceKind::Tcp, "TCP"),
             ];
@@ -162,7 +162,7 @@ impl SourceForm {
                     let rate = &mut self.frames_per_second;
                     quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "");
                 }
-                SourceKind::File => self.file_ui(ui, effects),
+                SourceKind::Replay => self.file_ui(ui, effects),
                 SourceKind::Serial => {
                     let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
                     text_ui(ui, "Port", hint, &mut self.port);

@@ -204,7 +204,7 @@ impl LiveView {
     /// Replays the last recording.
     pub(super) fn replay_recorded(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         if let Some(recorded) = &self.recorded {
-            self.source.kind = SourceKind::File;
+            self.source.kind = SourceKind::Replay;
             self.source.path = recorded.path.display().to_string();
             self.start(shared, effects);
         }

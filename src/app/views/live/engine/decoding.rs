@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     app::test_view::Frame,
-    decoupling::{CompiledNetworks, Decoder, resistance_residual},
+    decoupling::{CompiledNetworks, Decoder},
     export::NetworkFile,
     live::{ReZero, ZeroGains},
     scene::{Deformation, Scene},
@@ -202,32 +202,114 @@ impl Decoding {
         })
     }
 
-    /// Residual of Eq. (2) over all readings of the last frame.
+    /// Root mean square of m/R − 1 over the readings m of the last frame that are not left out, with R from Eq. (2) at its
+    /// answer; infinite if the model has no resistance there.
     pub(super) fn residual(&self) -> f64 {
         let scale = self.sensor.scale;
-        let rows = self.frame_ohm.chunks_exact(scale.columns());
-        let rows = rows.zip(self.answer_mm.chunks_exact(scale.coordinates_per_row()));
-        let squares = rows.map(|(ohm, mm)| resistance_residual(&self.sensor, ohm, mm).powi(2));
-        (squares.sum::<f64>() / self.rows.len() as f64).sqrt()
+        let (mut sum, mut count) = (0.0, 0);
+        let mut model_ohm = vec![0.0; scale.columns()];
+        for (index, (ohm, mm)) in self.lines().enumerate() {
+            let row = self.rows[index];
+            let nodes = mm.chunks_exact(3).map(DVec3::from_slice).enumerate();
+            let displacements_mm: Vec<DVec3> = nodes
+                .map(|(node, position_mm)| self.sensor.displacement_mm(row, node, position_mm))
+                .collect();
+            let modelled = self.sensor.row_resistances_into(row, &displacements_mm, &mut model_ohm);
+            if modelled.is_err() {
+                return f64::INFINITY;
+            }
+            let used = (0..scale.columns()).filter(|&column| !self.watch.leaves_out(row, column));
+            for column in used {
+                sum += (ohm[column] / model_ohm[column] - 1.0).powi(2);
+                count += 1;
+            }
+        }
+        (sum / f64::from(count.max(1))).sqrt()
     }
 
-    /// Readings and coordinates of the last frame outside the range seen in training; `None` where that is not known.
+    /// Readings, without those left out, and coordinates of the last frame outside the range seen in training; `None` where
+    /// that is not known.
     pub(super) fn outside(&self) -> (Option<usize>, usize) {
-        let scale = self.sensor.scale;
-        let rows = self.frame_ohm.chunks_exact(scale.columns());
-        let rows = rows.zip(self.answer_mm.chunks_exact(scale.coordinates_per_row()));
         let mut outside = (Some(0), 0);
-        for (row, (ohm, mm)) in rows.enumerate() {
-            let network = self.network.network.at(row);
+        for (index, (ohm, mm)) in self.lines().enumerate() {
+            let network = self.network.network.at(index);
             let inputs = network.inputs();
-            let of_row = inputs
-                .range()
-                .map(|range| range.outside(inputs.quantity(), ohm).count());
+            let is_used = |column: &usize| !self.watch.leaves_out(self.rows[index], *column);
+            let of_row = inputs.range();
+            let of_row = of_row.map(|range| range.outside(inputs.quantity(), ohm).filter(is_used).count());
             outside.0 = outside.0.zip(of_row).map(|(sum, count)| sum + count);
             outside.1 += network.outputs().far_outside(mm).count();
         }
         outside
     }
+
+    /// Readings and answer of each row of the last frame.
+    fn lines(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        let scale = self.sensor.scale;
+        let rows = self.frame_ohm.chunks_exact(scale.columns());
+        rows.zip(self.answer_mm.chunks_exact(scale.coordinates_per_row()))
+    }
 }
 
 const NO_ANSWER: &str = "resistances so far from the training range that the network has no answer";
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::{
+        dataset::Seed,
+        decoupling::resistance_residual,
+        evaluation::{Run, SimulatedSettings},
+        live::Simulated,
+        scene::{Fault, Noise},
+    };
+
+    fn network() -> Arc<NetworkFile> {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "4x4_3x12".parse().unwrap();
+        (settings.source.samples, settings.hidden) = (200, 6);
+        settings.training.stopping.epochs = 10;
+        let mut run = Run::prepare(settings).unwrap();
+        while run.step().is_none() {}
+        Arc::new(NetworkFile::from_run(&run).unwrap())
+    }
+
+    #[test]
+    fn the_residual_is_the_librarys_and_that_of_a_fault_only_of_the_wires_used() {
+        let network = network();
+        let scene = Scene {
+            noise: Noise::relative(1e-3),
+            ..network.settings.source.scene
+        };
+        let mut decoding = Decoding::new(Arc::clone(&network), &scene, None).unwrap();
+        let mut source = Simulated::new(&decoding.sensor, &scene, Seed(1), 50.0).unwrap();
+        let mut ohm = vec![0.0; decoding.readings()];
+        source.next_frame(&mut ohm).unwrap();
+        let now = Instant::now();
+        decoding.decode(&ohm, Some(source.deformation()), now).unwrap();
+        let rows = ohm.chunks_exact(12).zip(decoding.answer_mm.chunks_exact(12));
+        let squares = rows.map(|(ohm, mm)| resistance_residual(&decoding.sensor, ohm, mm).powi(2));
+        let expected = (squares.sum::<f64>() / 4.0).sqrt();
+        assert!((decoding.residual() / expected - 1.0).abs() < 1e-9);
+
+        source
+            .set_fault(Some(Fault::OpenColumn {
+                column: 4,
+                before_node: 0,
+            }))
+            .unwrap();
+        let mut shown_mm = None;
+        for frame in 1..20 {
+            source.next_frame(&mut ohm).unwrap();
+            let at = now + Duration::from_secs(frame);
+            shown_mm = decoding.decode(&ohm, Some(source.deformation()), at).unwrap();
+        }
+        let state = decoding.watch.state();
+        assert!(matches!(state, Watched::Named(_)), "{state:?}");
+        assert!(decoding.residual() < 3e-3, "{}", decoding.residual());
+        let [by_all, left_out] = decoding.truth_errors(shown_mm).since_named_mm.unwrap();
+        assert!(left_out < by_all, "{left_out} and {by_all}");
+    }
+}

@@ -143,7 +143,7 @@ pub struct LiveFrame {
     pub drops_percent: Array2<f64>,
     /// Time of the frame in its source, in seconds.
     pub time_s: f64,
-    /// Root mean square of m/R − 1 over the readings m, R from Eq. (2) at the decoded deformation.
+    /// Root mean square of m/R − 1 over the readings m that are used, R from Eq. (2) at the decoded deformation.
     pub residual: f64,
     /// Readings outside the range seen in training; `None` if that is not known.
     pub readings_outside: Option<usize>,

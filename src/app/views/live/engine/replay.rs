@@ -1,4 +1,7 @@
-use std::time::{Duration, Instant};
+use std::{
+    ops::RangeInclusive,
+    time::{Duration, Instant},
+};
 
 use super::{
     counts::Tally,
@@ -22,7 +25,7 @@ pub(super) struct ReplayFrames {
 }
 
 /// Speeds from slowest to fastest.
-const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl ReplayFrames {
     /// Begins with the frame at `at_s` after the first.

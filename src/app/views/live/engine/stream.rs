@@ -1,7 +1,11 @@
-use std::{io::Read, time::Duration};
+use std::{
+    io::Read,
+    time::{Duration, Instant},
+};
 
 use super::{counts::Tally, frame_source::Next, message::Arrived};
 use crate::{
+    dataset::system_cause,
     live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
     scene::Rows,
     sensor::ArrayScale,
@@ -20,7 +24,7 @@ pub(super) struct StreamFrames {
     is_new: Vec<bool>,
     dropped: u64,
     /// When reading began.
-    begun: std::time::Instant,
+    begun: Instant,
 }
 
 impl StreamFrames {
@@ -44,7 +48,7 @@ impl StreamFrames {
             latest_ohm: vec![0.0; read * scale.columns()],
             is_new: vec![false; read],
             dropped: 0,
-            begun: std::time::Instant::now(),
+            begun: Instant::now(),
         })
     }
 
@@ -63,7 +67,7 @@ impl StreamFrames {
             NextLine::None => return Next::Nothing,
             NextLine::End(None) => return Next::End(Ok(())),
             NextLine::End(Some(error)) => {
-                let cause = crate::dataset::system_cause(&error);
+                let cause = system_cause(&error);
                 return Next::End(Err(format!("{} is lost: {cause}; connect it again", self.name)));
             }
         };

@@ -56,6 +56,14 @@ impl Watch {
         &self.state
     }
 
+    /// Returns `true` for a reading that is left out.
+    pub(super) fn leaves_out(&self, row: usize, column: usize) -> bool {
+        match &self.state {
+            Watched::Named(diagnosis) => diagnosis.wire.is_row(row) || diagnosis.wire.columns().contains(&Some(column)),
+            Watched::Off(_) | Watched::Sound | Watched::Unexplained => false,
+        }
+    }
+
     /// Checks a frame, unless another was checked just now. Returns `true` if another fault is named than before.
     pub(super) fn check(&mut self, frame_ohm: &[f64], now: Instant) -> bool {
         let Some(parts) = &mut self.parts else { return false };
