@@ -1,5 +1,7 @@
 //! Files written from the window.
 
+use std::fs;
+
 use decoupler::{
     export::{NetworkFile, format_number},
     network::Networks,
