@@ -46,7 +46,7 @@ impl View for TrainView {
         }
         // Before anything is drawn, so that all of the window shows what the finger does in the same frame.
         let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames);
+        self.press.take_pointer(ctx, shared.test(), &frames, self.node);
         self.follow(shared);
     }
 
