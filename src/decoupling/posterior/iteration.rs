@@ -1,4 +1,7 @@
-use super::{Posterior, PosteriorReport, linearised::Point};
+use super::{
+    Posterior, PosteriorReport,
+    linearised::{FactorsAt, Point},
+};
 use crate::decoupling::LARGEST_ERROR;
 
 /// Change of a mean, relative to the range, below which the linearisation has converged.
@@ -30,6 +33,7 @@ impl Posterior {
             displacements_mm: first,
         };
         let mut expected: Option<Vec<f64>> = None;
+        let mut earlier: Option<FactorsAt> = None;
         while steps < most_steps {
             self.problem.evaluate(&at.displacements_mm);
             if steps == 0 && self.likelihood.has_drift() {
@@ -42,7 +46,7 @@ impl Posterior {
             };
             let blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
             steps += 1;
-            let Some(found) = self.linearised(row, &at, blur) else {
+            let Some(found) = self.linearised(row, &at, blur, earlier.as_ref()) else {
                 converged = false;
                 break;
             };
@@ -68,6 +72,10 @@ impl Posterior {
             if largest < TOLERANCE && blur == 1.0 {
                 break;
             }
+            earlier = Some(FactorsAt {
+                factors: found.marginals.factors,
+                at: at.clone(),
+            });
             let share = share_of_step(steps);
             let between = |from: f64, to: f64| if share == 1.0 { to } else { from + share * (to - from) };
             for (at, mean) in at.displacements_mm.iter_mut().zip(&found.means.displacements_mm) {

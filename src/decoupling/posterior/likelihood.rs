@@ -90,6 +90,7 @@ impl Likelihood {
             linear: vec![0.0; unknowns],
             ranges: Vec::new(),
             rounded: Vec::new(),
+            first_factors: Vec::new(),
         };
         let mut form = vec![0.0; unknowns];
         for reading in 0..readings {

@@ -123,7 +123,7 @@ impl Posterior {
         if self.likelihood.has_drift() {
             truth.drift = self.likelihood.likeliest_drift(&self.problem);
         }
-        match self.linearised(row, &truth, 1.0) {
+        match self.linearised(row, &truth, 1.0, None) {
             Some(found) if found.marginals.converged => {
                 self.problem.coordinates_of(&found.medians_mm, coordinates_mm);
                 true
