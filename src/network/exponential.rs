@@ -49,7 +49,10 @@ mod tests {
         let arguments = (-7080..=7090).map(|i| f64::from(i) * 0.1);
         for x in arguments.chain((0..320).flat_map(|e| [10.0_f64.powi(-e), -(10.0_f64.powi(-e))])) {
             let (ours, theirs) = (exp(x), x.exp());
-            assert!((ours - theirs).abs() <= 2.0 * f64::EPSILON * theirs, "{x}: {ours} {theirs}");
+            assert!(
+                (ours - theirs).abs() <= 2.0 * f64::EPSILON * theirs,
+                "{x}: {ours} {theirs}"
+            );
         }
     }
 

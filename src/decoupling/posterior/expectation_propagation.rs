@@ -2,7 +2,9 @@ use pulp::{Simd, WithSimd};
 
 use super::{
     gaussian::{Direction, Gaussian},
-    truncated::{Factor, Marginal, Moments},
+    marginal::Marginal,
+    site::Site,
+    truncated::Factor,
 };
 use crate::decoupling::row_problem::Range;
 
@@ -40,8 +42,6 @@ pub(super) struct RoundedReading {
 #[derive(Clone, Debug)]
 pub(super) struct Marginals {
     pub(super) of_unknowns: Vec<Marginal>,
-    /// Factors that stand for the ranges of the unknowns.
-    pub(super) factors: Vec<Factor>,
     /// False if the factors still moved after the last round.
     pub(super) converged: bool,
 }
@@ -54,96 +54,6 @@ const ROUNDS_UNDAMPED: usize = 20;
 const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
 const TOLERANCE: f64 = 1e-7;
-
-/// A range and the Gaussian factor that stands for it.
-struct Site<'a> {
-    direction: Direction<'a>,
-    range: Range,
-    /// Variance of what is added to the unknown before it meets the range.
-    noise: f64,
-    factor: Factor,
-    /// What the other factors and the equations say of the unknown.
-    seen: Factor,
-    /// Moments of that within the range.
-    moments: Moments,
-}
-
-impl<'a> Site<'a> {
-    /// Begins with the moments of the range by itself; with none if it is open.
-    fn new(direction: Direction<'a>, range: Range, noise: f64) -> Self {
-        let precision = 12.0 / (range.width() * range.width());
-        let factor = if precision > 0.0 {
-            Factor {
-                precision,
-                linear: precision * range.middle(),
-            }
-        } else {
-            Factor {
-                precision: 0.0,
-                linear: 0.0,
-            }
-        };
-        Self {
-            direction,
-            range,
-            noise,
-            factor: factor.blurred(noise),
-            seen: Factor {
-                precision: 0.0,
-                linear: 0.0,
-            },
-            moments: Moments {
-                mean: f64::INFINITY,
-                variance: f64::INFINITY,
-            },
-        }
-    }
-
-    /// Changes the factor by `share` of what makes the marginal keep its moments within the range. False if numbers
-    /// overflow.
-    #[inline(always)]
-    fn meet_range(&mut self, gaussian: &mut Gaussian, share: f64) -> bool {
-        let (mean, variance) = gaussian.marginal(self.direction);
-        let before = self.factor;
-        let cavity = Factor {
-            precision: 1.0 / variance - before.precision,
-            linear: mean / variance - before.linear,
-        };
-        let seen = cavity.blurred(self.noise);
-        let moments = seen.cut_to(self.range);
-        if !(moments.variance > 0.0 && moments.variance.is_finite()) {
-            return false;
-        }
-        let found = Factor {
-            precision: (1.0 / moments.variance - seen.precision).max(0.0),
-            linear: moments.mean / moments.variance - seen.linear,
-        };
-        let found = found.blurred(self.noise);
-        let by_precision = share * (found.precision - before.precision);
-        let by_linear = share * (found.linear - before.linear);
-        self.factor = Factor {
-            precision: before.precision + by_precision,
-            linear: before.linear + by_linear,
-        };
-        (self.seen, self.moments) = (seen, moments);
-        gaussian.multiply(mean, variance, by_precision, by_linear)
-    }
-
-    /// Appends the factor as one more equation.
-    fn append_to(&self, equations: &mut Vec<f64>, unknowns: usize) {
-        let root = self.factor.precision.sqrt();
-        if root == 0.0 {
-            return;
-        }
-        match self.direction {
-            Direction::Unknown(place) => {
-                equations.extend((0..unknowns).map(|unknown| if unknown == place { root } else { 0.0 }));
-            }
-            Direction::Form(form) => equations.extend(form.iter().map(|value| root * value)),
-        }
-        equations.push(self.factor.linear / root);
-    }
-}
 
 impl LinearModel {
     /// The marginals; `None` if numbers overflow.
@@ -199,15 +109,19 @@ impl WithSimd for Propagation<'_> {
             let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
             let mut largest = 0.0;
             for (place, site) in sites.iter_mut().enumerate() {
-                let last = site.moments.mean;
+                let last = site.mean();
                 if !site.meet_range(&mut gaussian, share) {
                     return None;
                 }
                 if place < n {
                     let width = site.range.width();
                     let unit = if width.is_finite() { width } else { 1.0 };
-                    let moved = (site.moments.mean - last).abs() / unit;
-                    largest = if moved > largest || moved.is_nan() { moved } else { largest };
+                    let moved = (site.mean() - last).abs() / unit;
+                    largest = if moved > largest || moved.is_nan() {
+                        moved
+                    } else {
+                        largest
+                    };
                 }
             }
             if largest.is_nan() {
@@ -218,13 +132,8 @@ impl WithSimd for Propagation<'_> {
                 break;
             }
         }
-        sites.truncate(n);
         Some(Marginals {
-            of_unknowns: sites
-                .iter()
-                .map(|site| site.seen.marginal(site.range, site.moments))
-                .collect(),
-            factors: sites.iter().map(|site| site.factor).collect(),
+            of_unknowns: sites[..n].iter().map(Site::marginal).collect(),
             converged,
         })
     }
@@ -273,7 +182,7 @@ mod tests {
                 (ours.variance / (deviation * deviation * spread) - 1.0).abs() < 2e-3,
                 "{mean} {deviation}"
             );
-            let below = (normal_cdf((ours.median - mean) / deviation) - normal_cdf(alpha)) / mass;
+            let below = (normal_cdf((ours.median() - mean) / deviation) - normal_cdf(alpha)) / mass;
             assert!((below - 0.5).abs() < 2e-3, "{mean} {deviation}: {below}");
         }
     }

@@ -48,11 +48,14 @@ impl Gaussian {
         }
         let mut order: Vec<usize> = (0..n).collect();
         for k in 0..n {
-            let squares =
-                |column: usize| -> f64 { columns[column * m + k..(column + 1) * m].iter().map(|x| x * x).sum() };
-            let (pivot, square) = (k..n)
-                .map(|column| (column, squares(column)))
-                .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
+            let (mut pivot, mut square) = (k, -1.0);
+            for column in k..n {
+                let rest = &columns[column * m + k..(column + 1) * m];
+                let squares = dot(rest, rest);
+                if squares > square {
+                    (pivot, square) = (column, squares);
+                }
+            }
             if !(square > 0.0 && square.is_finite()) {
                 return None;
             }
@@ -153,7 +156,12 @@ impl Gaussian {
 /// Adds `factor` times `from`, both whole registers.
 #[inline(always)]
 fn add_blocks(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (to, from) in to.as_chunks_mut::<LANES>().0.iter_mut().zip(from.as_chunks::<LANES>().0) {
+    for (to, from) in to
+        .as_chunks_mut::<LANES>()
+        .0
+        .iter_mut()
+        .zip(from.as_chunks::<LANES>().0)
+    {
         for lane in 0..LANES {
             to[lane] += factor * from[lane];
         }

@@ -1,6 +1,6 @@
 use super::{
     Posterior, PosteriorReport,
-    linearised::{FactorsAt, Point},
+    linearised::{Linearised, Point},
 };
 use crate::decoupling::LARGEST_ERROR;
 
@@ -25,7 +25,6 @@ impl Posterior {
         coordinates_mm: &mut [f64],
     ) -> PosteriorReport {
         self.problem.read(row, readings_ohm);
-        let mut answer = first.clone();
         let (mut variance, mut determined) = (f64::NAN, false);
         let (mut converged, mut steps) = (false, 0);
         let mut at = Point {
@@ -33,7 +32,7 @@ impl Posterior {
             displacements_mm: first,
         };
         let mut expected: Option<Vec<f64>> = None;
-        let mut earlier: Option<FactorsAt> = None;
+        let mut last: Option<Linearised> = None;
         while steps < most_steps {
             self.problem.evaluate(&at.displacements_mm);
             if steps == 0 && self.likelihood.has_drift() {
@@ -46,7 +45,7 @@ impl Posterior {
             };
             let blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
             steps += 1;
-            let Some(found) = self.linearised(row, &at, blur, earlier.as_ref()) else {
+            let Some(found) = self.linearised(row, &at, blur, last.as_ref()) else {
                 converged = false;
                 break;
             };
@@ -68,14 +67,11 @@ impl Posterior {
                 .iter()
                 .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
             converged = found.marginals.converged && blur == 1.0;
-            answer = found.medians_mm;
-            if largest < TOLERANCE && blur == 1.0 {
+            let is_last = largest < TOLERANCE && blur == 1.0;
+            let found = last.insert(found);
+            if is_last {
                 break;
             }
-            earlier = Some(FactorsAt {
-                factors: found.marginals.factors,
-                at: at.clone(),
-            });
             let share = share_of_step(steps);
             let between = |from: f64, to: f64| if share == 1.0 { to } else { from + share * (to - from) };
             for (at, mean) in at.displacements_mm.iter_mut().zip(&found.means.displacements_mm) {
@@ -85,6 +81,10 @@ impl Posterior {
             let misfits = misfits.iter().zip(&found.misfits);
             expected = Some(misfits.map(|(&from, &to)| between(from, to)).collect());
         }
+        let answer = match &last {
+            Some(last) => self.medians_mm(last),
+            None => at.displacements_mm,
+        };
         let residual = self.problem.evaluate(&answer);
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {

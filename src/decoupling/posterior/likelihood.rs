@@ -1,6 +1,6 @@
 use super::{
     expectation_propagation::{LinearModel, RoundedReading},
-    truncated::Marginal,
+    marginal::Marginal,
 };
 use crate::{
     decoupling::row_problem::{Range, RowProblem},

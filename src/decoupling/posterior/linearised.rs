@@ -9,29 +9,26 @@ pub(super) struct Point {
     pub(super) drift: f64,
 }
 
-/// The factors of the unknowns' ranges after expectation propagation, linearised at a point.
-pub(super) struct FactorsAt {
-    pub(super) factors: Vec<Factor>,
-    pub(super) at: Point,
-}
-
-impl FactorsAt {
-    /// The same factors for unknowns measured from another point.
-    fn seen_from(&self, at: &Point, widths: &[f64]) -> Vec<Factor> {
-        let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
-        let shifts = points.zip(widths).map(|((to, from), width)| (to - from) / width);
-        let shifts = shifts.chain([at.drift - self.at.drift]);
-        self.factors.iter().zip(shifts).map(|(factor, shift)| factor.shifted(shift)).collect()
-    }
-}
-
 /// The posterior of the equations linearised at a point.
 pub(super) struct Linearised {
+    at: Point,
     pub(super) marginals: Marginals,
     pub(super) means: Point,
-    pub(super) medians_mm: Vec<f64>,
     /// w that the linearisation expects at the means.
     pub(super) misfits: Vec<f64>,
+}
+
+impl Linearised {
+    /// The factors of the ranges, for displacements measured from another point.
+    fn factors_from(&self, at: &Point, widths: &[f64]) -> Vec<Factor> {
+        let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
+        let shifts = points.zip(widths).map(|((to, from), width)| (to - from) / width);
+        let marginals = self.marginals.of_unknowns.iter();
+        marginals
+            .zip(shifts)
+            .map(|(marginal, shift)| marginal.factor.shifted(shift))
+            .collect()
+    }
 }
 
 impl Posterior {
@@ -42,7 +39,7 @@ impl Posterior {
         row: usize,
         at: &Point,
         blur: f64,
-        earlier: Option<&FactorsAt>,
+        earlier: Option<&Linearised>,
     ) -> Option<Linearised> {
         let n = self.widths.len();
         let mut model = self.likelihood.linearised(&self.problem, at.drift, blur, &self.widths);
@@ -65,7 +62,7 @@ impl Posterior {
         let unknowns = model.ranges.len();
         self.priors[place].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
         if let Some(earlier) = earlier {
-            model.first_factors = earlier.seen_from(at, &self.widths);
+            model.first_factors = earlier.factors_from(at, &self.widths);
         }
         let mut marginals = model.marginals()?;
         let misfits = expected_misfits(&model, self.problem.equations(), &marginals.of_unknowns, blur);
@@ -74,22 +71,29 @@ impl Posterior {
             .get(n)
             .map_or(0.0, |marginal| at.drift + marginal.mean);
         marginals.of_unknowns.truncate(n);
-        let places = marginals.of_unknowns.iter().zip(&at.displacements_mm).zip(&self.widths);
-        let places = places.zip(&self.ranges);
-        let place = |x: f64, at: f64, width: f64, range: &Range| range.clamp(at + x * width);
+        let displacements_mm = self.displacements_mm(at, marginals.of_unknowns.iter().map(|marginal| marginal.mean));
         Some(Linearised {
+            at: at.clone(),
             means: Point {
-                displacements_mm: places
-                    .clone()
-                    .map(|(((marginal, &at), &width), range)| place(marginal.mean, at, width, range))
-                    .collect(),
+                displacements_mm,
                 drift,
             },
-            medians_mm: places
-                .map(|(((marginal, &at), &width), range)| place(marginal.median, at, width, range))
-                .collect(),
             misfits,
             marginals,
         })
+    }
+
+    /// The medians of the displacements.
+    pub(super) fn medians_mm(&self, found: &Linearised) -> Vec<f64> {
+        let medians = found.marginals.of_unknowns.iter().map(|marginal| marginal.median());
+        self.displacements_mm(&found.at, medians)
+    }
+
+    /// Displacements within their ranges from x = (displacement − present) / width.
+    fn displacements_mm(&self, at: &Point, x: impl Iterator<Item = f64>) -> Vec<f64> {
+        let places = x.zip(&at.displacements_mm).zip(&self.widths).zip(&self.ranges);
+        places
+            .map(|(((x, at), width), range)| range.clamp(at + x * width))
+            .collect()
     }
 }

@@ -87,7 +87,10 @@ mod tests {
             let mut values = vec![0.0; gaussians.width()];
             gaussians.evaluate(x.as_slice().unwrap(), &mut values);
             for (centre, value) in centres.rows().into_iter().zip(&values) {
-                assert!((value / gaussian(x.row(0), centre, 0.4) - 1.0).abs() < 1e-14, "{count} {inputs}");
+                assert!(
+                    (value / gaussian(x.row(0), centre, 0.4) - 1.0).abs() < 1e-14,
+                    "{count} {inputs}"
+                );
             }
         }
     }
