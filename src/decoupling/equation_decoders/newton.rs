@@ -60,7 +60,7 @@ impl NewtonDecoder {
         })
     }
 
-    /// Solves one row by `rules`; returns the report on the row-wire that fits best.
+    /// Solves one row by `rules`; returns the report on the row-wire taken.
     fn solve(
         &mut self,
         rules: NewtonRules,
@@ -70,19 +70,15 @@ impl NewtonDecoder {
     ) -> Result<Option<NewtonReport>, DecodeError> {
         let newton = &mut self.newton;
         newton.set_rules(rules);
-        let mut best: Option<NewtonReport> = None;
         self.search
             .solve(row_index, readings, targets, |row, readings, coordinates| {
                 let report = newton.solve(row, readings, coordinates)?;
-                if best.is_none_or(|best| report.residual < best.residual) {
-                    best = Some(report);
-                }
-                Ok(match report.solution {
+                let misfit = match report.solution {
                     Solution::None => report.residual.max(EXPLAINED),
                     Solution::Unique | Solution::Undetermined => report.residual.min(0.5 * EXPLAINED),
-                })
-            })?;
-        Ok(best)
+                };
+                Ok((misfit, report))
+            })
     }
 
     /// Solves one row; returns the standing of the answer.

@@ -1,6 +1,6 @@
 use super::row_search::{EXPLAINED, RowSearch};
 use crate::{
-    decoupling::{DecodeError, Decoder, Posterior, PosteriorReport, Solution, SolvedRows},
+    decoupling::{DecodeError, Decoder, Posterior, Solution, SolvedRows},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -38,16 +38,13 @@ impl PosteriorDecoder {
         targets: &mut [f64],
     ) -> Result<Solution, DecodeError> {
         let posterior = &mut self.posterior;
-        let mut best: Option<PosteriorReport> = None;
-        self.search
+        let taken = self
+            .search
             .solve(row_index, readings, targets, |row, readings, coordinates| {
                 let report = posterior.solve(row, readings, coordinates)?;
-                if best.is_none_or(|best| report.residual < best.residual) {
-                    best = Some(report);
-                }
-                Ok(report.residual)
+                Ok((report.residual, report))
             })?;
-        Ok(match best {
+        Ok(match taken {
             Some(report) if report.converged => {
                 if self.is_noisy || report.determined && report.residual < EXPLAINED {
                     Solution::Unique

@@ -75,20 +75,22 @@ impl RowSearch {
         self.rest.len() > 1 && self.scale.nodes_per_column() == 1 || self.twins_x_mm.contains(&coordinates_mm[0])
     }
 
-    /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit.
+    /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit
+    /// with a report. Returns the report on the row-wire taken.
     ///
     /// If rows are not known, row-wires are tried in the order of similarity of their readings at rest, and the one
     /// that fits the readings best is taken; rows that mirror each other may then be confused.
-    pub(super) fn solve(
+    pub(super) fn solve<R>(
         &mut self,
         row_index: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<f64, DecodeError>,
-    ) -> Result<(), DecodeError> {
+        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<(f64, R), DecodeError>,
+    ) -> Result<Option<R>, DecodeError> {
         DecodeError::check(readings_ohm)?;
         if self.rest.is_empty() {
-            return solve(self.rows[row_index], readings_ohm, coordinates_mm).map(drop);
+            let (_, report) = solve(self.rows[row_index], readings_ohm, coordinates_mm)?;
+            return Ok(Some(report));
         }
         let unlike = |rest: &Vec<f64>| -> f64 {
             let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
@@ -97,16 +99,17 @@ impl RowSearch {
         let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut least = f64::INFINITY;
+        let mut of_taken = None;
         for (_, row_wire) in order {
-            let residual = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
+            let (residual, report) = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
             if residual < least {
-                least = residual;
+                (least, of_taken) = (residual, Some(report));
                 coordinates_mm.copy_from_slice(&self.trial_mm);
             }
             if least < EXPLAINED {
                 break;
             }
         }
-        Ok(())
+        Ok(of_taken)
     }
 }

@@ -3,7 +3,7 @@ use ndarray::Array2;
 use super::*;
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, NewtonRules, Posterior, SolvedRows, TrainingMean, decode_set},
+    decoupling::{Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows, TrainingMean, decode_set},
     scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -68,6 +68,35 @@ fn rows_that_mirror_each_other_are_flagged_unless_they_are_known() {
         let solved = solved(newton, &set);
         assert_eq!((solved.rows, solved.unsolved, solved.undetermined), (30, 0, expected));
     }
+}
+
+/// In a sensor so high that all rows look alike, which of them explain the readings depends on the last digits.
+#[test]
+fn the_standing_is_that_of_the_row_taken_and_of_no_other_that_was_tried() {
+    let mut model = SensorModel::new("10x2_3x30".parse().unwrap());
+    model.geometry.height_mm = 1e5;
+    let scene = Scene::default();
+    let rows = Vec::from_iter(0..10);
+    let mut decoder = NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap();
+    let mut newton = Newton::new(&model, &scene, NewtonRules::default());
+    let mut counts = [0; 2];
+    for noise in [1e-15, 1.2e-15] {
+        let mut set = Dataset::simulate(&model, &scene, 200, &mut Seed(0).rng(Stream::Test)).unwrap();
+        set.disturb(&model, &Noise::relative(noise), &mut Seed(0).rng(Stream::TestNoise))
+            .unwrap();
+        for sample in 0..set.samples() {
+            let readings = set.sample_readings(sample);
+            let mut coordinates_mm = [0.0; 6];
+            decoder.decode_row(0, readings, &mut coordinates_mm).unwrap();
+            let is_taken = |&&row: &&usize| model.geometry.row_x_mm(row) == coordinates_mm[0];
+            let taken = *rows.iter().find(is_taken).unwrap();
+            let of_taken = newton.solve(taken, readings, &mut [0.0; 6]).unwrap();
+            let unsolved = usize::from(of_taken.solution == Solution::None);
+            assert_eq!(decoder.take_solved_rows().unsolved, unsolved, "{noise:e}, {sample}");
+            counts[unsolved] += 1;
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 20), "{counts:?}");
 }
 
 /// Four electrodes for six nodes leave every row open, and 18 none.
