@@ -26,6 +26,8 @@ pub(super) struct LinearModel {
     pub(super) rounded: Vec<RoundedReading>,
     /// Factors with which those of the unknowns begin; empty if they begin with the moments of their ranges.
     pub(super) first_factors: Vec<Factor>,
+    /// Change of a mean, relative to the range, below which the factors have converged.
+    pub(super) tolerance: f64,
 }
 
 /// A reading of which only the interval is known.
@@ -53,7 +55,7 @@ const ROUNDS_UNDAMPED: usize = 20;
 /// Smallest share of a change of a factor.
 const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
-const TOLERANCE: f64 = 1e-7;
+pub(super) const TOLERANCE: f64 = 1e-7;
 
 impl LinearModel {
     /// The marginals; `None` if numbers overflow.
@@ -127,7 +129,7 @@ impl WithSimd for Propagation<'_> {
             if largest.is_nan() {
                 return None;
             }
-            if largest < TOLERANCE * share {
+            if largest < self.model.tolerance * share {
                 converged = true;
                 break;
             }
@@ -158,6 +160,7 @@ mod tests {
             ranges,
             rounded: Vec::new(),
             first_factors: Vec::new(),
+            tolerance: TOLERANCE,
         };
         let marginals = model.marginals().unwrap();
         assert!(marginals.converged);
@@ -211,6 +214,7 @@ mod tests {
                     },
                 }],
                 first_factors: Vec::new(),
+                tolerance: TOLERANCE,
             };
             let ours = model.marginals().unwrap().of_unknowns[0];
             let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);

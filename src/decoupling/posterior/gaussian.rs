@@ -141,15 +141,44 @@ impl Gaussian {
         let shift = linear - precision / left * (mean + linear * variance);
         // Σ − precision/left Σ a aᵀ Σ = M Mᵀ with M = L − shrink L (Lᵀa) (Lᵀa)ᵀ.
         let shrink = precision / (left + left.sqrt());
-        self.covariances.fill(0.0);
-        for (column, &along) in self.root.chunks_exact(self.stride).zip(&self.along) {
-            add_blocks(&mut self.covariances, along, column);
-        }
+        self.project();
         add_blocks(&mut self.mean, shift, &self.covariances);
         for (column, &along) in self.root.chunks_exact_mut(self.stride).zip(&self.along) {
             add_blocks(column, -shrink * along, &self.covariances);
         }
         true
+    }
+}
+
+impl Gaussian {
+    /// Computes L Lᵀa. Each block of unknowns stays in registers.
+    #[inline(always)]
+    fn project(&mut self) {
+        let (blocks, along) = (self.covariances.as_chunks_mut::<LANES>().0, &self.along);
+        for (block, covariances) in blocks.iter_mut().enumerate() {
+            let (mut even, mut odd) = ([0.0; LANES], [0.0; LANES]);
+            let column = |index: usize| -> &[f64; LANES] {
+                let begin = index * self.stride + block * LANES;
+                self.root[begin..begin + LANES].try_into().expect("a block")
+            };
+            let pairs = along.as_chunks::<2>();
+            for (pair, along) in pairs.0.iter().enumerate() {
+                let (of_even, of_odd) = (column(2 * pair), column(2 * pair + 1));
+                for lane in 0..LANES {
+                    even[lane] += along[0] * of_even[lane];
+                    odd[lane] += along[1] * of_odd[lane];
+                }
+            }
+            if let [along] = pairs.1 {
+                let of_even = column(2 * pairs.0.len());
+                for lane in 0..LANES {
+                    even[lane] += along * of_even[lane];
+                }
+            }
+            for lane in 0..LANES {
+                covariances[lane] = even[lane] + odd[lane];
+            }
+        }
     }
 }
 

@@ -1,11 +1,13 @@
 use super::{
-    Posterior, PosteriorReport,
+    Posterior, PosteriorReport, expectation_propagation,
     linearised::{Linearised, Point},
 };
 use crate::decoupling::LARGEST_ERROR;
 
 /// Change of a mean, relative to the range, below which the linearisation has converged.
 const TOLERANCE: f64 = 1e-5;
+/// Change of a mean up to which the first linearisation is followed, which is far from the answer.
+const FIRST_TOLERANCE: f64 = 1e-3;
 /// Error of a linearisation, in standard deviations of the readings, up to which it needs no blur.
 const TOLERATED_MISFIT: f64 = 1e4;
 /// Error of a linearisation in proportion to the change of the readings, before it is known.
@@ -44,8 +46,14 @@ impl Posterior {
                 Some(expected) => rms(misfits.iter().zip(expected).map(|(found, expected)| found - expected)),
             };
             let blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
+            let is_rough = steps == 0 && most_steps > 1;
+            let tolerance = if is_rough {
+                FIRST_TOLERANCE
+            } else {
+                expectation_propagation::TOLERANCE
+            };
             steps += 1;
-            let Some(found) = self.linearised(row, &at, blur, last.as_ref()) else {
+            let Some(found) = self.linearised(row, &at, blur, last.as_ref(), tolerance) else {
                 converged = false;
                 break;
             };
@@ -67,7 +75,7 @@ impl Posterior {
                 .iter()
                 .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
             converged = found.marginals.converged && blur == 1.0;
-            let is_last = largest < TOLERANCE && blur == 1.0;
+            let is_last = largest < TOLERANCE && blur == 1.0 && !is_rough;
             let found = last.insert(found);
             if is_last {
                 break;

@@ -1,5 +1,5 @@
 use super::{
-    expectation_propagation::{LinearModel, RoundedReading},
+    expectation_propagation::{LinearModel, RoundedReading, TOLERANCE},
     marginal::Marginal,
 };
 use crate::{
@@ -91,6 +91,7 @@ impl Likelihood {
             ranges: Vec::new(),
             rounded: Vec::new(),
             first_factors: Vec::new(),
+            tolerance: TOLERANCE,
         };
         let mut form = vec![0.0; unknowns];
         for reading in 0..readings {

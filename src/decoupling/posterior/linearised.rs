@@ -33,13 +33,15 @@ impl Linearised {
 
 impl Posterior {
     /// The posterior of the equations linearised at `at`, where they were evaluated, with `blur` times the noise; `None`
-    /// if numbers overflow. Expectation propagation begins with the factors of an earlier linearisation, if there was one.
+    /// if numbers overflow. Expectation propagation begins with the factors of an earlier linearisation, if there was one, and
+    /// ends when no mean changes by more than `tolerance`.
     pub(super) fn linearised(
         &self,
         row: usize,
         at: &Point,
         blur: f64,
         earlier: Option<&Linearised>,
+        tolerance: f64,
     ) -> Option<Linearised> {
         let n = self.widths.len();
         let mut model = self.likelihood.linearised(&self.problem, at.drift, blur, &self.widths);
@@ -61,6 +63,7 @@ impl Posterior {
         let place = place.expect("the row is one of those given");
         let unknowns = model.ranges.len();
         self.priors[place].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
+        model.tolerance = tolerance;
         if let Some(earlier) = earlier {
             model.first_factors = earlier.factors_from(at, &self.widths);
         }

@@ -125,7 +125,7 @@ impl Posterior {
         if self.likelihood.has_drift() {
             truth.drift = self.likelihood.likeliest_drift(&self.problem);
         }
-        match self.linearised(row, &truth, 1.0, None) {
+        match self.linearised(row, &truth, 1.0, None, expectation_propagation::TOLERANCE) {
             Some(found) if found.marginals.converged => {
                 let medians_mm = self.medians_mm(&found);
                 self.problem.coordinates_of(&medians_mm, coordinates_mm);

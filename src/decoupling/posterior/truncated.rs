@@ -153,9 +153,12 @@ impl Cut {
             step,
             ..
         } = self;
-        let density: [f64; POINTS] = std::array::from_fn(|k| {
-            let t = lowest + step * k as f64;
-            (slope * t - 0.5 * precision * t * t).exp()
+        let mut density = [0.0; POINTS];
+        pulp::Arch::new().dispatch(|| {
+            for (k, density) in density.iter_mut().enumerate() {
+                let t = lowest + step * k as f64;
+                *density = exp(slope * t - 0.5 * precision * t * t);
+            }
         });
         let trapezoid = |k: usize| 0.5 * (density[k] + density[k + 1]);
         let mut left = 0.5 * (0..POINTS - 1).map(trapezoid).sum::<f64>();
