@@ -190,8 +190,6 @@ impl RowArithmetic {
 
 /// Evaluations that Newton takes from an affine estimate: its error of a hundredth of the stroke is squared each time.
 const NEWTON_EVALUATIONS: usize = 3;
-/// Rounds of expectation propagation in all linearisations of a row.
-const PRIOR_ROUNDS: usize = 30;
 
 fn print_scale(scale: ArrayScale) {
     let model = SensorModel::new(scale);
@@ -260,7 +258,13 @@ fn print_scale(scale: ArrayScale) {
         "newton".into(),
         Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
     ));
-    let posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut answer = vec![0.0; scale.coordinates_per_row()];
+    let mut rounds_of = |row: usize| {
+        let readings = &frame[row * scale.columns()..(row + 1) * scale.columns()];
+        posterior.solve(row, readings, &mut answer).unwrap().rounds
+    };
+    let rounds = rows.iter().map(|&row| rounds_of(row)).sum::<usize>() / rows.len();
     decoders.push((
         "newton with prior, noise 1e-3".into(),
         Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
@@ -332,7 +336,7 @@ fn print_scale(scale: ArrayScale) {
         ("newton", newton(NEWTON_EVALUATIONS)),
         (
             "newton with prior, noise 1e-3",
-            RowArithmetic::of_propagation(scale, PRIOR_ROUNDS),
+            RowArithmetic::of_propagation(scale, rounds),
         ),
     ];
     for (name, arithmetic) in per_row {

@@ -44,6 +44,8 @@ pub(super) struct RoundedReading {
 #[derive(Clone, Debug)]
 pub(super) struct Marginals {
     pub(super) of_unknowns: Vec<Marginal>,
+    /// Number of rounds.
+    pub(super) rounds: usize,
     /// False if the factors still moved after the last round.
     pub(super) converged: bool,
 }
@@ -106,8 +108,9 @@ impl WithSimd for Propagation<'_> {
         let mut equations = equations.clone();
         sites.iter().for_each(|site| site.append_to(&mut equations, n));
         let mut gaussian = Gaussian::new(&equations, linear)?;
-        let mut converged = false;
+        let (mut converged, mut rounds) = (false, 0);
         for round in 0..ROUNDS {
+            rounds += 1;
             let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
             let mut largest = 0.0;
             for (place, site) in sites.iter_mut().enumerate() {
@@ -136,6 +139,7 @@ impl WithSimd for Propagation<'_> {
         }
         Some(Marginals {
             of_unknowns: sites[..n].iter().map(Site::marginal).collect(),
+            rounds,
             converged,
         })
     }

@@ -28,7 +28,7 @@ impl Posterior {
     ) -> PosteriorReport {
         self.problem.read(row, readings_ohm);
         let (mut variance, mut determined) = (f64::NAN, false);
-        let (mut converged, mut steps) = (false, 0);
+        let (mut converged, mut steps, mut rounds) = (false, 0, 0);
         let mut at = Point {
             drift: 0.0,
             displacements_mm: first,
@@ -65,6 +65,7 @@ impl Posterior {
             let largest = moved
                 .map(|((at, mean), width)| (mean - at).abs() / width)
                 .fold(0.0, f64::max);
+            rounds += found.marginals.rounds;
             let marginals = &found.marginals.of_unknowns;
             let squares = marginals
                 .iter()
@@ -97,6 +98,7 @@ impl Posterior {
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {
             steps,
+            rounds,
             residual,
             spread_mm: variance.sqrt(),
             determined,
