@@ -9,6 +9,7 @@ mod geometry;
 mod identifiability;
 mod partial_sum;
 mod reciprocal_distances;
+mod reciprocal_root;
 mod resistance;
 mod short_number;
 
