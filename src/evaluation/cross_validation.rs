@@ -204,13 +204,13 @@ fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
 }
 
 /// Returns the `n`th seed derived from `seed`.
-fn nth_seed(seed: Seed, n: usize) -> Seed {
+pub(super) fn nth_seed(seed: Seed, n: usize) -> Seed {
     let mut seeds = seed.rng(Stream::Folds).random_iter();
     Seed(seeds.nth(n).expect("a generator never ends"))
 }
 
 /// Copies the rows of `answers` to the rows `samples` of `pooled`.
-fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
+pub(super) fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
     for (&sample, answer) in samples.iter().zip(answers.axis_iter(Axis(0))) {
         pooled.row_mut(sample).assign(&answer);
     }
