@@ -14,7 +14,8 @@ pub struct Division {
     pub by: SplitBy,
     /// Share of the samples for the test, above 0 and below 1.
     pub test_fraction: f64,
-    /// Share of the other samples that is held out for validation, from 0 to below 1. With 0, nothing is held out.
+    /// Share of the other samples that is held out for validation, from 0 to below 1. With 0, nothing is held out; see
+    /// [`RunSettings::validation_fraction`](crate::evaluation::RunSettings::validation_fraction).
     pub validation_fraction: f64,
 }
 
@@ -54,12 +55,13 @@ pub enum DivisionError {
 }
 
 impl Default for Division {
-    /// Returns the division in time: the last fifth for the test, and the last fifth of the rest for validation.
+    /// Returns the division in time: the last fifth for the test, and nothing held out for validation, since the default
+    /// method of measured runs needs none.
     fn default() -> Self {
         Self {
             by: SplitBy::Time,
             test_fraction: 0.2,
-            validation_fraction: 0.2,
+            validation_fraction: 0.0,
         }
     }
 }
@@ -177,7 +179,8 @@ mod tests {
     fn divide(set: &Dataset, by: SplitBy, seed: u64) -> Result<Parts, DivisionError> {
         let division = Division {
             by,
-            ..Division::default()
+            test_fraction: 0.2,
+            validation_fraction: 0.2,
         };
         division.divide(set, &mut Seed(seed).rng(Stream::Split))
     }
@@ -250,16 +253,16 @@ mod tests {
     fn a_given_test_set_leaves_the_rest_for_training_and_validation() {
         let set = set((0..50).collect());
         let rng = &mut Seed(0).rng(Stream::Split);
-        let parts = Division::default().divide_for_training(&set, rng).unwrap();
+        let a_fifth_held_out = Division {
+            validation_fraction: 0.2,
+            ..Division::default()
+        };
+        let parts = a_fifth_held_out.divide_for_training(&set, rng).unwrap();
         assert_eq!(
             (parts.training.len(), parts.validation.len(), parts.test.len()),
             (40, 10, 0)
         );
-        let nothing_held_out = Division {
-            validation_fraction: 0.0,
-            ..Division::default()
-        };
-        let parts = nothing_held_out.divide_for_training(&set, rng).unwrap();
+        let parts = Division::default().divide_for_training(&set, rng).unwrap();
         assert_eq!(parts.split(&set).validation, None);
     }
 

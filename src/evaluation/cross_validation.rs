@@ -16,7 +16,8 @@ use crate::{
 /// A k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] takes other folds.
 ///
 /// Each fold in turn is the test set and the fold after it the validation set, which selects the best weights and ends
-/// the training; the others are the training set. With two folds there is no validation set.
+/// the training; the others are the training set. With two folds there is no validation set, nor for measured samples
+/// where the method [needs none](crate::training::Method::needs_validation).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CrossValidation {
@@ -52,6 +53,8 @@ pub struct CrossValidated {
     pub linear: Array2<f64>,
     /// Name of the linear maps in tables.
     linear_name: &'static str,
+    /// The fold after the test fold is held out for validation.
+    holds_out: bool,
     /// Epochs and time of the trainings.
     pub effort: Effort,
 }
@@ -98,12 +101,14 @@ impl CrossValidated {
         folds: Folds,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
+        let is_measured = settings.source.simulation().is_none();
+        let holds_out = !is_measured || settings.training.method.needs_validation();
         let mut effort = Effort::default();
         let empty = || Array2::zeros(set.targets().dim());
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
         for fold in 0..folds.count() {
             let (samples, test) = (folds.test(fold), set.select(folds.test(fold)));
-            let split = split(set, &folds, fold);
+            let split = split(set, &folds, fold, holds_out);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
             scatter(&mut mean, samples, &decode_set(&mut of_mean, &test)?);
             scatter(&mut linear, samples, &decode_set(&mut of_linear, &test)?);
@@ -124,13 +129,14 @@ impl CrossValidated {
             mean,
             linear,
             linear_name: linear_name(&settings.source),
+            holds_out,
             effort,
         }))
     }
 
     /// Returns the training samples for test fold `fold` of `set`, the set that was cross-validated.
     pub(super) fn training(&self, set: &Dataset, fold: usize) -> Dataset {
-        split(set, &self.folds, fold).training
+        split(set, &self.folds, fold, self.holds_out).training
     }
 
     /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.
@@ -188,10 +194,11 @@ impl Effort {
     }
 }
 
-/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set.
-fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
+/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is held
+/// out.
+fn split(set: &Dataset, folds: &Folds, fold: usize, holds_out: bool) -> Split {
     let chooses = (fold + 1) % folds.count();
-    if folds.count() < 3 {
+    if folds.count() < 3 || !holds_out {
         return Split {
             training: set.select(&folds.without(&[fold])),
             validation: None,

@@ -186,7 +186,7 @@ mod tests {
         }
         let (set, answers) = recording(12, 0.0, 0.9, 6);
         let few = set.select(&[0, 1, 2, 3, 4]);
-        let sentence = measure(&few, &answers.slice_move(ndarray::s![..5, ..]), SplitBy::Time)
+        let sentence = measure(&few, &answers.select(ndarray::Axis(0), &[0, 1, 2, 3, 4]), SplitBy::Time)
             .unwrap()
             .sentence("y");
         assert!(sentence.contains("from only 5 independent"), "{sentence}");

@@ -39,6 +39,9 @@ impl fmt::Display for Interval {
     /// Writes `0.04 ± 0.03`, with decimals as given, or two.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(2);
-        write!(f, "{:.digits$} ± {:.digits$}", self.value, self.half_width())
+        // No -0.00.
+        let places = 10.0_f64.powi(digits as i32);
+        let value = (self.value * places).round() / places + 0.0;
+        write!(f, "{value:.digits$} ± {:.digits$}", self.half_width())
     }
 }

@@ -46,17 +46,18 @@ struct Fitted {
 impl LearningCurve {
     /// Fits at each number of samples below all.
     pub const REPEATS: usize = 4;
-    /// Halvings of the number of samples.
-    const HALVINGS: u32 = 5;
+    /// Numbers of samples, each the larger by √2, up to all. Below an eighth of a recording, stretches miss whole regions
+    /// of what is sensed, and errors follow no law that could be extended.
+    const LEVELS: i32 = 7;
     /// Fewest training samples of a fit.
     const FEWEST: usize = 8;
     /// Part of the error that twice the samples must save to be called a gain.
     const WORTH_SAYING: f64 = 0.01;
 
-    /// Fits `model` to all training samples of `parts`, to half of them, and so on down to 1/32, and measures the test
-    /// samples, target by target; `None` if cancelled. Parts of the training set are stretches of the recording, whole
+    /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
+    /// test samples, target by target; `None` if cancelled. Parts of the training set are stretches of the recording, whole
     /// groups or single samples as `by` says, so that twice as many samples mean twice as long a recording, or twice as
-    /// many groups. Takes up to 24 fits.
+    /// many groups. Takes up to 28 fits.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -70,13 +71,14 @@ impl LearningCurve {
         let (whole, test) = (parts.split(set), parts.test_set(set));
         let mut rng = settings.seed.rng(Stream::Resampling);
         let mut fits = Vec::new();
-        for halvings in (0..=Self::HALVINGS).rev() {
-            let wanted = whole.training.samples() >> halvings;
+        for level in (0..Self::LEVELS).rev() {
+            let share = std::f64::consts::FRAC_1_SQRT_2.powi(level);
+            let wanted = (share * whole.training.samples() as f64).round() as usize;
             if wanted < Self::FEWEST {
                 continue;
             }
             // The network's start varies where its samples do not.
-            let repeats = if halvings == 0 && model == FittedModel::Ridge {
+            let repeats = if level == 0 && model == FittedModel::Ridge {
                 1
             } else {
                 Self::REPEATS
@@ -174,7 +176,7 @@ impl LearningCurve {
 /// Numbers of samples of one level: whole groups cannot be halved exactly.
 fn near(one: usize, other: usize) -> bool {
     let ratio = one as f64 / other as f64;
-    (0.71..1.41).contains(&ratio)
+    (0.85..1.18).contains(&ratio)
 }
 
 fn point(level: &[Fitted], rmse: impl Fn(&Fitted) -> f64) -> LearningPoint {

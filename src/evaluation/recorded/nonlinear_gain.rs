@@ -34,17 +34,21 @@ impl NonlinearGain {
             .collect()
     }
 
-    /// Tells whether the network is better than ridge by more than its interval shows.
+    /// Part of ridge's error that a network must save to be worth its weights.
+    const WORTH_HAVING: f64 = 0.05;
+
+    /// Tells whether the network is better than ridge by at least 5 %, and by more than the interval shows.
     pub fn is_supported(&self) -> bool {
-        self.ratio.high < 1.0
+        self.ratio.high < 1.0 && self.ratio.value <= 1.0 - Self::WORTH_HAVING
     }
 
-    /// A sentence on the target of this name where the network is no better than ridge.
+    /// A sentence on the target of this name where the network is no better than ridge, or hardly.
     pub fn remark(&self, name: &str) -> Option<String> {
         (!self.is_supported()).then(|| {
             let Interval { value, low, high } = self.ratio;
+            let better = if high < 1.0 { "hardly better" } else { "no better" };
             format!(
-                "the network is no better than ridge for {name} (error {value:.2} times ridge's, {low:.2} to {high:.2}): \
+                "the network is {better} than ridge for {name} (error {value:.2} times ridge's, {low:.2} to {high:.2}): \
                  these data do not support more than a linear map; give more samples, or take ridge"
             )
         })

@@ -12,7 +12,8 @@ pub struct PowerLaw {
 
 impl PowerLaw {
     /// Fits the law to errors at numbers of samples, in proportion to the errors; `None` with fewer than three different
-    /// numbers or without errors above 0.
+    /// numbers or without errors above 0. Points weigh in proportion to their samples, as the law is to be extended from
+    /// the largest number on.
     ///
     /// For each exponent of a grid, floor and scale are those of least squares that are not negative.
     pub(super) fn fit(points: &[(f64, f64)]) -> Option<Self> {
@@ -33,7 +34,7 @@ impl PowerLaw {
         // Weighted sums of 1·1, 1·x, x·x, 1·y and x·y, with x = n^(−exponent).
         let mut sums = [0.0; 5];
         for (number, error) in points {
-            let (x, weight) = (number.powf(-exponent), 1.0 / (error * error));
+            let (x, weight) = (number.powf(-exponent), number / (error * error));
             let terms = [1.0, x, x * x, *error, x * error];
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += weight * term);
         }
@@ -48,7 +49,7 @@ impl PowerLaw {
             let law = Self { floor, scale, exponent };
             let misses = points
                 .iter()
-                .map(|(number, error)| (law.at(*number) / error - 1.0).powi(2));
+                .map(|(number, error)| number * (law.at(*number) / error - 1.0).powi(2));
             (law, misses.sum::<f64>())
         });
         let best = judged.min_by(|(_, one), (_, other)| one.total_cmp(other));

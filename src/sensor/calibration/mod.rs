@@ -9,6 +9,8 @@ mod error;
 mod levenberg_marquardt;
 mod parameter;
 mod report;
+#[cfg(test)]
+mod tests;
 
 pub use error::CalibrationError;
 pub use parameter::SensorParameter;
