@@ -78,7 +78,9 @@ pub(super) fn rmse_ratio(
         .map(|(ours, theirs)| ours - ratio * theirs)
         .collect();
     let resampling = Resampling::of(set, by, [&influence[..]]);
-    if resampling.count() < 2 || !(ratio > 0.0) {
+    // NaN if neither has errors.
+    let is_positive = ratio > 0.0;
+    if resampling.count() < 2 || !is_positive {
         return None;
     }
     let sums = resampling.sums(|sample| [ours[sample], theirs[sample]]);

@@ -13,14 +13,21 @@ pub(super) struct Resampling {
 impl Resampling {
     /// Number of replicates.
     const REPLICATES: usize = 1000;
+    /// Most units: more would take long to draw and change no interval. Neighbours are joined to fewer.
+    const MOST_UNITS: usize = 2000;
 
     /// Units of `set`: its groups where it is split by group, otherwise blocks long enough for the autocorrelation of
     /// each of `series`, values of the samples in the order of the recording.
     pub(super) fn of<'a>(set: &Dataset, by: SplitBy, series: impl IntoIterator<Item = &'a [f64]>) -> Self {
         let units = match by {
-            SplitBy::Group => set.snapshots(),
+            SplitBy::Group => {
+                let groups = set.snapshots();
+                let joined = groups.len().div_ceil(Self::MOST_UNITS);
+                groups.chunks(joined.max(1)).map(<[Vec<usize>]>::concat).collect()
+            }
             SplitBy::Time | SplitBy::Random => {
                 let length = series.into_iter().map(block_length).max().unwrap_or(1);
+                let length = length.max(set.samples().div_ceil(Self::MOST_UNITS));
                 let samples: Vec<usize> = (0..set.samples()).collect();
                 samples.chunks(length).map(<[usize]>::to_vec).collect()
             }

@@ -89,8 +89,10 @@ impl Calibration {
                 .iter()
                 .enumerate()
                 .max_by(|(_, one), (_, other)| one.total_cmp(other));
-            if let Some((index, variance)) = least_known
-                && !(factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE)
+            // False for NaN.
+            let is_told = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
+            if let Some((index, &variance)) = least_known
+                && !is_told(variance)
             {
                 free.remove(index);
                 continue;
