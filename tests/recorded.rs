@@ -6,7 +6,9 @@ use decoupler::{
     dataset::{Dataset, Division, Folds, Parts, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidated, Measured, RunSettings,
-        recorded::{FittedModel, LearningCurve, NonlinearGain, SplitComparison, channel_importance},
+        recorded::{
+            Doubling, FittedModel, Interval, LearningCurve, NonlinearGain, SplitComparison, channel_importance,
+        },
     },
     scene::RowModel,
 };
@@ -121,19 +123,31 @@ fn a_learning_curve_foretells_the_error_with_twice_the_samples() {
     };
     let theory = |samples: f64| 3.0 * (1.0 + 20.0 / (samples - 21.0)).sqrt();
     for by in [SplitBy::Time, SplitBy::Random, SplitBy::Group] {
-        let few = curve(80, by);
-        let expected = theory(160.0) / theory(80.0);
-        let ratio = few.doubling.unwrap().ratio;
-        assert!(
-            ratio.low < expected && expected < ratio.high,
-            "{by}: {ratio:?}, {expected}"
-        );
-        assert!(few.gains(), "{by}: {ratio:?}");
-        assert!(
-            few.sentence("y")
-                .starts_with("twice the samples would lower the error of y by about ")
-        );
+        for samples in [60, 80, 120] {
+            let n = samples as f64;
+            let expected = theory(2.0 * n) / theory(n);
+            let ratio = curve(samples, by).doubling.unwrap().ratio;
+            assert!(
+                ratio.low < expected && expected < ratio.high,
+                "{by}, {samples}: {ratio:?}, {expected}"
+            );
+            assert!(ratio.value < 0.99, "{by}, {samples}: {ratio:?}");
+        }
     }
+    let ratio = Interval {
+        value: 0.9,
+        low: 0.85,
+        high: 0.95,
+    };
+    let few = LearningCurve {
+        doubling: Some(Doubling { ratio }),
+        ..curve(80, SplitBy::Time)
+    };
+    assert!(few.gains());
+    assert_eq!(
+        few.sentence("y"),
+        "twice the samples would lower the error of y by about 10 % (5 to 15 %)"
+    );
     let many = curve(2000, SplitBy::Time);
     assert!(!many.gains(), "{:?}", many.doubling);
     assert!(

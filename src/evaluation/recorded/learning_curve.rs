@@ -32,7 +32,8 @@ pub struct LearningPoint {
 /// Error with twice the training samples in proportion to that with all there are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doubling {
-    /// Proportion with its interval: below 1 where more samples would help.
+    /// Proportion with its interval: below 1 where more samples would help. The median over bootstrap samples of the test
+    /// set and of the fits, and over laws fitted from each number of samples on, since none holds down to the smallest.
     pub ratio: Interval,
 }
 
@@ -111,7 +112,7 @@ impl LearningCurve {
         let rmse = |fit: &Fitted| fit.squares.column(target).mean().unwrap_or(0.0).sqrt();
         let points: Vec<LearningPoint> = levels.iter().map(|level| point(level, rmse)).collect();
         let law = law_of(&points);
-        let doubling = law.zip(points.last()).and_then(|(law, all)| {
+        let doubling = law.and(points.last()).and_then(|all| {
             let whole = all.samples as f64;
             let columns: Vec<Vec<f64>> = fits.iter().map(|fit| fit.squares.column(target).to_vec()).collect();
             let resampling = Resampling::of(test, by, columns.last().map(Vec::as_slice));
@@ -123,24 +124,33 @@ impl LearningCurve {
             let mut picks = Seed(rng.random()).rng(Stream::Resampling);
             let mut replicates = Vec::new();
             resampling.draw(rng, |times| {
-                let mut first = 0;
-                let drawn: Vec<(f64, f64)> = levels
-                    .iter()
-                    .map(|level| {
-                        let fits = first..first + level.len();
-                        first = fits.end;
-                        let rmse = |fit: usize| {
-                            let [count, squares] = super::resampling::weighted(&sums[fit], times);
-                            (squares / count).sqrt()
-                        };
-                        let drawn = level.iter().map(|_| rmse(picks.random_range(fits.clone())));
-                        let samples = level.iter().map(|fit| fit.samples as f64).sum::<f64>();
-                        (samples / level.len() as f64, drawn.sum::<f64>() / level.len() as f64)
-                    })
-                    .collect();
-                replicates.push(PowerLaw::fit(&drawn).map_or(f64::NAN, |law| law.doubling(whole)));
+                let rmse = |fit: usize| {
+                    let [count, squares] = super::resampling::weighted(&sums[fit], times);
+                    (squares / count).sqrt()
+                };
+                let (mut drawn, mut before, mut first): (Vec<(f64, f64)>, Vec<f64>, usize) = Default::default();
+                for level in &levels {
+                    let errors: Vec<f64> = (first..first + level.len()).map(rmse).collect();
+                    first += level.len();
+                    let mut pick = |errors: &[f64]| errors[picks.random_range(0..errors.len())];
+                    let picked = errors.iter().map(|_| pick(&errors)).sum::<f64>() / errors.len() as f64;
+                    // A single fit has the luck of its samples, as much as one of the level before.
+                    let luck = if errors.len() == 1 && !before.is_empty() {
+                        pick(&before) * before.len() as f64 / before.iter().sum::<f64>()
+                    } else {
+                        1.0
+                    };
+                    let samples = level.iter().map(|fit| fit.samples as f64).sum::<f64>() / level.len() as f64;
+                    drawn.push((samples, picked * luck));
+                    before = errors;
+                }
+                // A law holds only so far down: how far, no one knows.
+                let lowest = picks.random_range(0..=drawn.len().saturating_sub(3));
+                replicates.push(PowerLaw::fit(&drawn[lowest..]).map_or(f64::NAN, |law| law.doubling(whole)));
             });
-            let ratio = Interval::of_replicates(law.doubling(whole), &replicates)?;
+            let mut finite: Vec<f64> = replicates.iter().copied().filter(|ratio| ratio.is_finite()).collect();
+            finite.sort_by(f64::total_cmp);
+            let ratio = Interval::of_replicates(*finite.get(finite.len() / 2)?, &replicates)?;
             Some(Doubling { ratio })
         });
         Self { points, law, doubling }
