@@ -3,6 +3,7 @@
 
 mod array_scale;
 mod axes;
+mod calibration;
 mod conductance;
 mod fixed_point;
 mod geometry;
@@ -15,6 +16,7 @@ mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
+pub use calibration::{CalibratedParameter, Calibration, CalibrationError, PressedRow, SensorParameter, Standing};
 pub use conductance::RowConductance;
 pub use geometry::{Geometry, GeometryError};
 pub use glam::DVec3;
