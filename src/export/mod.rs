@@ -20,6 +20,8 @@ mod run_folder;
 mod samples;
 mod sealed;
 mod soundness;
+#[cfg(feature = "cli")]
+mod sweep;
 mod tables;
 mod trade_file;
 mod unfinished;
@@ -36,6 +38,8 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
+#[cfg(feature = "cli")]
+pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
 pub use tables::{write_errors, write_loss_curves};
 pub use trade_file::write_trade_off;
 #[cfg(feature = "cli")]
