@@ -67,14 +67,19 @@ fn slurm(command: &str, trials: usize, jobs: usize) -> String {
 # {trials} trials in {jobs} jobs of one thread. Submit with sbatch, with --partition, --time and --mem as your cluster
 # needs. All nodes must see the folder. Submitting it again trains only what is missing.
 
-{command} "$SLURM_ARRAY_TASK_ID/{jobs}" &
-worker=$!
-requeue=no
-waiting=yes
 # SIGTERM comes when Slurm itself requeues, preempts or cancels the job, SIGUSR1 a minute before its time is over. In both
 # cases the training is saved, and the next run resumes it.
-trap 'waiting=yes; kill -TERM "$worker" 2>/dev/null' TERM
-trap 'waiting=yes; requeue=yes; kill -TERM "$worker" 2>/dev/null' USR1
+worker=
+waiting=yes
+requeue=no
+stop() {{
+    waiting=yes
+    [ -z "$worker" ] || kill -TERM "$worker" 2>/dev/null
+}}
+trap stop TERM
+trap 'requeue=yes; stop' USR1
+{command} "$SLURM_ARRAY_TASK_ID/{jobs}" &
+worker=$!
 while [ "$waiting" = yes ]; do
     waiting=no
     wait "$worker"

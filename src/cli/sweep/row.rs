@@ -49,15 +49,7 @@ impl Row {
 
     /// What the table of results is compared by: options and result.
     pub(super) fn compared(&self) -> String {
-        let mut texts = BTreeMap::new();
-        flatten(&self.result, "", &mut |place, value| {
-            texts.insert(place.to_owned(), value.to_string());
-        });
-        let result: Vec<_> = texts
-            .into_iter()
-            .map(|(place, value)| format!("{place}={value}"))
-            .collect();
-        format!("{}\n\n{}", self.key(), result.join("\n"))
+        format!("{}\n{}", self.key(), sorted(&self.result))
     }
 
     /// Order in the table: by the options, in the order of their names; numbers by their size.
@@ -151,6 +143,25 @@ fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value
             }
         }
         _ => {}
+    }
+}
+
+/// JSON with the fields of each object in the order of their names, in which objects need not be held.
+fn sorted(value: &Value) -> String {
+    match value {
+        Value::Object(fields) => {
+            let texts: BTreeMap<_, _> = fields.iter().map(|(name, value)| (name, sorted(value))).collect();
+            let texts: Vec<_> = texts
+                .into_iter()
+                .map(|(name, text)| format!("{name:?}:{text}"))
+                .collect();
+            format!("{{{}}}", texts.join(","))
+        }
+        Value::Array(values) => {
+            let texts: Vec<_> = values.iter().map(sorted).collect();
+            format!("[{}]", texts.join(","))
+        }
+        value => value.to_string(),
     }
 }
 
