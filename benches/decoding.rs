@@ -110,6 +110,87 @@ macro_rules! arithmetic {
     }};
 }
 
+/// Square roots, divisions and products that a decoder cannot avoid in a row.
+#[derive(Clone, Copy)]
+struct RowArithmetic {
+    roots: usize,
+    divisions: usize,
+    products: usize,
+}
+
+impl RowArithmetic {
+    /// Of `evaluations` of Eq. (2) and its derivatives along z, each with its normal equations and their factor.
+    fn of_newton(scale: ArrayScale, evaluations: usize) -> Self {
+        let (nodes, columns) = (scale.nodes_per_row(), scale.columns());
+        let distances = nodes * scale.nodes_per_column() * columns;
+        let equations = (nodes + 1) * (nodes + 2) / 2 * columns;
+        Self {
+            roots: evaluations * distances,
+            divisions: evaluations * distances,
+            products: evaluations * (3 * distances + equations + nodes * nodes * nodes / 6),
+        }
+    }
+
+    /// Of Gaussians around `centres`, each with an exponential of about 16 products.
+    fn of_radial_basis(scale: ArrayScale, centres: usize) -> Self {
+        let (inputs, outputs) = (scale.columns(), scale.nodes_per_row());
+        Self {
+            roots: 0,
+            divisions: inputs,
+            products: inputs * inputs + centres * (inputs + outputs + 16),
+        }
+    }
+
+    /// Of `rounds` of expectation propagation over all nodes: a quadrature of 97 points and two products with the factor
+    /// of the covariance each.
+    fn of_propagation(scale: ArrayScale, rounds: usize) -> Self {
+        let nodes = scale.nodes_per_row();
+        Self {
+            roots: rounds * 2 * nodes,
+            divisions: rounds * 10 * nodes,
+            products: rounds * nodes * (97 * 5 + 2 * nodes * nodes),
+        }
+    }
+
+    /// The work of `rows` rows in plain loops.
+    fn work(self, rows: usize) -> impl FnMut() {
+        struct Loops<'a>(&'a mut [f64], &'a mut [f64], &'a [f64]);
+        impl WithSimd for Loops<'_> {
+            type Output = f64;
+
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _: S) -> f64 {
+                const LANES: usize = 8;
+                for value in self.0 {
+                    *value = (*value + 30.0).sqrt();
+                }
+                for value in self.1 {
+                    *value = 1.0 / *value;
+                }
+                let mut sums = [[0.0; LANES]; 4];
+                for blocks in self.2.as_chunks::<LANES>().0.as_chunks::<4>().0 {
+                    for (sums, block) in sums.iter_mut().zip(blocks) {
+                        for lane in 0..LANES {
+                            sums[lane] += 0.7 * block[lane];
+                        }
+                    }
+                }
+                sums.as_flattened().iter().sum()
+            }
+        }
+        let (mut roots, mut quotients) = (vec![1.0; self.roots], vec![1.5; self.divisions]);
+        let factors = vec![0.01; self.products];
+        move || {
+            for _ in 0..rows {
+                black_box(pulp::Arch::new().dispatch(Loops(&mut roots, &mut quotients, &factors)));
+            }
+        }
+    }
+}
+
+/// Evaluations that Newton takes from an affine estimate: its error of a hundredth of the stroke is squared each time.
+const NEWTON_EVALUATIONS: usize = 3;
+
 fn print_scale(scale: ArrayScale) {
     let model = SensorModel::new(scale);
     let scene = Scene {
@@ -177,7 +258,13 @@ fn print_scale(scale: ArrayScale) {
         "newton".into(),
         Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
     ));
-    let posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut answer = vec![0.0; scale.coordinates_per_row()];
+    let mut rounds_of = |row: usize| {
+        let readings = &frame[row * scale.columns()..(row + 1) * scale.columns()];
+        posterior.solve(row, readings, &mut answer).unwrap().rounds
+    };
+    let rounds = rows.iter().map(|&row| rounds_of(row)).sum::<usize>() / rows.len();
     decoders.push((
         "newton with prior, noise 1e-3".into(),
         Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
@@ -242,6 +329,19 @@ fn print_scale(scale: ArrayScale) {
             black_box(&distances);
         }),
     ));
+    let newton = |evaluations| RowArithmetic::of_newton(scale, evaluations);
+    let per_row = [
+        ("radial basis, 100 centres", RowArithmetic::of_radial_basis(scale, 100)),
+        ("polish, 1 step", newton(2)),
+        ("newton", newton(NEWTON_EVALUATIONS)),
+        (
+            "newton with prior, noise 1e-3",
+            RowArithmetic::of_propagation(scale, rounds),
+        ),
+    ];
+    for (name, arithmetic) in per_row {
+        works.push((format!("arithmetic of {name}"), Box::new(arithmetic.work(m1))));
+    }
     let times = medians_ns(&mut works);
     println!("\n{scale}: {m1} rows a frame");
     println!("{:38} {:>12} {:>12}", "", "ns per row", "us per frame");
@@ -255,6 +355,10 @@ fn print_scale(scale: ArrayScale) {
             of(&format!("network, 12 hidden, conductance, {precision}"))
                 / of(&format!("arithmetic of 12 hidden, {precision}"))
         );
+    }
+    for (name, _) in per_row {
+        let times = of(name) / of(&format!("arithmetic of {name}"));
+        println!("{name}: {times:.1} times its arithmetic");
     }
     println!(
         "forward model: {:.1} times its arithmetic",

@@ -4,7 +4,10 @@
 
 use decoupler::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder, TakagiSugeno},
+    decoupling::{
+        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, RadialBasisNetwork,
+        RadialBasisSettings, TakagiSugeno,
+    },
     live::{
         Diagnosis, FaultCause, FaultMonitor, FaultyWire, Latencies, LeftOutDecoder, LineParser, ParsedLine, Simulated,
     },
@@ -72,6 +75,37 @@ fn a_frame_is_decoded_by_fuzzy_rules_without_allocating() {
     let frame = set.frames().unwrap().frame(0).to_vec();
     let mut coordinates_mm = vec![0.0; 180];
     assert_eq!(allocations(|| decoder.decode(&frame, &mut coordinates_mm).unwrap()), 0);
+}
+
+#[test]
+fn a_frame_is_decoded_by_radial_basis_and_newton_without_allocating() {
+    let model = SensorModel::new("10x6_3x18".parse().unwrap());
+    let scene = Scene {
+        rows: Rows::Known,
+        ..Scene::default()
+    };
+    let mut rng = Seed(0).rng(Stream::Training);
+    let set = Dataset::simulate(&model, &scene, 600, &mut rng).unwrap();
+    let no_noise = NoiseSource::default();
+    let ridge = |set: &Dataset| AffineMap::ridge(set, InputChoice::BEST, no_noise);
+    let first = Box::new(PerRow::fit(&set, RowModel::Each, ridge).unwrap());
+    let rows: Vec<usize> = (0..10).collect();
+    let mut polished = PolishedDecoder::new(first, &model, &scene, &rows, 1, &mut rng).unwrap();
+    let mut newton = NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap();
+    let basis = |set: &Dataset| {
+        let settings = RadialBasisSettings::default();
+        RadialBasisNetwork::fit(set, InputChoice::BEST, no_noise, settings, &mut rng)
+    };
+    let mut basis = PerRow::fit(&set, RowModel::Each, basis).unwrap();
+    let mut coordinates_mm = vec![0.0; 180];
+    let frames = set.frames().unwrap();
+    let decoders: [&mut dyn Decoder; 3] = [&mut polished, &mut newton, &mut basis];
+    for decoder in decoders {
+        // The first frame shows which rows there are.
+        decoder.decode(frames.frame(0), &mut coordinates_mm).unwrap();
+        let allocated = allocations(|| decoder.decode(frames.frame(1), &mut coordinates_mm).unwrap());
+        assert_eq!(allocated, 0);
+    }
 }
 
 #[test]

@@ -110,6 +110,54 @@ fn contour_lines_of_a_slope_lie_where_it_has_their_heights() {
     assert!(seen[1..].iter().all(|ends| *ends > 20), "{seen:?}");
 }
 
+/// A slope leaves the axes, which have room for 3.92 to 5.08 mm, in the margin on both sides: at x = (level − 4.05) / 0.32.
+#[test]
+fn a_steep_surface_ends_along_the_ends_of_the_axis() {
+    let slope = |mode| Surface {
+        mode,
+        ..surface("", Quantity::Height, |x, _| 4.05 + 0.32 * x)
+    };
+    let [low, high] = [3.92, 5.08].map(|level| (level - 4.05) / 0.32);
+    let drawing = lay_out(&slope(ViewMode::Top), OrbitCamera::default());
+    let x_at = |node: usize| drawing.dots.position(node).unwrap().x;
+    let points_per_mm = f64::from(x_at(15) - x_at(0)) / 3.0;
+    let mut area = 0.0;
+    let (mut left, mut right) = (f64::MAX, f64::MIN);
+    for cell in drawing.mesh.strips().flat_map(|(cells, _)| cells) {
+        let corners = drawing
+            .mesh
+            .corners(*cell)
+            .map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
+        for corner in corners {
+            let x_mm = (corner.x - f64::from(x_at(0))) / points_per_mm;
+            (left, right) = (left.min(x_mm), right.max(x_mm));
+        }
+        let [a, b, c, d] = corners;
+        area += 0.5 * ((b - a).perp_dot(c - a) + (c - a).perp_dot(d - a)).abs();
+    }
+    assert!(
+        (left - low).abs() < 1e-3 && (right - high).abs() < 1e-3,
+        "{left} {right}"
+    );
+    // Along y the margin is half a pitch on both sides of the five nodes.
+    let expected = (high - low) * 5.0;
+    assert!((area / points_per_mm.powi(2) / expected - 1.0).abs() < 1e-3, "{area}");
+
+    // In space the same edges lie on the ceiling and on the floor of the box.
+    let drawing = lay_out(&slope(ViewMode::ThreeD), OrbitCamera::default());
+    for (x_mm, z_mm) in [(low, 3.92), (high, 5.08)] {
+        for y_mm in [0.3, 2.0, 3.7] {
+            let edge = drawing.sight.point(DVec3::new(x_mm, y_mm, z_mm));
+            let nearest = drawing
+                .mesh
+                .vertices
+                .iter()
+                .map(|vertex| vertex.at.as_dvec2().distance(edge));
+            assert!(nearest.fold(f64::MAX, f64::min) < 3.0, "the surface reaches {edge}");
+        }
+    }
+}
+
 #[test]
 fn from_above_x_runs_to_the_right_and_y_upwards_at_one_scale() {
     let drawing = lay_out(&from_above(dent("")), OrbitCamera::default());

@@ -1,9 +1,10 @@
 """Live decoding over a pseudo-terminal pair, at normal priority.
 
-Usage: follow.py PROGRAM [SECONDS], where PROGRAM is the release build; SECONDS is how long frames come at a steady rate, 600
-unless given. Trains the network of the 10x10_5x30 array with 12 hidden nodes, sends whole frames (300 resistances a line), and
-prints Markdown tables: a steady 1000 frames a second, the same with garbage in every tenth line, and as many as the
-terminal carries, also with a reader of the answers that is slower than the program.
+Usage: follow.py PROGRAM [SECONDS [ROWS]], where PROGRAM is the release build; SECONDS is how long lines come at a steady rate,
+600 unless given; ROWS is the number of row-wires in a line: 10, a whole frame of 300 resistances, unless 1 is given. Trains the
+network of the 10x10_5x30 array with 12 hidden nodes and prints Markdown tables: a steady 1000 lines a second, the same with
+garbage in every tenth line, and as many as the terminal carries, also with a reader of the answers that is slower than the
+program.
 """
 
 import os
@@ -19,6 +20,7 @@ import tty
 
 PROGRAM = pathlib.Path(sys.argv[1]).resolve()
 SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 600.0
+ROWS = int(sys.argv[3]) if len(sys.argv) > 3 else 10
 RATE = 1000
 
 
@@ -131,12 +133,12 @@ with tempfile.TemporaryDirectory() as home:
     rows = [line.split(",") for line in readings.read_text().splitlines()]
     columns = [rows[0].index(f"r_{k}") for k in range(1, 31)]
     values = [[f"{float(row[column]):.6f}" for column in columns] for row in rows[1:]]
-    frames = [sum(values[frame : frame + 10], []) for frame in range(0, len(values), 10)]
+    frames = [sum(values[row : row + ROWS], []) for row in range(0, len(values), ROWS)]
     lines = [(",".join(frame) + "\n").encode() for frame in frames]
-    print("| frames | seconds | sent | bad | answered | lost | resident memory, KiB |\n|---|---|---|---|---|---|---|")
+    print("| lines | seconds | sent | bad | answered | lost | resident memory, KiB |\n|---|---|---|---|---|---|---|")
     steady(network, lines, SECONDS, garbage=False)
     steady(network, lines, min(SECONDS, 60.0), garbage=True)
-    print("\n| frames | seconds | sent | sent a second | answered a second | longest gap, ms | one after it, ms | resident memory, KiB |")
+    print("\n| lines | seconds | sent | sent a second | answered a second | longest gap, ms | one after it, ms | resident memory, KiB |")
     print("|---|---|---|---|---|---|---|---|")
     flood(network, lines, min(SECONDS, 30.0), None)
     flood(network, lines, min(SECONDS, 30.0), 2000)

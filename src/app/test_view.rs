@@ -104,9 +104,13 @@ impl TestView {
         Frame { nodes_mm, grid_mm }
     }
 
-    /// Drops of the readings below those at rest, in percent: rows read × M4; `None` where the sensor has none at rest.
+    /// Drops of the readings below those at rest, in percent: rows read × M4; `None` where the sensor has none at rest, or
+    /// these are not of all rows.
     pub fn drops_percent(&self, readings_ohm: &Array2<f64>) -> Option<Array2<f64>> {
         let unloaded_ohm = self.unloaded_ohm.as_deref()?;
+        if readings_ohm.dim() != unloaded_ohm.dim() {
+            return None;
+        }
         let ratios = Zip::from(readings_ohm).and(unloaded_ohm);
         Some(ratios.map_collect(|reading, unloaded| 100.0 * (1.0 - reading / unloaded)))
     }

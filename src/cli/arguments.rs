@@ -1,5 +1,4 @@
 use std::{
-    borrow::Cow,
     error::Error,
     ffi::OsString,
     io::{Write, stderr},
@@ -9,8 +8,8 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate,
-    trade::Trade, train::Train,
+    decode::Decode, export::Export, failure::Failure, interruption, parse_error::one_line, reproduce::Reproduce,
+    simulate::Simulate, sweep::Sweep, trade::Trade, train::Train,
 };
 use crate::export::exit_leaving_nothing;
 
@@ -35,6 +34,7 @@ enum Command {
     Simulate(Box<Simulate>),
     Reproduce(Reproduce),
     Trade(Box<Trade>),
+    Sweep(Sweep),
 }
 
 /// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command
@@ -55,6 +55,7 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
                 Failure::Interrupted(_)
                 | Failure::InterruptedTrials { .. }
                 | Failure::InterruptedTrade { .. }
+                | Failure::InterruptedSweep { .. }
                 | Failure::InterruptedFollow => {
                     writeln!(stderr(), "{failure}")
                 }
@@ -78,6 +79,7 @@ impl Arguments {
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),
+            Some(Command::Sweep(sweep)) => sweep.run(),
             None => {
                 window.ok_or(Failure::NoWindow)?().map_err(Failure::Window)?;
                 // A file that took too long to be written is not left half-written.
@@ -85,33 +87,6 @@ impl Arguments {
             }
         }
     }
-}
-
-/// The parser's message in one line, without its usage text.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.render().to_string();
-    let paragraphs = text.split("\n\n").map(|paragraph| {
-        let lines: Vec<_> = paragraph.lines().map(str::trim).collect();
-        lines.join(" ")
-    });
-    let said = paragraphs.filter(|paragraph| {
-        let aside = ["Usage:", "For more information"];
-        !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
-    });
-    let line = said.collect::<Vec<_>>().join("; ");
-    let line = line.strip_prefix("error: ").unwrap_or(&line);
-    line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
-}
-
-/// A word as given, unless it is too long to be read.
-fn shortened(word: &str) -> Cow<'_, str> {
-    const LONGEST: usize = 200;
-    const BEGINNING: usize = 40;
-    if word.chars().count() <= LONGEST {
-        return Cow::Borrowed(word);
-    }
-    let beginning: String = word.chars().take(BEGINNING).collect();
-    Cow::Owned(format!("{beginning}…"))
 }
 
 #[cfg(test)]

@@ -67,6 +67,16 @@ impl CheckpointArguments {
 }
 
 impl Checkpointing {
+    /// Saves in `path` every `interval`, for the first time after one.
+    pub(super) fn every(interval: Duration, path: PathBuf) -> Self {
+        Self {
+            path,
+            interval,
+            next: Instant::now() + interval,
+            has_warned: false,
+        }
+    }
+
     /// Saves `run` if it is due. A failure is reported once and the next attempt is made as usual: training goes on.
     pub(super) fn save_if_due(&mut self, run: &Run) {
         let begun = Instant::now();

@@ -7,7 +7,7 @@ use std::{
 
 use thiserror::Error;
 
-use super::interruption;
+use super::{interruption, specification_error::SpecificationError};
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
@@ -53,6 +53,21 @@ pub(super) enum Failure {
     InterruptedTrade { done: usize },
     #[error("interrupted")]
     InterruptedFollow,
+    #[error(transparent)]
+    Specification(#[from] SpecificationError),
+    #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
+    InterruptedSweep { done: usize, trials: usize, status: u8 },
+    #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
+    FailedTrials { failed: usize, trials: usize },
+    #[error("no sweep in '{}': give a folder that decoupler sweep has filled", .0.display())]
+    NoSweep(PathBuf),
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
+    IncompleteSweep {
+        missing: usize,
+        conflicting: usize,
+        unreadable: usize,
+        out: PathBuf,
+    },
     #[error(transparent)]
     Source(SourceError),
     #[error("cannot start to read: {}", system_cause(.0))]
@@ -134,6 +149,9 @@ impl Failure {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
+            Self::Specification(SpecificationError::Read { .. }) => 1,
+            Self::Specification(_) => 2,
+            Self::InterruptedSweep { status, .. } => *status,
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_)

@@ -1,4 +1,5 @@
-//! The work in a terminal: `decoupler train`, `decode`, `export`, `simulate`, `reproduce` and `trade`.
+//! The work in a terminal: `decoupler train`, `decode`, `export`, `simulate`, `reproduce`, `trade` and
+//! `sweep`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
@@ -17,13 +18,17 @@ mod follow_report;
 mod interruption;
 mod output;
 mod outside_training;
+mod parse_error;
 mod parsers;
 mod reproduce;
 mod reproduce_report;
 mod same_file;
 mod scene_arguments;
+mod shell;
 mod simulate;
+mod specification_error;
 mod spread_plot;
+mod sweep;
 mod trade;
 mod trade_report;
 mod train;

@@ -11,12 +11,14 @@ use super::{
     checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     interruption::Graceful,
-    output::progress_bar,
+    output::{print_object, progress_bar},
     same_file::is_same,
-    train_report::{print_json, print_text},
+    shell::quoted,
+    train_report::{print_text, report},
     training_arguments::TrainingArguments,
 };
 use crate::{
+    decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
     export::{CheckpointFile, NetworkFile, check_writable, format_number, report::RunReport},
 };
@@ -64,7 +66,7 @@ impl Train {
         let mut decoders = Vec::new();
         let measured = match end {
             Err(Failure::Interrupted(_)) => Ok(()),
-            _ => self.measure_decoders(&file, &run, &mut decoders),
+            _ => measure_decoders(&self.training.scene.decoders(), &file, &run, &mut decoders),
         };
         let flaw = run.flaw();
         let reported = self.report.as_ref().map_or(Ok(()), |path| {
@@ -77,7 +79,7 @@ impl Train {
             report.save(path)
         });
         if self.json {
-            print_json(&file, flaw.as_ref(), &decoders)?;
+            print_object(&report(&file, flaw.as_ref(), &decoders)?)?;
         } else {
             print_text(&file, flaw.as_ref(), &decoders)?;
         }
@@ -111,21 +113,6 @@ impl Train {
             }
         }
         files.iter().try_for_each(|(_, path)| Ok(check_writable(path)?))
-    }
-
-    fn measure_decoders(
-        &self,
-        file: &NetworkFile,
-        run: &Run,
-        reports: &mut Vec<DecoderReport>,
-    ) -> Result<(), RunError> {
-        let set = DecoderSet::new(&file.settings, Some(file.network.clone()))?;
-        for kind in self.training.scene.decoders() {
-            for &precision in kind.precisions() {
-                reports.extend(set.measure(kind, precision, run.test())?);
-            }
-        }
-        Ok(())
     }
 
     fn resume(&self, path: &Path) -> Result<Run, Failure> {
@@ -207,6 +194,22 @@ impl Train {
     }
 }
 
+/// Measures decoders of these kinds on the test samples of `run`, whose network is in `file`.
+pub(super) fn measure_decoders(
+    kinds: &[DecoderKind],
+    file: &NetworkFile,
+    run: &Run,
+    reports: &mut Vec<DecoderReport>,
+) -> Result<(), RunError> {
+    let set = DecoderSet::new(&file.settings, Some(file.network.clone()))?;
+    for kind in kinds {
+        for &precision in kind.precisions() {
+            reports.extend(set.measure(*kind, precision, run.test())?);
+        }
+    }
+    Ok(())
+}
+
 /// Largest epoch among the starts.
 fn furthest(run: &Run) -> usize {
     let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
@@ -222,32 +225,4 @@ fn show(run: &Run, bar: &ProgressBar) {
         starts => format!(", {} of {starts} starts ended", ended.count()),
     };
     bar.set_message(format!("mse {mse}{starts}"));
-}
-
-/// Quotes a path for a POSIX shell.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text;
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_quoted_as_a_shell_needs_it() {
-        let cases = [
-            ("run.checkpoint", "run.checkpoint"),
-            ("my runs/a.json", "'my runs/a.json'"),
-            ("it's", r"'it'\''s'"),
-            ("$HOME", "'$HOME'"),
-        ];
-        for (path, expected) in cases {
-            assert_eq!(quoted(Path::new(path)), expected);
-        }
-    }
 }

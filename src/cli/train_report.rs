@@ -6,11 +6,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::{
-    failure::Failure,
-    output::{print, print_object},
-    spread_plot::write_starts,
-};
+use super::{failure::Failure, output::print, spread_plot::write_starts};
 use crate::{
     evaluation::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
@@ -101,18 +97,18 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
     training.seconds / epochs(training).max(1) as f64
 }
 
-/// Prints one JSON object.
-pub(super) fn print_json(
-    file: &NetworkFile,
+/// Returns the object printed by `train --json`.
+pub(super) fn report<'a>(
+    file: &'a NetworkFile,
     flaw: Option<&RunFlaw>,
     decoders: &[DecoderReport],
-) -> Result<(), Failure> {
+) -> Result<impl Serialize + use<'a>, Failure> {
     let (settings, training) = (&file.settings, &file.training);
     let best = training.history.get(training.best_epoch);
     let size = settings.source.model_size().map_err(RunError::from)?;
     let outlook = Outlook::of(&settings.source).ok();
     let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
-    let report = Report {
+    Ok(Report {
         array: settings.source.sensor.scale,
         hidden: settings.hidden,
         method: settings.training.method.short_name(),
@@ -158,8 +154,7 @@ pub(super) fn print_json(
             z_percent: errors.z_percent,
             z_mm: errors.z_mm,
         }),
-    };
-    print_object(&report)
+    })
 }
 
 fn decoder(report: &DecoderReport) -> Decoder {

@@ -34,6 +34,8 @@ pub enum Stream {
     Live = 8,
     /// Noise of the simulated live source.
     LiveNoise = 9,
+    /// Bootstrap samples, and parts of a training set.
+    Resampling = 20,
 }
 
 /// Stream of the random initialisations after the first: this number plus the number of the initialisation.

@@ -17,6 +17,7 @@
 //! how well an answer explains the readings, without ground truth.
 
 mod affine_map;
+mod affine_start;
 mod clusters;
 mod compiled;
 mod decoder;
@@ -30,11 +31,14 @@ mod linear_fit;
 mod newton;
 mod newton_report;
 mod newton_starts;
+mod normal_equations;
+mod plain_newton;
 mod posterior;
 mod radial_basis;
 mod residual;
 mod ridge;
 mod row_problem;
+mod side_by_side;
 mod solved_rows;
 mod takagi_sugeno;
 mod training_mean;

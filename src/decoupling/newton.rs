@@ -1,9 +1,11 @@
 use super::{
     DecodeError,
     gauss_newton::Linearised,
-    newton_report::{LARGEST_ERROR, NewtonReport, NewtonRules, NewtonStop, Solution},
+    newton_report::{NewtonReport, NewtonRules, NewtonStop, ROUNDING, Solution},
     newton_starts::Starts,
+    plain_newton::{PlainNewton, SHORTEST_SHARE},
     row_problem::{Range, RowProblem, ranges, wide_ranges},
+    side_by_side::LANES,
     twins::Twins,
 };
 use crate::{scene::Scene, sensor::SensorModel};
@@ -11,15 +13,16 @@ use crate::{scene::Scene, sensor::SensorModel};
 /// Gauss-Newton method with Levenberg's damping and bounds for Eq. (2) of one known row-wire. The unknowns are only
 /// what the scene moves.
 ///
-/// Plain steps are tried first. If they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that
+/// Plain steps are tried first, which solve nearly all rows. If they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that
 /// are not held at a bound, and is cut off at the bounds. μ is 0 until a step fails to lower the misfit; then it grows
 /// tenfold, and shrinks again after steps that succeed.
 ///
 /// The misfit has minima that are no solutions. An answer counts as the [solution](Solution) only if what is left of
-/// the misfit, or the rounding of readings and model where that is more, cannot hide a distance of [`LARGEST_ERROR`];
-/// else other starts are tried.
+/// the misfit, or the rounding of readings and model where that is more, cannot hide a distance of
+/// [`LARGEST_ERROR`](super::LARGEST_ERROR); else other starts are tried.
 #[derive(Clone, Debug)]
 pub struct Newton {
+    plain: PlainNewton,
     problem: RowProblem,
     ranges: Vec<Range>,
     /// Ranges that plain steps may not leave.
@@ -27,19 +30,16 @@ pub struct Newton {
     rules: NewtonRules,
     linearised: Linearised,
     twins: Twins,
+    /// Buffer for the start of a row that is polished.
+    start_mm: Vec<f64>,
 }
 
 /// Damping of the first retry after a failed step, relative to the largest diagonal entry of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-12;
 /// Largest number of plain steps before damped ones.
 const MOST_PLAIN_STEPS: usize = 25;
-/// Smallest fraction of a plain step; one that must be shortened further leads out of the sensor.
-const SHORTEST_SHARE: f64 = 1e-3;
 /// Relative damping beyond which steps only get shorter.
 const LARGEST_DAMPING: f64 = 1e6;
-/// Largest rounding of a residual: of the resistance that was read and of the one that the model computes (4 units in the
-/// last place each), of the reading and of the residual itself.
-const ROUNDING: f64 = 10.0 * f64::EPSILON;
 /// Distance, in proportion to the range, within which minima found from different starts count as the same.
 const SAME: f64 = 1e-3;
 /// Number of starts that must lead to the same minimum for the readings to be given up.
@@ -50,12 +50,14 @@ impl Newton {
     pub fn new(model: &SensorModel, scene: &Scene, rules: NewtonRules) -> Self {
         let problem = RowProblem::new(model, scene.movement.axes());
         Self {
+            plain: PlainNewton::new(model, scene),
             linearised: Linearised::new(problem.unknowns()),
             problem,
             wide: wide_ranges(model, scene),
             ranges: ranges(model, scene),
             rules,
             twins: Twins::new(model, scene),
+            start_mm: vec![0.0; ranges(model, scene).len()],
         }
     }
 
@@ -69,8 +71,8 @@ impl Newton {
         self.problem.unknowns()
     }
 
-    /// Solves row-wire `row` for its readings in ohm (M4), and writes absolute coordinates (3·M2). Starts in the middle
-    /// of the ranges, and elsewhere if that leads to no solution.
+    /// Solves row-wire `row` for its readings in ohm (M4), and writes absolute coordinates (3·M2). Starts from an affine
+    /// estimate, and elsewhere if that leads to no solution.
     ///
     /// # Errors
     /// If readings are not resistances.
@@ -80,7 +82,71 @@ impl Newton {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<NewtonReport, DecodeError> {
-        self.read(row, readings_ohm)?;
+        DecodeError::check(readings_ohm)?;
+        match self.solve_plainly(&[row], readings_ohm, coordinates_mm)[0] {
+            Some(report) => Ok(report),
+            None => Ok(self.solve_carefully(row, readings_ohm, coordinates_mm)),
+        }
+    }
+
+    /// Solves up to [`LANES`] row-wires at once by plain steps alone, for their sound readings in ohm (rows × M4), and
+    /// writes absolute coordinates (rows × 3·M2) of those for which that leads to the only solution; returns their reports.
+    pub(super) fn solve_plainly(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> [Option<NewtonReport>; LANES] {
+        if !self.plain.is_fit() {
+            return [None; LANES];
+        }
+        let readings = readings_ohm.chunks_exact(self.problem.equations());
+        for (lane, (&row, readings_ohm)) in rows.iter().zip(readings).enumerate() {
+            self.plain.load(lane, row, readings_ohm);
+        }
+        self.plain.solve(self.rules);
+        self.write_plain_answers(rows, coordinates_mm)
+    }
+
+    /// Polishes as [`Self::polish`] up to [`LANES`] row-wires at once by plain steps alone; returns the reports of those for
+    /// which that is enough.
+    pub(super) fn polish_plainly(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> [Option<NewtonReport>; LANES] {
+        if !self.plain.is_fit() {
+            return [None; LANES];
+        }
+        let readings = readings_ohm.chunks_exact(self.problem.equations());
+        let coordinates = coordinates_mm.chunks_exact(self.problem.coordinates());
+        for (lane, ((&row, readings_ohm), coordinates_mm)) in rows.iter().zip(readings).zip(coordinates).enumerate() {
+            self.problem.turn_to(row);
+            self.problem.unknowns_of(coordinates_mm, &mut self.start_mm);
+            self.plain.load_from(lane, row, readings_ohm, &self.start_mm);
+        }
+        self.plain.polish(self.rules);
+        self.write_plain_answers(rows, coordinates_mm)
+    }
+
+    fn write_plain_answers(&mut self, rows: &[usize], coordinates_mm: &mut [f64]) -> [Option<NewtonReport>; LANES] {
+        let mut reports = [None; LANES];
+        let coordinates = coordinates_mm.chunks_exact_mut(self.problem.coordinates());
+        for (lane, (&row, coordinates_mm)) in rows.iter().zip(coordinates).enumerate() {
+            if let Some((report, unknowns_mm)) = self.plain.answer(lane) {
+                self.problem.turn_to(row);
+                self.problem.coordinates_of(unknowns_mm, coordinates_mm);
+                reports[lane] = Some(report);
+            }
+        }
+        self.plain.clear();
+        reports
+    }
+
+    /// Solves with damping and bounds, from the middle of the ranges, and from elsewhere if that leads to no solution.
+    fn solve_carefully(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> NewtonReport {
+        self.problem.read(row, readings_ohm);
         let mut starts = Starts::default();
         let (mut best, mut answer) = self.run(row, starts.next_mm(&self.ranges));
         let mut agreeing = 1;
@@ -109,7 +175,7 @@ impl Newton {
             }
         }
         self.problem.coordinates_of(&answer, coordinates_mm);
-        Ok(best)
+        best
     }
 
     /// Solves as [`Self::solve`], but only from the answer of another decoder in `coordinates_mm`, which is
@@ -123,18 +189,16 @@ impl Newton {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<NewtonReport, DecodeError> {
-        self.read(row, readings_ohm)?;
+        DecodeError::check(readings_ohm)?;
+        if let Some(report) = self.polish_plainly(&[row], readings_ohm, coordinates_mm)[0] {
+            return Ok(report);
+        }
+        self.problem.read(row, readings_ohm);
         let mut start = vec![0.0; self.problem.unknowns()];
         self.problem.unknowns_of(coordinates_mm, &mut start);
         let (report, answer) = self.run(row, start);
         self.problem.coordinates_of(&answer, coordinates_mm);
         Ok(report)
-    }
-
-    fn read(&mut self, row: usize, readings_ohm: &[f64]) -> Result<(), DecodeError> {
-        DecodeError::check(readings_ohm)?;
-        self.problem.read(row, readings_ohm);
-        Ok(())
     }
 
     /// Runs plain Gauss-Newton steps first, which converge from anywhere nearby, though the misfit may rise on the way.
@@ -189,17 +253,8 @@ impl Newton {
             is_explained &= residual.abs() <= rounding;
         }
         let largest_error = self.linearised.largest_error(f64::max(squares, excess).sqrt());
-        let solution = if largest_error <= LARGEST_ERROR {
-            if self.is_redundant() && !self.twins.has(row, unknowns) {
-                Solution::Unique
-            } else {
-                Solution::Undetermined
-            }
-        } else if is_explained {
-            Solution::Undetermined
-        } else {
-            Solution::None
-        };
+        let is_only = || self.is_redundant() && !self.twins.has(row, unknowns);
+        let solution = Solution::of(largest_error, is_explained, is_only);
         (solution, largest_error)
     }
 

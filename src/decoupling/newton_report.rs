@@ -5,7 +5,8 @@ use std::fmt;
 pub struct NewtonRules {
     /// Largest number of steps from one start. A step that is rejected and shortened counts as one.
     pub steps: usize,
-    /// Step length, in proportion to the range of the unknown, below which the method has converged.
+    /// Step length, in proportion to the range of the unknown, below which the method has converged. Plain steps also end
+    /// where another could only lower residuals within their rounding.
     pub tolerance: f64,
     /// Largest number of starts; another is tried where one does not lead to a solution.
     pub starts: usize,
@@ -58,6 +59,23 @@ pub enum Solution {
     Undetermined,
 }
 
+impl Solution {
+    /// Judges an answer by the largest error that what is left of its misfit can hide; `is_explained` tells that rounding
+    /// explains the misfit, and `is_only` that no other answer would be as good.
+    pub(super) fn of(largest_error: f64, is_explained: bool, is_only: impl FnOnce() -> bool) -> Self {
+        if largest_error <= LARGEST_ERROR {
+            if is_only() { Self::Unique } else { Self::Undetermined }
+        } else if is_explained {
+            Self::Undetermined
+        } else {
+            Self::None
+        }
+    }
+}
+
+/// Largest rounding of a residual: of the resistance that was read and of the one that the model computes (4 units in the
+/// last place each), of the reading and of the residual itself.
+pub(super) const ROUNDING: f64 = 10.0 * f64::EPSILON;
 /// Largest error of an unknown, in proportion to its range, of an answer that counts as the solution.
 pub const LARGEST_ERROR: f64 = 1e-6;
 

@@ -102,6 +102,16 @@ impl RowProblem {
         self.readings_ohm.len()
     }
 
+    /// Number of coordinates.
+    pub(crate) fn coordinates(&self) -> usize {
+        3 * self.displacements_mm.len()
+    }
+
+    /// Makes `row` the present row-wire.
+    pub(crate) fn turn_to(&mut self, row: usize) {
+        self.row = row;
+    }
+
     /// Sets the readings of row-wire `row`, for which the equations are to be solved.
     pub(crate) fn read(&mut self, row: usize, readings_ohm: &[f64]) {
         self.row = row;

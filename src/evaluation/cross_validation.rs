@@ -4,16 +4,20 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{Run, RunError, RunSettings, TargetErrors, TargetRow, baselines::fit_baselines};
+use super::{
+    Run, RunError, RunSettings, TargetErrors, TargetRow,
+    baselines::{fit_baselines, linear_name},
+};
 use crate::{
     dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
     decoupling::decode_set,
 };
 
-/// A k-fold cross-validation, repeated with the samples reshuffled.
+/// A k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] takes other folds.
 ///
 /// Each fold in turn is the test set and the fold after it the validation set, which selects the best weights and ends
-/// the training; the others are the training set. With two folds there is no validation set.
+/// the training; the others are the training set. With two folds there is no validation set, nor for measured samples
+/// where the method [needs none](crate::training::Method::needs_validation).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CrossValidation {
@@ -47,6 +51,10 @@ pub struct CrossValidated {
     pub mean: Array2<f64>,
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
+    /// Name of the linear maps in tables.
+    linear_name: &'static str,
+    /// The fold after the test fold is held out for validation.
+    holds_out: bool,
     /// Epochs and time of the trainings.
     pub effort: Effort,
 }
@@ -75,19 +83,37 @@ impl CrossValidation {
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<CrossValidated>, RunError> {
-        let own_seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(set, self.folds, self.unit, &mut own_seed.rng(Stream::Split))?;
+        let seed = nth_seed(settings.seed, repeat);
+        let folds = Folds::deal(set, self.folds, self.unit, &mut seed.rng(Stream::Split))?;
+        CrossValidated::on_folds(&RunSettings { seed, ..*settings }, set, folds, is_cancelled)
+    }
+}
+
+impl CrossValidated {
+    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`. Returns `None` if
+    /// cancelled.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub fn on_folds(
+        settings: &RunSettings,
+        set: &Dataset,
+        folds: Folds,
+        is_cancelled: impl Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let is_measured = settings.source.simulation().is_none();
+        let holds_out = !is_measured || settings.training.method.needs_validation();
         let mut effort = Effort::default();
         let empty = || Array2::zeros(set.targets().dim());
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
         for fold in 0..folds.count() {
             let (samples, test) = (folds.test(fold), set.select(folds.test(fold)));
-            let split = split(set, &folds, fold);
+            let split = split(set, &folds, fold, holds_out);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
             scatter(&mut mean, samples, &decode_set(&mut of_mean, &test)?);
             scatter(&mut linear, samples, &decode_set(&mut of_linear, &test)?);
             let settings = RunSettings {
-                seed: nth_seed(own_seed, fold),
+                seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
             let mut run = Run::on_sets(settings, split, test)?;
@@ -97,20 +123,20 @@ impl CrossValidation {
             scatter(&mut network, samples, &run.decouple_test());
             effort.add(of_fold);
         }
-        Ok(Some(CrossValidated {
+        Ok(Some(Self {
             folds,
             network,
             mean,
             linear,
+            linear_name: linear_name(&settings.source),
+            holds_out,
             effort,
         }))
     }
-}
 
-impl CrossValidated {
     /// Returns the training samples for test fold `fold` of `set`, the set that was cross-validated.
     pub(super) fn training(&self, set: &Dataset, fold: usize) -> Dataset {
-        split(set, &self.folds, fold).training
+        split(set, &self.folds, fold, self.holds_out).training
     }
 
     /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.
@@ -124,7 +150,7 @@ impl CrossValidated {
         };
         vec![
             row("training mean", &self.mean),
-            row("linear map", &self.linear),
+            row(self.linear_name, &self.linear),
             row("network", &self.network),
         ]
     }
@@ -168,10 +194,11 @@ impl Effort {
     }
 }
 
-/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set.
-fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
+/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is held
+/// out.
+fn split(set: &Dataset, folds: &Folds, fold: usize, holds_out: bool) -> Split {
     let chooses = (fold + 1) % folds.count();
-    if folds.count() < 3 {
+    if folds.count() < 3 || !holds_out {
         return Split {
             training: set.select(&folds.without(&[fold])),
             validation: None,
@@ -184,13 +211,13 @@ fn split(set: &Dataset, folds: &Folds, fold: usize) -> Split {
 }
 
 /// Returns the `n`th seed derived from `seed`.
-fn nth_seed(seed: Seed, n: usize) -> Seed {
+pub(super) fn nth_seed(seed: Seed, n: usize) -> Seed {
     let mut seeds = seed.rng(Stream::Folds).random_iter();
     Seed(seeds.nth(n).expect("a generator never ends"))
 }
 
 /// Copies the rows of `answers` to the rows `samples` of `pooled`.
-fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
+pub(super) fn scatter(pooled: &mut Array2<f64>, samples: &[usize], answers: &Array2<f64>) {
     for (&sample, answer) in samples.iter().zip(answers.axis_iter(Axis(0))) {
         pooled.row_mut(sample).assign(&answer);
     }

@@ -2,16 +2,19 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade_off`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings.
+//! [`measure_trade_off`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings;
+//! [`recorded`] says what recorded readings can tell.
 
 mod baselines;
 mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod fine_tuning;
 #[cfg(feature = "files")]
 pub(crate) mod format;
 mod frame_time;
+mod known_presses;
 mod machine;
 mod missing_figures;
 mod node_spread;
@@ -22,6 +25,7 @@ mod preset;
 mod pressed;
 mod published;
 mod ready;
+pub mod recorded;
 mod reference;
 mod reference_note;
 mod remark;
@@ -46,7 +50,9 @@ pub use baselines::Baselines;
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet, TargetReport};
 pub use errors::{Errors, NodeAddress};
+pub use fine_tuning::fine_tune;
 pub use frame_time::network_frame_time;
+pub use known_presses::{pressed_rows, rebased};
 pub use missing_figures::MissingFigures;
 pub use node_spread::node_rms_mm;
 pub use outlook::{Outlook, OutlookError};

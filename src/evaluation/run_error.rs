@@ -62,6 +62,18 @@ pub enum RunError {
         /// Channels, targets or row-wires of the training set.
         expected: String,
     },
+    /// The samples are not such as the networks decode.
+    #[error(
+        "the {set} set has {found}, the networks have {expected}: give samples of the sensor they were trained for"
+    )]
+    Networks {
+        /// Name of the set: training or validation.
+        set: &'static str,
+        /// Channels, targets or row-wires of the set.
+        found: String,
+        /// Their number in the networks.
+        expected: usize,
+    },
     /// A row-wire that needs its own network has no samples.
     #[error("row {} has no {set} samples: give some of every row, or train one network for all rows", .row_wire + 1)]
     RowWithoutSamples {

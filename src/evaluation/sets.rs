@@ -1,6 +1,7 @@
 use super::{RunError, RunSettings, Source};
 use crate::{
     dataset::{Dataset, Split},
+    network::Networks,
     scene::RowModel,
 };
 
@@ -40,6 +41,36 @@ pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) 
                 let row_wire = set.row_wires_read().map_or(0, |read| read[row_index]);
                 return Err(RunError::RowWithoutSamples { row_wire, set: name });
             }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the sets of a split are such as `networks` decode.
+pub(super) fn check_networks(networks: &Networks, split: &Split) -> Result<(), RunError> {
+    let network = networks.at(0);
+    let sets = [
+        ("training", Some(&split.training)),
+        ("validation", split.validation.as_ref()),
+    ];
+    for (set, samples) in sets.into_iter().filter_map(|(name, set)| Some((name, set?))) {
+        let count = networks.values().len();
+        let sizes = [
+            ("channels", samples.channels(), network.inputs().channels()),
+            ("targets", samples.outputs(), network.outputs().channels()),
+            ("row-wires", if count == 1 { 1 } else { samples.row_count() }, count),
+        ];
+        if let Some((what, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
+            return Err(RunError::Networks {
+                set,
+                found: format!("{found} {what}"),
+                expected,
+            });
+        }
+        let row_without = (0..count).find(|&row| count > 1 && samples.of_row(row).samples() == 0);
+        if let Some(row) = row_without {
+            let row_wire = samples.row_wires_read().map_or(0, |read| read[row]);
+            return Err(RunError::RowWithoutSamples { row_wire, set });
         }
     }
     Ok(())

@@ -25,6 +25,10 @@ pub enum DocumentKind {
     Checkpoint,
     /// A name or choice of the run list: [`super::RunFolder`].
     RunList,
+    /// A finished trial of `decoupler sweep`.
+    Trial,
+    /// The trials of a specification of `decoupler sweep`.
+    SweepPlan,
 }
 
 impl DocumentKind {
@@ -34,6 +38,8 @@ impl DocumentKind {
             Self::Network => "decoupler network",
             Self::Checkpoint => "decoupler checkpoint",
             Self::RunList => "decoupler run list",
+            Self::Trial => "decoupler trial",
+            Self::SweepPlan => "decoupler sweep plan",
         }
     }
 
@@ -45,7 +51,7 @@ impl DocumentKind {
             Self::Network => 1..=3,
             // Version 1 had the paper's scene only, version 3 has the wall time.
             Self::Checkpoint => 1..=3,
-            Self::RunList => 1..=1,
+            Self::RunList | Self::Trial | Self::SweepPlan => 1..=1,
         }
     }
 
@@ -54,6 +60,7 @@ impl DocumentKind {
             Self::Network => "copy or save it again",
             Self::Checkpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",
+            Self::Trial | Self::SweepPlan => "delete it and run the sweep again",
         }
     }
 
@@ -118,11 +125,13 @@ impl fmt::Display for DocumentKind {
             Self::Network => "network file",
             Self::Checkpoint => "checkpoint",
             Self::RunList => "part of a run list",
+            Self::Trial => "trial",
+            Self::SweepPlan => "sweep plan",
         })
     }
 }
 
-/// Errors of reading or writing a network file, a checkpoint or a run list.
+/// Errors of reading or writing a network file, a checkpoint, a run list or the files of a sweep.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DocumentError {

@@ -22,6 +22,8 @@ mod run_folder;
 mod samples;
 mod sealed;
 mod soundness;
+#[cfg(feature = "cli")]
+mod sweep;
 mod table;
 mod tables;
 #[cfg(test)]
@@ -42,6 +44,8 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
+#[cfg(feature = "cli")]
+pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{decoder_table, error_table, write_loss_curves};
 #[cfg(feature = "figures")]

@@ -5,6 +5,7 @@
 
 mod channel_noise;
 mod decoupling_network;
+mod exponential;
 mod inputs;
 mod mlp;
 mod networks;
@@ -19,6 +20,7 @@ mod whitening;
 
 pub use channel_noise::ChannelNoise;
 pub use decoupling_network::{DecouplingNetwork, NetworkError};
+pub(crate) use exponential::exp;
 pub(crate) use inputs::channel_noise;
 pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
 pub use mlp::{Mlp, Shape};

@@ -3,17 +3,20 @@
 
 mod array_scale;
 mod axes;
+mod calibration;
 mod conductance;
 mod fixed_point;
 mod geometry;
 mod identifiability;
 mod partial_sum;
 mod reciprocal_distances;
+mod reciprocal_root;
 mod resistance;
 mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
+pub use calibration::{CalibratedParameter, Calibration, CalibrationError, PressedRow, SensorParameter, Standing};
 pub use conductance::RowConductance;
 pub use geometry::{Geometry, GeometryError};
 pub use glam::DVec3;

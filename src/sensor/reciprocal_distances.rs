@@ -1,3 +1,5 @@
+use std::marker::PhantomData;
+
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
@@ -5,6 +7,7 @@ use super::{
     ArrayScale, Geometry,
     fixed_point::{Parts, two_sum},
     geometry::Differences,
+    reciprocal_root::ReciprocalRoot,
 };
 
 /// Columns per block, whose sums stay in registers. The padding of the last block is discarded.
@@ -23,34 +26,36 @@ const ELECTRODES: usize = 8;
 /// units in the last place for any number of nodes.
 ///
 /// No fused operations, so every machine gives the same bits.
-pub(super) fn sum_reciprocal_distances<const AXES: usize>(
+pub(super) fn sum_reciprocal_distances<const AXES: usize, R: ReciprocalRoot>(
     (scale, geometry): (ArrayScale, &Geometry),
     row: usize,
     displacements_mm: &[DVec3],
     sums: &mut [f64],
     derivatives: &mut [f64],
 ) {
-    pulp::Arch::new().dispatch(Summation::<AXES> {
+    pulp::Arch::new().dispatch(Summation::<AXES, R> {
         scale,
         geometry,
         row,
         displacements_mm,
         sums,
         derivatives,
+        root: PhantomData,
     });
 }
 
 /// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
-struct Summation<'a, const AXES: usize> {
+struct Summation<'a, const AXES: usize, R> {
     scale: ArrayScale,
     geometry: &'a Geometry,
     row: usize,
     displacements_mm: &'a [DVec3],
     sums: &'a mut [f64],
     derivatives: &'a mut [f64],
+    root: PhantomData<R>,
 }
 
-impl<const AXES: usize> WithSimd for Summation<'_, AXES> {
+impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
     type Output = ();
 
     #[inline(always)]
@@ -68,7 +73,7 @@ impl<const AXES: usize> WithSimd for Summation<'_, AXES> {
     }
 }
 
-impl<const AXES: usize> Summation<'_, AXES> {
+impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
     /// Adds the terms of electrodes `first_electrode` and on of every column-wire.
     #[inline(always)]
     fn add_electrodes(&mut self, differences: &Differences, first_electrode: usize, are_first: bool) {
@@ -92,7 +97,7 @@ impl<const AXES: usize> Summation<'_, AXES> {
                 let mut slopes = [[0.0; LANES]; AXES];
                 for &electrode_x in electrodes_x {
                     let dx = x.plus(electrode_x).rounded();
-                    add_electrode([dx, z], &dy, &mut of_node, &mut slopes);
+                    add_electrode::<AXES, R>([dx, z], &dy, &mut of_node, &mut slopes);
                 }
                 for lane in 0..LANES {
                     let (total, rest) = two_sum(totals[lane], of_node[lane]);
@@ -122,7 +127,7 @@ impl<const AXES: usize> Summation<'_, AXES> {
 
 /// Adds 1/d and its derivatives for an electrode of each column-wire of a block.
 #[inline(always)]
-fn add_electrode<const AXES: usize>(
+fn add_electrode<const AXES: usize, R: ReciprocalRoot>(
     [dx, z]: [f64; 2],
     dy: &[f64; LANES],
     sums: &mut [f64; LANES],
@@ -131,7 +136,7 @@ fn add_electrode<const AXES: usize>(
     let across2 = dx * dx + z * z;
     for lane in 0..LANES {
         let dy = dy[lane];
-        let inverse = 1.0 / (across2 + dy * dy).sqrt();
+        let inverse = R::of(across2 + dy * dy);
         sums[lane] += inverse;
         if AXES > 0 {
             let cubed = inverse * inverse * inverse;

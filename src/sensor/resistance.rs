@@ -3,7 +3,10 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances, short};
+use super::{
+    ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances, reciprocal_root::Divided,
+    short,
+};
 
 /// Default resistance per millimetre of rubber. The paper gives none: g scales every
 /// resistance alike, so no relative error depends on it.
@@ -103,7 +106,7 @@ impl SensorModel {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
         // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
-        sum_reciprocal_distances::<0>(
+        sum_reciprocal_distances::<0, Divided>(
             (self.scale, &self.geometry),
             row,
             displacements_mm,
@@ -145,7 +148,7 @@ impl SensorModel {
         let (columns, nodes) = (self.scale.columns(), self.scale.nodes_per_row());
         let (mut sums, mut derivatives) = (vec![0.0; columns], vec![0.0; 3 * nodes * columns]);
         let sensor = (self.scale, &self.geometry);
-        sum_reciprocal_distances::<3>(sensor, row, displacements_mm, &mut sums, &mut derivatives);
+        sum_reciprocal_distances::<3, Divided>(sensor, row, displacements_mm, &mut sums, &mut derivatives);
         Ok(Array3::from_shape_fn((columns, nodes, 3), |(column, node, axis)| {
             -resistances_ohm[column] / sums[column] * derivatives[(3 * node + axis) * columns + column]
         }))

@@ -189,6 +189,17 @@ impl Default for Method {
 }
 
 impl Method {
+    /// Bayesian regularisation with its defaults.
+    pub fn bayesian_regularization() -> Self {
+        Self::BayesianRegularization(BayesianRegularization::default_settings())
+    }
+
+    /// Returns `false` for Bayesian regularisation, which weighs fit against size of the weights by itself: samples held
+    /// out for validation are better used to train it.
+    pub fn needs_validation(&self) -> bool {
+        !matches!(self, Self::BayesianRegularization(_))
+    }
+
     /// Short name, for the terminal and tables.
     pub fn short_name(&self) -> &'static str {
         self.words().short_name

@@ -242,6 +242,16 @@ impl Driver {
         self.click_by(&By::new().role(Role::Button).label(label));
     }
 
+    /// Clicks the last of the buttons that are labelled so: an open list lies over what is beneath.
+    #[track_caller]
+    pub(crate) fn click_last_button(&mut self, label: &str) {
+        let by = By::new().role(Role::Button).label(label);
+        self.harness.get_all(by).last().unwrap().click();
+        self.harness.run_steps(2);
+        self.harness.remove_cursor();
+        self.harness.step();
+    }
+
     #[track_caller]
     fn click_by(&mut self, by: &By<'_>) {
         self.harness.get(by.clone()).scroll_to_me();

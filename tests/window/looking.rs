@@ -72,10 +72,10 @@ fn the_buttons_that_run_the_training_stand_apart() {
         let driver = Driver::open_sized(size);
         let labels = ["Test snapshot", "Previous snapshot", "1 of 10", "Next snapshot"];
         let buttons = ["▶ Train", "⏸ Pause", "■ Stop"];
-        // The words give way where there is little room.
-        let has_room = driver.has("Test snapshot");
-        assert!(has_room || size.x < 1000.0, "at {size}");
-        let labels = labels.into_iter().skip(usize::from(!has_room));
+        // Where there is little room the words before the number give way.
+        let labels = labels
+            .into_iter()
+            .filter(|label| *label != labels[0] || driver.has(label));
         let places: Vec<(&str, Rect)> = labels
             .chain(buttons)
             .map(|label| (label, driver.get(label).rect()))

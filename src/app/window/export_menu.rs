@@ -27,9 +27,13 @@ pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Expo
         };
         scroll.show(ui, |ui| {
             Frame::new().inner_margin(margin).show(ui, |ui| {
-                ui.set_width(WIDTH);
-                let asked = exports_ui(ui, exports());
-                effects.extend(asked.map(|ask| ask()));
+                // A menu justifies its lines, and shows buttons as text.
+                ui.with_layout(Layout::top_down(Align::Min), |ui| {
+                    ui.set_width(WIDTH);
+                    ui.visuals_mut().widgets.inactive.weak_bg_fill = Theme::of(ui).palette.raised;
+                    let asked = exports_ui(ui, exports());
+                    effects.extend(asked.map(|ask| ask()));
+                });
             });
         });
     });

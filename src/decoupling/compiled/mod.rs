@@ -1,7 +1,7 @@
 //! Trained networks prepared to decode fast: scalings folded into the weights, layers padded to vector registers.
 
 mod folded_network;
-mod padded_layer;
+pub(super) mod padded_layer;
 mod real;
 
 use pulp::{Simd, WithSimd};

@@ -3,6 +3,52 @@ use super::Real;
 /// Layers are padded to a multiple of this number.
 pub(super) const LANES: usize = 4;
 
+/// An affine layer in double precision.
+#[derive(Clone, Debug)]
+pub(in crate::decoupling) struct PaddedLayer {
+    outputs: usize,
+    padded_outputs: usize,
+    /// (inputs + 1) × padded outputs, the constants last.
+    weights: Vec<f64>,
+}
+
+impl PaddedLayer {
+    /// Lays out the weight of each input, and the constant of no input, for each output.
+    pub(in crate::decoupling) fn new(
+        (inputs, outputs): (usize, usize),
+        weight: impl Fn(Option<usize>, usize) -> f64,
+    ) -> Self {
+        let padded_outputs = outputs.next_multiple_of(LANES);
+        let mut weights = vec![0.0; (inputs + 1) * padded_outputs];
+        for (input, weights) in weights.chunks_exact_mut(padded_outputs.max(1)).enumerate() {
+            for (output, to) in weights[..outputs].iter_mut().enumerate() {
+                *to = weight((input < inputs).then_some(input), output);
+            }
+        }
+        Self {
+            outputs,
+            padded_outputs,
+            weights,
+        }
+    }
+
+    /// Number of outputs.
+    pub(in crate::decoupling) fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Number of outputs with padding.
+    pub(in crate::decoupling) fn padded_outputs(&self) -> usize {
+        self.padded_outputs
+    }
+
+    /// Computes the outputs, with padding.
+    #[inline(always)]
+    pub(in crate::decoupling) fn apply(&self, input: &[f64], output: &mut [f64]) {
+        affine(input, &self.weights, output);
+    }
+}
+
 /// Computes `output = [input, 1] · layer`. The layer is stored row by row with its biases last; its number of columns
 /// is that of the outputs, a multiple of [`LANES`]. Blocks of columns stay in registers.
 #[inline(always)]

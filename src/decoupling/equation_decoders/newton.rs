@@ -3,6 +3,7 @@ use super::{
     row_search::{EXPLAINED, RowSearch},
 };
 use crate::{
+    decoupling::side_by_side::LANES,
     decoupling::{
         DecodeError, Decoder, LARGEST_ERROR, Newton, NewtonReport, NewtonRules, Posterior, Solution, SolvedRows,
     },
@@ -114,6 +115,44 @@ impl Decoder for NewtonDecoder {
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let solution = self.answer(row_index, readings, targets)?;
         self.solved.count(solution);
+        Ok(())
+    }
+
+    /// Solves the rows side by side by plain steps, and those that want more care one by one.
+    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        assert_eq!(readings.len() / channels, targets.len() / outputs);
+        let chunks = readings
+            .chunks(LANES * channels)
+            .zip(targets.chunks_mut(LANES * outputs));
+        for (chunk, (readings, targets)) in chunks.enumerate() {
+            let first = chunk * LANES;
+            let at_row = |error, place| DecodeError {
+                row_index: first + place,
+                ..error
+            };
+            let rows = readings.chunks_exact(channels);
+            for (place, readings) in rows.clone().enumerate() {
+                DecodeError::check(readings).map_err(|error| at_row(error, place))?;
+            }
+            let reports = match self.search.known_rows() {
+                Some(known) => {
+                    let known = &known[first..first + rows.len()];
+                    self.newton.set_rules(self.rules);
+                    self.newton.solve_plainly(known, readings, targets)
+                }
+                None => [None; LANES],
+            };
+            let rows = rows.zip(targets.chunks_exact_mut(outputs)).zip(reports);
+            for (place, ((readings, targets), report)) in rows.enumerate() {
+                match report {
+                    Some(report) => self.solved.count(report.solution),
+                    None => self
+                        .decode_row(first + place, readings, targets)
+                        .map_err(|error| at_row(error, place))?,
+                }
+            }
+        }
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 use rand::Rng;
 
 use crate::{
-    decoupling::{DecodeError, Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows},
+    decoupling::{DecodeError, Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows, side_by_side::LANES},
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
 };
@@ -82,6 +82,14 @@ impl PolishedDecoder {
         }
     }
 
+    /// Returns the row-wire of a row with this first answer.
+    fn row_wire(&self, row_index: usize, coordinates_mm: &[f64]) -> usize {
+        match self.row_model {
+            RowModel::Each => self.rows[row_index],
+            RowModel::Shared => self.nearest_row(coordinates_mm),
+        }
+    }
+
     /// Returns the row-wire whose x is nearest to the mean x of the coordinates.
     fn nearest_row(&self, coordinates_mm: &[f64]) -> usize {
         let x_mm = coordinates_mm.iter().step_by(3).sum::<f64>() / (coordinates_mm.len() / 3) as f64;
@@ -106,12 +114,46 @@ impl Decoder for PolishedDecoder {
 
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         self.first.decode_row(row_index, readings, targets)?;
-        let row_wire = match self.row_model {
-            RowModel::Each => self.rows[row_index],
-            RowModel::Shared => self.nearest_row(targets),
-        };
+        let row_wire = self.row_wire(row_index, targets);
         let solution = self.improve(row_wire, readings, targets)?;
         self.solved.count(solution);
+        Ok(())
+    }
+
+    /// Improves the rows side by side where plain steps do, and others one by one.
+    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        self.first.decode(readings, targets)?;
+        let chunks = readings
+            .chunks(LANES * channels)
+            .zip(targets.chunks_mut(LANES * outputs));
+        for (chunk, (readings, targets)) in chunks.enumerate() {
+            let first = chunk * LANES;
+            let at_row = |error, place| DecodeError {
+                row_index: first + place,
+                ..error
+            };
+            let mut row_wires = [0; LANES];
+            let rows = readings.chunks_exact(channels);
+            for (place, (readings, coordinates_mm)) in rows.clone().zip(targets.chunks_exact(outputs)).enumerate() {
+                DecodeError::check(readings).map_err(|error| at_row(error, place))?;
+                row_wires[place] = self.row_wire(first + place, coordinates_mm);
+            }
+            let reports = match &mut self.improvement {
+                Improvement::Newton(newton) => newton.polish_plainly(&row_wires[..rows.len()], readings, targets),
+                Improvement::Posterior(..) => [None; LANES],
+            };
+            let rows = rows.zip(targets.chunks_exact_mut(outputs)).zip(reports).zip(row_wires);
+            for (place, (((readings, targets), report), row_wire)) in rows.enumerate() {
+                let solution = match report {
+                    Some(report) => report.solution,
+                    None => self
+                        .improve(row_wire, readings, targets)
+                        .map_err(|error| at_row(error, place))?,
+                };
+                self.solved.count(solution);
+            }
+        }
         Ok(())
     }
 

@@ -59,6 +59,11 @@ impl RowSearch {
         self.scale.coordinates_per_row()
     }
 
+    /// Row-wires read, if the row-wire of each row of a frame is known.
+    pub(super) fn known_rows(&self) -> Option<&[usize]> {
+        self.rest.is_empty().then_some(&self.rows)
+    }
+
     /// Returns `true` if rows are not known.
     pub(super) fn is_needed(&self) -> bool {
         !self.rest.is_empty()

@@ -129,3 +129,76 @@ fn rows_that_the_equations_leave_open_are_answered_by_the_posterior_and_no_other
         assert_eq!(both.take_solved_rows().undetermined, undetermined, "{array}");
     }
 }
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Rows side by side do not touch each other: neither those of which noise leaves none solved, nor those that are given up
+/// among others that are solved.
+#[test]
+fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {
+    for (array, noisy_rows) in [
+        ("9x6_3x18", 0..0),
+        ("11x4_2x12", 3..5),
+        ("3x2_2x6", 0..3),
+        ("3x6_3x4", 0..0),
+    ] {
+        let model = SensorModel::new(array.parse().unwrap());
+        let (rows, channels) = (model.scale.rows(), model.scale.columns());
+        for known in [Rows::Known, Rows::All] {
+            let scene = Scene {
+                rows: known,
+                ..Scene::default()
+            };
+            let set = Dataset::simulate(&model, &scene, 2 * rows, &mut Seed(3).rng(Stream::Test)).unwrap();
+            let all: Vec<usize> = (0..rows).collect();
+            let newton = || NewtonDecoder::new(&model, &scene, &all, NewtonRules::default()).unwrap();
+            let decoders: [(Box<dyn Decoder>, Box<dyn Decoder>); 3] = [
+                (Box::new(newton()), Box::new(newton())),
+                (
+                    Box::new(polish(&model, &scene, &set, 1)),
+                    Box::new(polish(&model, &scene, &set, 1)),
+                ),
+                (
+                    Box::new(polish(&model, &scene, &set, 20)),
+                    Box::new(polish(&model, &scene, &set, 20)),
+                ),
+            ];
+            let mut readings = set.frames().unwrap().frame(1).to_vec();
+            for row in noisy_rows.clone() {
+                readings[row * channels] *= 1.2;
+            }
+            for (mut whole, mut by_rows) in decoders {
+                let mut frame = vec![0.0; rows * whole.outputs()];
+                whole.decode(&readings, &mut frame).unwrap();
+                for (row, answer) in frame.chunks_exact(whole.outputs()).enumerate() {
+                    let mut alone = vec![0.0; answer.len()];
+                    let readings = &readings[row * channels..(row + 1) * channels];
+                    by_rows.decode_row(row, readings, &mut alone).unwrap();
+                    assert_eq!(bits(&alone), bits(answer), "{array}, row {row}");
+                }
+                assert_eq!(whole.take_solved_rows(), by_rows.take_solved_rows(), "{array}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bad_reading_of_a_frame_is_named() {
+    let model = SensorModel::new("10x2_2x6".parse().unwrap());
+    let scene = Scene {
+        rows: Rows::Known,
+        ..Scene::default()
+    };
+    let set = Dataset::simulate(&model, &scene, 10, &mut Seed(3).rng(Stream::Test)).unwrap();
+    let mut readings = set.frames().unwrap().frame(0).to_vec();
+    readings[9 * 6 + 4] = -1.0;
+    let rows: Vec<usize> = (0..10).collect();
+    let newton = NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap();
+    let decoders: [Box<dyn Decoder>; 2] = [Box::new(newton), Box::new(polish(&model, &scene, &set, 1))];
+    for mut decoder in decoders {
+        let error = decoder.decode(&readings, &mut [0.0; 60]).unwrap_err();
+        assert_eq!((error.row_index, error.channel, error.value), (9, 4, -1.0));
+    }
+}

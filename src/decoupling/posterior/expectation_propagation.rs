@@ -1,6 +1,10 @@
+use pulp::{Simd, WithSimd};
+
 use super::{
     gaussian::{Direction, Gaussian},
-    truncated::{Factor, Marginal},
+    marginal::Marginal,
+    site::Site,
+    truncated::Factor,
 };
 use crate::decoupling::row_problem::Range;
 
@@ -20,6 +24,10 @@ pub(super) struct LinearModel {
     pub(super) ranges: Vec<Range>,
     /// The rounded readings.
     pub(super) rounded: Vec<RoundedReading>,
+    /// Factors with which those of the unknowns begin; empty if they begin with the moments of their ranges.
+    pub(super) first_factors: Vec<Factor>,
+    /// Change of a mean, relative to the range, below which the factors have converged.
+    pub(super) tolerance: f64,
 }
 
 /// A reading of which only the interval is known.
@@ -33,9 +41,11 @@ pub(super) struct RoundedReading {
 }
 
 /// The marginals of all unknowns.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Marginals {
     pub(super) of_unknowns: Vec<Marginal>,
+    /// Number of rounds.
+    pub(super) rounds: usize,
     /// False if the factors still moved after the last round.
     pub(super) converged: bool,
 }
@@ -47,123 +57,90 @@ const ROUNDS_UNDAMPED: usize = 20;
 /// Smallest share of a change of a factor.
 const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
-const TOLERANCE: f64 = 1e-7;
-
-/// A range and the Gaussian factor that stands for it.
-struct Site<'a> {
-    direction: Direction<'a>,
-    range: Range,
-    /// Variance of what is added to the unknown before it meets the range.
-    noise: f64,
-    factor: Factor,
-}
-
-impl<'a> Site<'a> {
-    /// Begins with the moments of the range by itself; with none if it is open.
-    fn new(direction: Direction<'a>, range: Range, noise: f64) -> Self {
-        let precision = 12.0 / (range.width() * range.width());
-        let factor = if precision > 0.0 {
-            Factor {
-                precision,
-                linear: precision * range.middle(),
-            }
-        } else {
-            Factor {
-                precision: 0.0,
-                linear: 0.0,
-            }
-        };
-        Self {
-            direction,
-            range,
-            noise,
-            factor: factor.blurred(noise),
-        }
-    }
-
-    /// Appends the factor as one more equation.
-    fn append_to(&self, equations: &mut Vec<f64>, unknowns: usize) {
-        let root = self.factor.precision.sqrt();
-        if root == 0.0 {
-            return;
-        }
-        match self.direction {
-            Direction::Unknown(place) => {
-                equations.extend((0..unknowns).map(|unknown| if unknown == place { root } else { 0.0 }));
-            }
-            Direction::Form(form) => equations.extend(form.iter().map(|value| root * value)),
-        }
-        equations.push(self.factor.linear / root);
-    }
-}
+pub(super) const TOLERANCE: f64 = 1e-7;
 
 impl LinearModel {
     /// The marginals; `None` if numbers overflow.
     pub(super) fn marginals(&self) -> Option<Marginals> {
-        let n = self.linear.len();
-        let unknowns = self.ranges.iter().enumerate();
+        if !self.first_factors.is_empty() {
+            let found = pulp::Arch::new().dispatch(Propagation {
+                model: self,
+                first_factors: &self.first_factors,
+            });
+            if found.as_ref().is_some_and(|marginals| marginals.converged) {
+                return found;
+            }
+        }
+        pulp::Arch::new().dispatch(Propagation {
+            model: self,
+            first_factors: &[],
+        })
+    }
+}
+
+/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
+struct Propagation<'a> {
+    model: &'a LinearModel,
+    first_factors: &'a [Factor],
+}
+
+impl WithSimd for Propagation<'_> {
+    type Output = Option<Marginals>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let LinearModel {
+            equations,
+            linear,
+            ranges,
+            rounded,
+            ..
+        } = self.model;
+        let n = linear.len();
+        let unknowns = ranges.iter().enumerate();
         let unknowns = unknowns.map(|(unknown, &range)| Site::new(Direction::Unknown(unknown), range, 0.0));
-        let rounded = self.rounded.iter();
+        let rounded = rounded.iter();
         let rounded = rounded.map(|reading| Site::new(Direction::Form(&reading.form), reading.range, 1.0));
         let mut sites: Vec<Site<'_>> = unknowns.chain(rounded).collect();
-        let mut equations = self.equations.clone();
+        for (site, &factor) in sites.iter_mut().zip(self.first_factors) {
+            site.factor = factor;
+        }
+        let mut equations = equations.clone();
         sites.iter().for_each(|site| site.append_to(&mut equations, n));
-        let mut gaussian = Gaussian::new(&equations, &self.linear)?;
-        let mut marginals = vec![Marginal::default(); n];
-        let mut last = vec![f64::INFINITY; n];
+        let mut gaussian = Gaussian::new(&equations, linear)?;
+        let (mut converged, mut rounds) = (false, 0);
         for round in 0..ROUNDS {
+            rounds += 1;
             let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
+            let mut largest = 0.0;
             for (place, site) in sites.iter_mut().enumerate() {
-                let (mean, variance) = gaussian.marginal(site.direction);
-                let before = site.factor;
-                let cavity = Factor {
-                    precision: 1.0 / variance - before.precision,
-                    linear: mean / variance - before.linear,
-                };
-                let seen = cavity.blurred(site.noise);
-                let tilted = seen.cut_to(site.range);
-                if !(tilted.variance > 0.0 && tilted.variance.is_finite()) {
+                let last = site.mean();
+                if !site.meet_range(&mut gaussian, share) {
                     return None;
                 }
-                let found = Factor {
-                    precision: (1.0 / tilted.variance - seen.precision).max(0.0),
-                    linear: tilted.mean / tilted.variance - seen.linear,
-                };
-                let found = found.blurred(site.noise);
-                let by_precision = share * (found.precision - before.precision);
-                let by_linear = share * (found.linear - before.linear);
-                site.factor = Factor {
-                    precision: before.precision + by_precision,
-                    linear: before.linear + by_linear,
-                };
-                if !gaussian.multiply(mean, variance, by_precision, by_linear) {
-                    return None;
-                }
-                if let Some(marginal) = marginals.get_mut(place) {
-                    *marginal = tilted;
+                if place < n {
+                    let width = site.range.width();
+                    let unit = if width.is_finite() { width } else { 1.0 };
+                    let moved = (site.mean() - last).abs() / unit;
+                    largest = if moved > largest || moved.is_nan() {
+                        moved
+                    } else {
+                        largest
+                    };
                 }
             }
-            let moved = |(i, marginal): (usize, &Marginal)| {
-                let width = self.ranges[i].width();
-                (marginal.mean - last[i]).abs() / if width.is_finite() { width } else { 1.0 }
-            };
-            let largest = marginals.iter().enumerate().map(moved).fold(0.0, f64::max);
             if largest.is_nan() {
                 return None;
             }
-            if largest < TOLERANCE * share {
-                return Some(Marginals {
-                    of_unknowns: marginals,
-                    converged: true,
-                });
-            }
-            for (last, marginal) in last.iter_mut().zip(&marginals) {
-                *last = marginal.mean;
+            if largest < self.model.tolerance * share {
+                converged = true;
+                break;
             }
         }
         Some(Marginals {
-            of_unknowns: marginals,
-            converged: false,
+            of_unknowns: sites[..n].iter().map(Site::marginal).collect(),
+            rounds,
+            converged,
         })
     }
 }
@@ -186,6 +163,8 @@ mod tests {
             linear: vec![0.0; ranges.len()],
             ranges,
             rounded: Vec::new(),
+            first_factors: Vec::new(),
+            tolerance: TOLERANCE,
         };
         let marginals = model.marginals().unwrap();
         assert!(marginals.converged);
@@ -210,7 +189,7 @@ mod tests {
                 (ours.variance / (deviation * deviation * spread) - 1.0).abs() < 2e-3,
                 "{mean} {deviation}"
             );
-            let below = (normal_cdf((ours.median - mean) / deviation) - normal_cdf(alpha)) / mass;
+            let below = (normal_cdf((ours.median() - mean) / deviation) - normal_cdf(alpha)) / mass;
             assert!((below - 0.5).abs() < 2e-3, "{mean} {deviation}: {below}");
         }
     }
@@ -238,6 +217,8 @@ mod tests {
                         highest: 50.0 * highest,
                     },
                 }],
+                first_factors: Vec::new(),
+                tolerance: TOLERANCE,
             };
             let ours = model.marginals().unwrap().of_unknowns[0];
             let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);

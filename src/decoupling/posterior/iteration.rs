@@ -1,8 +1,13 @@
-use super::{Posterior, PosteriorReport, linearised::Point};
+use super::{
+    Posterior, PosteriorReport, expectation_propagation,
+    linearised::{Linearised, Point},
+};
 use crate::decoupling::LARGEST_ERROR;
 
 /// Change of a mean, relative to the range, below which the linearisation has converged.
 const TOLERANCE: f64 = 1e-5;
+/// Change of a mean up to which the first linearisation is followed, which is far from the answer.
+const FIRST_TOLERANCE: f64 = 1e-3;
 /// Error of a linearisation, in standard deviations of the readings, up to which it needs no blur.
 const TOLERATED_MISFIT: f64 = 1e4;
 /// Error of a linearisation in proportion to the change of the readings, before it is known.
@@ -22,14 +27,14 @@ impl Posterior {
         coordinates_mm: &mut [f64],
     ) -> PosteriorReport {
         self.problem.read(row, readings_ohm);
-        let mut answer = first.clone();
         let (mut variance, mut determined) = (f64::NAN, false);
-        let (mut converged, mut steps) = (false, 0);
+        let (mut converged, mut steps, mut rounds) = (false, 0, 0);
         let mut at = Point {
             drift: 0.0,
             displacements_mm: first,
         };
         let mut expected: Option<Vec<f64>> = None;
+        let mut last: Option<Linearised> = None;
         while steps < most_steps {
             self.problem.evaluate(&at.displacements_mm);
             if steps == 0 && self.likelihood.has_drift() {
@@ -41,8 +46,14 @@ impl Posterior {
                 Some(expected) => rms(misfits.iter().zip(expected).map(|(found, expected)| found - expected)),
             };
             let blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
+            let is_rough = steps == 0 && most_steps > 1;
+            let tolerance = if is_rough {
+                FIRST_TOLERANCE
+            } else {
+                expectation_propagation::TOLERANCE
+            };
             steps += 1;
-            let Some(found) = self.linearised(row, &at, blur) else {
+            let Some(found) = self.linearised(row, &at, blur, last.as_ref(), tolerance) else {
                 converged = false;
                 break;
             };
@@ -54,6 +65,7 @@ impl Posterior {
             let largest = moved
                 .map(|((at, mean), width)| (mean - at).abs() / width)
                 .fold(0.0, f64::max);
+            rounds += found.marginals.rounds;
             let marginals = &found.marginals.of_unknowns;
             let squares = marginals
                 .iter()
@@ -64,8 +76,9 @@ impl Posterior {
                 .iter()
                 .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
             converged = found.marginals.converged && blur == 1.0;
-            answer = found.medians_mm;
-            if largest < TOLERANCE && blur == 1.0 {
+            let is_last = largest < TOLERANCE && blur == 1.0 && !is_rough;
+            let found = last.insert(found);
+            if is_last {
                 break;
             }
             let share = share_of_step(steps);
@@ -77,10 +90,15 @@ impl Posterior {
             let misfits = misfits.iter().zip(&found.misfits);
             expected = Some(misfits.map(|(&from, &to)| between(from, to)).collect());
         }
+        let answer = match &last {
+            Some(last) => self.medians_mm(last),
+            None => at.displacements_mm,
+        };
         let residual = self.problem.evaluate(&answer);
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {
             steps,
+            rounds,
             residual,
             spread_mm: variance.sqrt(),
             determined,

@@ -1,6 +1,6 @@
 use super::{
-    expectation_propagation::{LinearModel, RoundedReading},
-    truncated::Marginal,
+    expectation_propagation::{LinearModel, RoundedReading, TOLERANCE},
+    marginal::Marginal,
 };
 use crate::{
     decoupling::row_problem::{Range, RowProblem},
@@ -90,6 +90,8 @@ impl Likelihood {
             linear: vec![0.0; unknowns],
             ranges: Vec::new(),
             rounded: Vec::new(),
+            first_factors: Vec::new(),
+            tolerance: TOLERANCE,
         };
         let mut form = vec![0.0; unknowns];
         for reading in 0..readings {

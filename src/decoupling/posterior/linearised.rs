@@ -1,4 +1,4 @@
-use super::{Posterior, expectation_propagation::Marginals, likelihood::expected_misfits};
+use super::{Posterior, expectation_propagation::Marginals, likelihood::expected_misfits, truncated::Factor};
 use crate::decoupling::row_problem::Range;
 
 /// A point of linearisation.
@@ -11,17 +11,38 @@ pub(super) struct Point {
 
 /// The posterior of the equations linearised at a point.
 pub(super) struct Linearised {
+    at: Point,
     pub(super) marginals: Marginals,
     pub(super) means: Point,
-    pub(super) medians_mm: Vec<f64>,
     /// w that the linearisation expects at the means.
     pub(super) misfits: Vec<f64>,
 }
 
+impl Linearised {
+    /// The factors of the ranges, for displacements measured from another point.
+    fn factors_from(&self, at: &Point, widths: &[f64]) -> Vec<Factor> {
+        let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
+        let shifts = points.zip(widths).map(|((to, from), width)| (to - from) / width);
+        let marginals = self.marginals.of_unknowns.iter();
+        marginals
+            .zip(shifts)
+            .map(|(marginal, shift)| marginal.factor.shifted(shift))
+            .collect()
+    }
+}
+
 impl Posterior {
     /// The posterior of the equations linearised at `at`, where they were evaluated, with `blur` times the noise; `None`
-    /// if numbers overflow.
-    pub(super) fn linearised(&self, row: usize, at: &Point, blur: f64) -> Option<Linearised> {
+    /// if numbers overflow. Expectation propagation begins with the factors of an earlier linearisation, if there was one, and
+    /// ends when no mean changes by more than `tolerance`.
+    pub(super) fn linearised(
+        &self,
+        row: usize,
+        at: &Point,
+        blur: f64,
+        earlier: Option<&Linearised>,
+        tolerance: f64,
+    ) -> Option<Linearised> {
         let n = self.widths.len();
         let mut model = self.likelihood.linearised(&self.problem, at.drift, blur, &self.widths);
         let ranges = self.ranges.iter().zip(&at.displacements_mm).zip(&self.widths);
@@ -42,6 +63,10 @@ impl Posterior {
         let place = place.expect("the row is one of those given");
         let unknowns = model.ranges.len();
         self.priors[place].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
+        model.tolerance = tolerance;
+        if let Some(earlier) = earlier {
+            model.first_factors = earlier.factors_from(at, &self.widths);
+        }
         let mut marginals = model.marginals()?;
         let misfits = expected_misfits(&model, self.problem.equations(), &marginals.of_unknowns, blur);
         let drift = marginals
@@ -49,22 +74,29 @@ impl Posterior {
             .get(n)
             .map_or(0.0, |marginal| at.drift + marginal.mean);
         marginals.of_unknowns.truncate(n);
-        let places = marginals.of_unknowns.iter().zip(&at.displacements_mm).zip(&self.widths);
-        let places = places.zip(&self.ranges);
-        let place = |x: f64, at: f64, width: f64, range: &Range| range.clamp(at + x * width);
+        let displacements_mm = self.displacements_mm(at, marginals.of_unknowns.iter().map(|marginal| marginal.mean));
         Some(Linearised {
+            at: at.clone(),
             means: Point {
-                displacements_mm: places
-                    .clone()
-                    .map(|(((marginal, &at), &width), range)| place(marginal.mean, at, width, range))
-                    .collect(),
+                displacements_mm,
                 drift,
             },
-            medians_mm: places
-                .map(|(((marginal, &at), &width), range)| place(marginal.median, at, width, range))
-                .collect(),
             misfits,
             marginals,
         })
+    }
+
+    /// The medians of the displacements.
+    pub(super) fn medians_mm(&self, found: &Linearised) -> Vec<f64> {
+        let medians = found.marginals.of_unknowns.iter().map(|marginal| marginal.median());
+        self.displacements_mm(&found.at, medians)
+    }
+
+    /// Displacements within their ranges from x = (displacement − present) / width.
+    fn displacements_mm(&self, at: &Point, x: impl Iterator<Item = f64>) -> Vec<f64> {
+        let places = x.zip(&at.displacements_mm).zip(&self.widths).zip(&self.ranges);
+        places
+            .map(|(((x, at), width), range)| range.clamp(at + x * width))
+            .collect()
     }
 }

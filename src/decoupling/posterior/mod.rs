@@ -5,8 +5,10 @@ mod gaussian;
 mod iteration;
 mod likelihood;
 mod linearised;
+mod marginal;
 mod report;
 mod row_prior;
+mod site;
 mod truncated;
 
 pub use report::PosteriorReport;
@@ -123,9 +125,10 @@ impl Posterior {
         if self.likelihood.has_drift() {
             truth.drift = self.likelihood.likeliest_drift(&self.problem);
         }
-        match self.linearised(row, &truth, 1.0) {
+        match self.linearised(row, &truth, 1.0, None, expectation_propagation::TOLERANCE) {
             Some(found) if found.marginals.converged => {
-                self.problem.coordinates_of(&found.medians_mm, coordinates_mm);
+                let medians_mm = self.medians_mm(&found);
+                self.problem.coordinates_of(&medians_mm, coordinates_mm);
                 true
             }
             _ => false,

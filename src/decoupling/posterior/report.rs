@@ -3,6 +3,8 @@
 pub struct PosteriorReport {
     /// Linearisations.
     pub steps: usize,
+    /// Rounds of expectation propagation over all unknowns, in all linearisations.
+    pub rounds: usize,
     /// rms over readings of the relative misfit m/R − 1 at the answer.
     pub residual: f64,
     /// rms over unknowns of the posterior standard deviation.

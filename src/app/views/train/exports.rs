@@ -88,7 +88,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     let decoders = shown.map(|(run, _)| run).and_then(|run| {
         let reports = measured(view);
         if reports.is_empty() {
-            return Err("No decoder is measured yet: unfold More decoders in the report.".to_owned());
+            return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
         Ok(move || decoder_table(&reports, run.baselines.reference.as_ref()))
     });

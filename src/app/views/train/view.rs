@@ -61,7 +61,7 @@ impl View for TrainView {
 
     fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
         let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames);
+        self.press.take_pointer(ctx, shared.test(), &frames, self.node);
         self.follow(shared);
     }
 

@@ -15,6 +15,7 @@ mod section;
 mod shown;
 mod state;
 mod subject;
+mod target;
 
 pub use finger::Hand;
 pub use readings_card::{readings_card_ui, readings_ui};

@@ -1,10 +1,7 @@
 use eframe::egui::{Painter, Pos2, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::{
-    finger::Hand,
-    state::{PressState, Target},
-};
+use super::{finger::Hand, state::PressState, target::Target};
 use crate::{
     app::theme::Palette,
     figure::surface::Ray,

@@ -3,30 +3,13 @@ use glam::{DVec2, DVec3};
 
 use super::{
     finger::{Hand, Tool},
-    state::{PressState, Target},
+    state::PressState,
+    target::{Grip, Target},
 };
 use crate::{
     app::{test_view::TestView, views::train::drawn::Frames},
     scene::Touch,
 };
-
-/// Hold of the pointer on the surface while its button is down.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Grip {
-    /// An indenter moves in the level in which the surface was met, so that it does not jump as the surface gives way.
-    Level(f64),
-    /// A node moves up and down.
-    Node {
-        /// Its place among those drawn.
-        node: usize,
-        /// Height of the node above the pointer's.
-        above_mm: f64,
-        /// Height of the node, and of the pointer on the screen, when it was taken.
-        begin: (f64, f32),
-    },
-    /// The button went down beside the surface.
-    Missed,
-}
 
 /// Deeper by a turn of the wheel of so many points: the whole stroke in about ten turns of a usual wheel.
 const SHARE_PER_POINT: f64 = 0.002;
@@ -36,8 +19,9 @@ const SHARE_PER_KEY: f64 = 0.05;
 const POINTS_PER_STROKE: f64 = 120.0;
 
 impl PressState {
-    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those on show.
-    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames) {
+    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those on show, and `lit` is
+    /// the node that the pointer lights up.
+    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames, lit: Option<usize>) {
         let nobody_types = ctx.memory(|memory| memory.focused().is_none())
             || self
                 .target
@@ -54,11 +38,18 @@ impl PressState {
             self.grip = None;
             return;
         };
-        self.take_button(ctx, &response, &target, test, frames);
+        self.take_button(ctx, &response, &target, test, (frames, lit));
         self.take_wheel_and_keys(ctx, &response, &target, test);
     }
 
-    fn take_button(&mut self, ctx: &Context, response: &Response, target: &Target, test: &TestView, frames: &Frames) {
+    fn take_button(
+        &mut self,
+        ctx: &Context,
+        response: &Response,
+        target: &Target,
+        test: &TestView,
+        seen: (&Frames, Option<usize>),
+    ) {
         let is_held = ctx.input(|input| input.pointer.button_down(PointerButton::Primary) && !input.modifiers.shift);
         let at = response.interact_pointer_pos();
         let Some(at) = at.filter(|_| is_held && response.is_pointer_button_down_on()) else {
@@ -66,7 +57,7 @@ impl PressState {
             return;
         };
         match self.grip {
-            None => self.grip = Some(self.take_hold(target, test, frames, at)),
+            None => self.grip = Some(self.take_hold(target, test, seen, at)),
             Some(Grip::Level(z_mm)) => {
                 if let Some(met) = target.sight.ray(points(at)).at_level(z_mm) {
                     self.print_at(within(target, met), test.stroke_mm);
@@ -82,17 +73,34 @@ impl PressState {
     }
 
     /// The button went down.
-    fn take_hold(&mut self, target: &Target, test: &TestView, frames: &Frames, at: Pos2) -> Grip {
-        let Some(met) = target.surface.pick(&target.sight.ray(points(at))) else {
-            return Grip::Missed;
+    fn take_hold(
+        &mut self,
+        target: &Target,
+        test: &TestView,
+        (frames, lit): (&Frames, Option<usize>),
+        at: Pos2,
+    ) -> Grip {
+        let ray = target.sight.ray(points(at));
+        let nodes_mm = &frames.actual.nodes_mm;
+        let lit = lit.and_then(|node| Some((node, *nodes_mm.get(node)?)));
+        // Beside a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
+        let beside = lit.and_then(|(_, place)| ray.at_level(place.z));
+        let met = match (target.surface.pick(&ray), beside, lit) {
+            (Some(picked), Some(beside), Some((_, place))) if beside.distance(place) < picked.distance(place) => beside,
+            (Some(picked), _, _) => picked,
+            (None, Some(beside), _) => beside,
+            (None, None, _) => return Grip::Missed,
         };
         if self.finger.tool != Tool::OneNode {
-            self.print_at(met.truncate(), test.stroke_mm);
+            self.print_at(within(target, met), test.stroke_mm);
             return Grip::Level(met.z);
         }
-        let nodes = frames.actual.nodes_mm.iter().enumerate();
         let distance = |node: &DVec3| node.truncate().distance_squared(met.truncate());
-        let Some((node, place)) = nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b))) else {
+        let nearest = || {
+            let nodes = nodes_mm.iter().copied().enumerate();
+            nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))
+        };
+        let Some((node, place)) = lit.or_else(nearest) else {
             return Grip::Missed;
         };
         if self.touch.is_none() {

@@ -9,7 +9,7 @@ use crate::{
         widgets::{dim_ui, placeholder_ui},
     },
     export::format_number,
-    figure::{HeatMap, readings_figure, ticks::round_steps},
+    figure::{HeatMap, readings_figure},
 };
 
 /// The card of the readings: [`readings_ui`] under a title.
@@ -50,6 +50,8 @@ fn readings_map(drops_percent: &Array2<f64>, rows: &[usize]) -> HeatMap {
     const LEAST_PERCENT: f64 = 0.01;
     let largest = drops_percent.iter().copied().filter(|drop| drop.is_finite());
     let largest = largest.fold(LEAST_PERCENT, f64::max);
-    let end = round_steps(largest).next().unwrap_or(largest);
+    let decade = 10_f64.powf(largest.log10().floor());
+    let ends = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0].map(|end| end * decade);
+    let end = ends.into_iter().find(|end| *end >= largest).unwrap_or(10.0 * decade);
     readings_figure(drops_percent.clone(), rows, end)
 }

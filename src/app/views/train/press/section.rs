@@ -124,7 +124,7 @@ fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let number = DragValue::new(&mut depth_mm)
             .range(0.0..=stroke_mm)
-            .speed(0.002 * stroke_mm);
+            .speed(0.01 * stroke_mm);
         let number = number
             .suffix(" mm")
             .max_decimals(3)

@@ -42,7 +42,14 @@ impl Question {
             (Some(one), Some(other)) => one.is(other),
             (one, other) => one.is_none() && other.is_none(),
         };
-        is_same_subject && Arc::ptr_eq(&self.test.set, &other.test.set) && self.touch == other.touch
+        is_same_subject && self.is_of(&other.test) && self.touch == other.touch
+    }
+
+    /// Returns true if it is about this sensor, with its rows and its stroke: a training begins with another test set of the
+    /// same.
+    pub(super) fn is_of(&self, test: &TestView) -> bool {
+        let of = |test: &TestView| (test.sensor, test.stroke_mm);
+        of(&self.test) == of(test) && self.test.rows == test.rows
     }
 
     /// Returns true if the answer takes a few milliseconds at most.

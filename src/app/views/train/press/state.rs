@@ -1,15 +1,14 @@
 use std::sync::Arc;
 
-use eframe::egui::{Id, Rect};
 use glam::DVec2;
 
 use super::{
     comparing::{Compared, Comparing},
     finger::{Finger, Hand, Tool},
-    pointer::Grip,
     ready::ReadyNetwork,
     shown::{Question, Shown},
     subject::Subject,
+    target::{Grip, Target},
 };
 use crate::{
     app::{
@@ -19,7 +18,7 @@ use crate::{
         test_view::TestView,
         views::train::drawn::Frames,
     },
-    figure::surface::{Sight, Surface},
+    figure::surface::Surface,
     scene::Touch,
 };
 
@@ -45,15 +44,6 @@ pub struct PressState {
     answering: Job<Result<Result<Shown, String>, JobError>>,
     /// The question that could not be answered, and why.
     failed: Option<(Question, String)>,
-}
-
-/// A surface on the screen that can be touched.
-#[derive(Clone, Debug)]
-pub(super) struct Target {
-    pub(super) id: Id,
-    pub(super) rect: Rect,
-    pub(super) sight: Sight,
-    pub(super) surface: Surface,
 }
 
 impl PressState {
@@ -162,11 +152,7 @@ impl PressState {
         let Some((touch, test)) = self.touch.as_ref().zip(shared.test()) else {
             return;
         };
-        if self
-            .shown
-            .as_ref()
-            .is_some_and(|shown| !Arc::ptr_eq(&shown.question.test.set, &test.set))
-        {
+        if self.shown.as_ref().is_some_and(|shown| !shown.question.is_of(test)) {
             // Another array, or another scene.
             self.let_go();
             return;
@@ -174,10 +160,23 @@ impl PressState {
         let question = Question {
             touch: touch.clone(),
             test: test.clone(),
-            subject: Subject::of(shared, result, &self.ready),
+            subject: self.subject(shared, result),
         };
         self.ask(question);
         self.comparing.follow(self.shown.as_ref());
+    }
+
+    /// The network on show, whose result is `result`; before there is one, the ready-made one.
+    fn subject(&self, shared: &Shared, result: Option<&RunResult>) -> Option<Subject> {
+        match shared.shown_run().zip(result) {
+            Some((run, result)) => Some(Subject {
+                networks: Arc::clone(&result.networks),
+                settings: run.settings,
+                is_ready_made: false,
+                is_standing: result.is_standing,
+            }),
+            None => self.ready.subject(shared),
+        }
     }
 
     /// Answers a question in this frame if it is light, otherwise behind it, one at a time.

@@ -1,11 +1,6 @@
 use std::sync::Arc;
 
-use super::ready::ReadyNetwork;
-use crate::{
-    app::shared::{RunResult, Shared},
-    evaluation::SimulatedSettings,
-    network::Networks,
-};
+use crate::{evaluation::SimulatedSettings, network::Networks};
 
 /// The network that answers the finger.
 #[derive(Clone, Debug)]
@@ -21,19 +16,6 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The network on show, whose result is `result`; before there is one, the ready-made one.
-    pub(super) fn of(shared: &Shared, result: Option<&RunResult>, ready: &ReadyNetwork) -> Option<Self> {
-        match shared.shown_run().zip(result) {
-            Some((run, result)) => Some(Self {
-                networks: Arc::clone(&result.networks),
-                settings: run.settings,
-                is_ready_made: false,
-                is_standing: result.is_standing,
-            }),
-            None => ready.subject(shared),
-        }
-    }
-
     pub(super) fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.networks, &other.networks)
     }

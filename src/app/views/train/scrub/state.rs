@@ -107,9 +107,12 @@ impl ScrubState {
                 Ok(None) | Err(_) => self.show_latest(),
             }
         }
-        let Some((run, epoch)) = run.zip(self.wanted) else {
+        let Some((run, wanted)) = run.zip(self.wanted) else {
             return;
         };
+        // It may have been thinned out meanwhile.
+        self.show(wanted, &run.past);
+        let Some(epoch) = self.wanted else { return };
         let is_there = self.result.as_ref().is_some_and(|result| result.epochs_run == epoch);
         if !is_there && !self.job.is_under_way() {
             self.compute(run, epoch);
@@ -124,8 +127,6 @@ impl ScrubState {
             Arc::clone(&run.test.set),
         );
         let (stroke_mm, is_standing) = (run.test.stroke_mm, present.is_standing);
-        // Some of the epochs wished for may be thinned out by now.
-        let epoch = past.nearest(epoch).unwrap_or(epoch);
         self.job.start(
             move |_| {
                 let result = result_at(epoch, &past, &networks, &test, stroke_mm)?;

@@ -1,0 +1,20 @@
+//! `decoupler sweep`: trains every combination of options. A trial is determined by its options and the program, its file
+//! is named by their hash and written whole or not at all, and whoever trains it holds a lock: so any number of programs,
+//! on any machines that see the folder, may fill it together, end at any moment and be started again.
+
+mod claim;
+mod command;
+mod filling;
+mod job_script;
+mod merging;
+mod row;
+mod shard;
+mod specification;
+mod stop;
+mod table;
+mod train_options;
+mod training;
+mod trials;
+mod unique_keys;
+
+pub(super) use command::Sweep;

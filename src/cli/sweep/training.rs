@@ -1,0 +1,56 @@
+use std::time::{Duration, Instant};
+
+use super::{claim::Claim, trials::PlannedTrial};
+use crate::{
+    cli::{checkpointing::Checkpointing, failure::Failure, train::measure_decoders, train_report::report},
+    evaluation::{Run, Workload},
+    export::{CheckpointFile, NetworkFile, Trial},
+};
+
+/// Time between two checkpoints of a trial: what a killed program loses at most.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Trains the trial of `claim` and measures it as `train` does, beside so many others. Returns none if it was stopped,
+/// with a checkpoint from which it is resumed with the same bits.
+pub(super) fn train(
+    trial: &PlannedTrial,
+    claim: &Claim,
+    beside: usize,
+    is_stopped: impl Fn() -> bool,
+) -> Result<Option<Trial>, Failure> {
+    let begun = Instant::now();
+    let mut workload = Workload::of(&trial.settings)?;
+    workload.bytes = workload.bytes.saturating_mul(beside as u64);
+    workload.check_memory()?;
+    let (mut run, before) = match resumed(trial, claim) {
+        Some(resumed) => resumed,
+        None => (Run::prepare(trial.settings)?, Duration::ZERO),
+    };
+    let mut checkpointing = Checkpointing::every(CHECKPOINT_INTERVAL, claim.checkpoint());
+    while run.stop_reason().is_none() {
+        if is_stopped() {
+            checkpointing.save(&run)?;
+            return Ok(None);
+        }
+        checkpointing.save_if_due(&run);
+        run.step();
+    }
+    let file = NetworkFile::from_run(&run)?;
+    let mut decoders = Vec::new();
+    measure_decoders(&trial.decoders, &file, &run, &mut decoders)?;
+    let report = report(&file, run.flaw().as_ref(), &decoders)?;
+    let report = serde_json::to_value(report).expect("a report has only text keys");
+    let seconds = (before + begun.elapsed()).as_secs_f64();
+    Ok(Some(Trial::new(trial.options.clone(), report, seconds)))
+}
+
+/// The run saved in the checkpoint of `claim`, with the time that it had taken. A checkpoint that is damaged or does not
+/// belong to the trial is no worse than none.
+fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, Duration)> {
+    let file = CheckpointFile::load(&claim.checkpoint()).ok()?;
+    if file.settings != trial.settings {
+        return None;
+    }
+    let before = file.wall_time.unwrap_or_default();
+    Some((file.resume().ok()?, before))
+}

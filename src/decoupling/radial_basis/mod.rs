@@ -1,0 +1,250 @@
+//! Radial-basis networks, fitted and prepared to decode fast.
+
+mod gaussians;
+
+use ndarray::{Array2, Axis};
+use pulp::{Simd, WithSimd};
+use rand::Rng;
+
+use self::gaussians::{Gaussians, gaussian};
+use super::{
+    DecodeError, Decoder,
+    clusters::k_means,
+    compiled::padded_layer::PaddedLayer,
+    distinct::{distinct, with_noise},
+    ridge::Ridge,
+};
+use crate::{
+    dataset::Dataset,
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingError},
+    scene::NoiseSource,
+};
+
+/// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear output
+/// layer with a constant, fitted by ridge regression with the penalty of the least leave-one-out error.
+///
+/// The scalings are folded into the layers, and decoding allocates nothing.
+#[derive(Clone, Debug)]
+pub struct RadialBasisNetwork {
+    quantity: Quantity,
+    /// Centre of each channel, subtracted from its values.
+    channel_centres: Vec<f64>,
+    /// From centred channels to scaled inputs.
+    input_layer: PaddedLayer,
+    centres: usize,
+    gaussians: Gaussians,
+    /// From Gaussians to the changes of the varying targets.
+    output_layer: PaddedLayer,
+    /// Targets from which the output layer counts.
+    middles: Vec<f64>,
+    /// Indices of the varying targets.
+    varying: Vec<usize>,
+    buffers: Buffers,
+}
+
+/// Buffers for one row.
+#[derive(Clone, Debug)]
+struct Buffers {
+    channels: Vec<f64>,
+    inputs: Vec<f64>,
+    gaussians: Vec<f64>,
+    changes: Vec<f64>,
+}
+
+/// Settings of a radial-basis network.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadialBasisSettings {
+    /// Positions of the Gaussians.
+    pub centres: Centres,
+    /// Width of the Gaussians in proportion to the root mean square distance between inputs.
+    pub relative_width: f64,
+}
+
+/// Positions of the Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Centres {
+    /// On every training sample.
+    Samples,
+    /// On this many means of clusters (Lloyd 1982), at most one for each sample.
+    KMeans(usize),
+}
+
+impl Default for RadialBasisSettings {
+    fn default() -> Self {
+        Self {
+            centres: Centres::KMeans(100),
+            relative_width: 2.0,
+        }
+    }
+}
+
+impl RadialBasisNetwork {
+    /// Fits to a training set; `unseen` as in [`Inputs::fit`]; `rng` draws it, and where clusters begin.
+    ///
+    /// # Errors
+    /// Values that cannot be scaled.
+    pub fn fit(
+        training: &Dataset,
+        choice: InputChoice,
+        unseen: NoiseSource,
+        settings: RadialBasisSettings,
+        rng: &mut impl Rng,
+    ) -> Result<Self, ScalingError> {
+        let training = with_noise(training, unseen, rng);
+        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
+        let outputs = MinMax::fit(training.targets())?;
+        let x = inputs.of(training.readings());
+        let y = outputs.scale(training.targets());
+        let centres = match settings.centres {
+            Centres::Samples => x.clone(),
+            Centres::KMeans(count) => k_means(x.view(), count.clamp(1, x.nrows()), rng),
+        };
+        // Twice the total variance is the mean squared distance between two samples.
+        let spread2 = 2.0 * x.var_axis(Axis(0), 0.0).sum();
+        let width2 = settings.relative_width.powi(2) * spread2;
+        let sharpness = if width2 > 0.0 { 0.5 / width2 } else { 0.0 };
+        let (x, y) = distinct(x.view(), y.view());
+        let basis = Array2::from_shape_fn((x.nrows(), centres.nrows()), |(s, c)| {
+            gaussian(x.row(s), centres.row(c), sharpness)
+        });
+        let ridge = Ridge::new(basis.view(), y.view(), Array2::zeros((0, centres.nrows())).view())?;
+        let coefficients = ridge.coefficients(ridge.best_penalty());
+        Ok(Self::folded(&inputs, &centres, sharpness, &coefficients, &outputs))
+    }
+
+    /// Folds the scalings into the layers; `coefficients` are (centres + 1) × varying outputs, the constant last.
+    fn folded(
+        inputs: &Inputs,
+        centres: &Array2<f64>,
+        sharpness: f64,
+        coefficients: &Array2<f64>,
+        outputs: &MinMax,
+    ) -> Self {
+        let (channel_centres, to_inputs) = inputs.affine();
+        let ranges = outputs.middles_and_half_widths();
+        let varying = outputs.varying();
+        let gaussians = Gaussians::new(centres, sharpness);
+        let (channels, count, width) = (channel_centres.len(), centres.nrows(), gaussians.width());
+        let input_layer = PaddedLayer::new((channels, inputs.count()), |channel, input| {
+            channel.map_or(0.0, |channel| to_inputs[[input, channel]])
+        });
+        let output_layer = PaddedLayer::new((width, varying.len()), |centre, output| {
+            let half_width = ranges[varying[output]].1;
+            match centre {
+                None => coefficients[[count, output]] * half_width,
+                Some(centre) if centre < count => coefficients[[centre, output]] * half_width,
+                Some(_) => 0.0,
+            }
+        });
+        Self {
+            quantity: inputs.quantity(),
+            buffers: Buffers {
+                channels: vec![0.0; channels],
+                inputs: vec![0.0; input_layer.padded_outputs()],
+                gaussians: vec![0.0; width],
+                changes: vec![0.0; output_layer.padded_outputs()],
+            },
+            channel_centres,
+            input_layer,
+            centres: count,
+            gaussians,
+            output_layer,
+            middles: ranges.iter().map(|range| range.0).collect(),
+            varying,
+        }
+    }
+
+    /// Number of Gaussians.
+    pub fn centres(&self) -> usize {
+        self.centres
+    }
+}
+
+impl Decoder for RadialBasisNetwork {
+    fn channels(&self) -> usize {
+        self.channel_centres.len()
+    }
+
+    fn outputs(&self) -> usize {
+        self.middles.len()
+    }
+
+    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        assert_eq!((readings.len(), targets.len()), (self.channels(), self.outputs()));
+        DecodeError::check_for(self.quantity, readings)?;
+        pulp::Arch::new().dispatch(Decoding {
+            network: self,
+            readings,
+            targets,
+        });
+        Ok(())
+    }
+}
+
+/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
+struct Decoding<'a> {
+    network: &'a mut RadialBasisNetwork,
+    readings: &'a [f64],
+    targets: &'a mut [f64],
+}
+
+impl WithSimd for Decoding<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let RadialBasisNetwork {
+            quantity,
+            channel_centres,
+            input_layer,
+            gaussians,
+            output_layer,
+            middles,
+            varying,
+            buffers,
+            ..
+        } = self.network;
+        let values = buffers.channels.iter_mut().zip(self.readings).zip(&*channel_centres);
+        values.for_each(|((value, &reading), centre)| *value = quantity.of(reading) - centre);
+        input_layer.apply(&buffers.channels, &mut buffers.inputs);
+        gaussians.evaluate(&buffers.inputs[..input_layer.outputs()], &mut buffers.gaussians);
+        output_layer.apply(&buffers.gaussians, &mut buffers.changes);
+        self.targets.copy_from_slice(middles);
+        for (&target, change) in varying.iter().zip(&buffers.changes) {
+            self.targets[target] += change;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::{Seed, Stream},
+        scene::Scene,
+        sensor::SensorModel,
+    };
+
+    #[test]
+    fn gaussians_on_every_sample_come_close_to_the_samples() {
+        let model = SensorModel::new("1x4_2x12".parse().unwrap());
+        let mut rng = Seed(0).rng(Stream::Training);
+        let set = Dataset::simulate(&model, &Scene::default(), 40, &mut rng).unwrap();
+        let settings = RadialBasisSettings {
+            centres: Centres::Samples,
+            relative_width: 0.5,
+        };
+        let mut network =
+            RadialBasisNetwork::fit(&set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng).unwrap();
+        assert_eq!(network.centres(), 40);
+        for sample in 0..40 {
+            let mut coordinates = [0.0; 12];
+            network
+                .decode_row(0, set.sample_readings(sample), &mut coordinates)
+                .unwrap();
+            for (ours, truth) in coordinates.iter().zip(set.sample_targets(sample)) {
+                assert!((ours - truth).abs() < 0.01, "{sample}: {ours} {truth}");
+            }
+        }
+    }
+}

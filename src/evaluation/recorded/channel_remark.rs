@@ -1,0 +1,200 @@
+use ndarray::{ArrayView1, Axis};
+
+use crate::{dataset::Dataset, sensor::short};
+
+/// Remark on a channel whose readings tell less than they should. Channels are counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ChannelRemark {
+    /// All readings are the same.
+    Constant {
+        /// Channel.
+        channel: usize,
+        /// Its only reading.
+        value: f64,
+    },
+    /// All readings are those of an earlier channel, or a linear function of them.
+    Duplicate {
+        /// Channel.
+        channel: usize,
+        /// Earlier channel that it repeats.
+        of: usize,
+    },
+    /// Readings pile up at their least or largest value.
+    Saturated {
+        /// Channel.
+        channel: usize,
+        /// Value at which they pile up.
+        value: f64,
+        /// True if it is the largest value, false if the least.
+        is_largest: bool,
+        /// Share of the samples at that value.
+        share: f64,
+    },
+}
+
+impl ChannelRemark {
+    /// Channel at fault, from 0.
+    pub fn channel(&self) -> usize {
+        match *self {
+            Self::Constant { channel, .. } | Self::Duplicate { channel, .. } | Self::Saturated { channel, .. } => {
+                channel
+            }
+        }
+    }
+
+    /// A sentence with the channels' names.
+    pub fn sentence(&self, name: impl Fn(usize) -> String) -> String {
+        match *self {
+            Self::Constant { channel, value } => format!(
+                "{} is {} in every sample: it tells nothing; check its wire",
+                name(channel),
+                short(value)
+            ),
+            Self::Duplicate { channel, of } => format!(
+                "{} repeats {}: it adds nothing; check that it is the channel you meant",
+                name(channel),
+                name(of)
+            ),
+            Self::Saturated {
+                channel,
+                value,
+                is_largest,
+                share,
+            } => format!(
+                "{} stands at its {} value {} in {:.1} % of the samples: it is saturated there, or its range ends; give it \
+                 a wider range",
+                name(channel),
+                if is_largest { "largest" } else { "least" },
+                short(value),
+                100.0 * share
+            ),
+        }
+    }
+}
+
+/// Finds the constant, duplicated and saturated channels of `set`, channel by channel.
+///
+/// A channel is saturated if at least 1 % of its samples, and no fewer than 5, have its least (or largest) value, and more
+/// than three times as many as have any of the three values next to it: the tail of a distribution thins out towards its
+/// end, where a limit piles it up. Channels of fewer than six different values, such as switches, are not judged.
+pub fn channel_remarks(set: &Dataset) -> Vec<ChannelRemark> {
+    let readings = set.readings();
+    let units: Vec<Option<Vec<f64>>> = readings.axis_iter(Axis(1)).map(unit_vector).collect();
+    let mut remarks = Vec::new();
+    for (channel, unit) in units.iter().enumerate() {
+        let Some(unit) = unit else {
+            let value = readings[[0, channel]];
+            remarks.push(ChannelRemark::Constant { channel, value });
+            continue;
+        };
+        let repeats = |of: &usize| units[*of].as_ref().is_some_and(|other| is_parallel(unit, other));
+        if let Some(of) = (0..channel).find(repeats) {
+            remarks.push(ChannelRemark::Duplicate { channel, of });
+            continue;
+        }
+        remarks.extend(saturation(channel, readings.column(channel)));
+    }
+    remarks
+}
+
+/// Deviations of the readings from their mean, as a vector of length 1; `None` for a constant channel.
+fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Vec<f64>> {
+    if channel.iter().all(|value| *value == channel[0]) {
+        return None;
+    }
+    let mean = channel.sum() / channel.len() as f64;
+    let largest = channel.iter().map(|value| (value - mean).abs()).fold(0.0, f64::max);
+    let off: Vec<f64> = channel.iter().map(|value| (value - mean) / largest).collect();
+    let length = off.iter().map(|value| value * value).sum::<f64>().sqrt();
+    Some(off.into_iter().map(|value| value / length).collect())
+}
+
+/// Tells whether two unit vectors are the same but for their sign and for rounding.
+fn is_parallel(one: &[f64], other: &[f64]) -> bool {
+    /// Distance of unit vectors that rounding of the readings explains.
+    const ROUNDING: f64 = 1e-9;
+    let along: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
+    let apart = |(a, b): (&f64, &f64)| (a - along.signum() * b).powi(2);
+    along.abs() > 0.999_999 && one.iter().zip(other).map(apart).sum::<f64>().sqrt() < ROUNDING
+}
+
+fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemark> {
+    const FEWEST: usize = 5;
+    const LEAST_SHARE: f64 = 0.01;
+    /// Times as many as at any of the neighbouring values.
+    const PILE: usize = 3;
+    let mut sorted = readings.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let runs: Vec<&[f64]> = sorted.chunk_by(|one, other| one == other).collect();
+    if runs.len() < 6 {
+        return Vec::new();
+    }
+    let judge = |end: &[f64], next: &[&[f64]], is_largest: bool| {
+        let share = end.len() as f64 / sorted.len() as f64;
+        let neighbours = next.iter().map(|run| run.len()).max().unwrap_or(0);
+        let piles_up = end.len() >= FEWEST && share >= LEAST_SHARE && end.len() > PILE * neighbours;
+        piles_up.then_some(ChannelRemark::Saturated {
+            channel,
+            value: end[0],
+            is_largest,
+            share,
+        })
+    };
+    let last = runs.len() - 1;
+    let ends = [
+        judge(runs[0], &runs[1..4], false),
+        judge(runs[last], &runs[last - 3..last], true),
+    ];
+    ends.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::scene::normal::standard_normal;
+
+    #[test]
+    fn faulty_channels_are_named_and_sound_ones_are_not() {
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let mut readings = Array2::from_shape_simple_fn((2000, 8), || standard_normal(&mut rng));
+        for mut row in readings.rows_mut() {
+            row[1] = 4.2;
+            row[3] = row[0];
+            row[4] = 1e4 - 250.0 * row[2];
+            row[5] = row[5].min(1.5); // 6.7 % of the samples.
+            row[6] = (row[6] * 10.0).round(); // A coarse converter, with tails.
+            row[7] = f64::from(u8::from(row[7] > 1.0)); // A switch.
+        }
+        let targets = Array2::zeros((2000, 1));
+        let set = Dataset::new(readings, targets, None, (0..2000).collect()).unwrap();
+        let remarks = channel_remarks(&set);
+        let name = |channel: usize| format!("c{}", channel + 1);
+        let sentences: Vec<String> = remarks.iter().map(|remark| remark.sentence(name)).collect();
+        let expected = [
+            "c2 is 4.2 in every sample",
+            "c4 repeats c1",
+            "c5 repeats c3",
+            "c6 stands at its largest value 1.5 in ",
+        ];
+        assert_eq!(sentences.len(), expected.len(), "{sentences:?}");
+        for (sentence, start) in sentences.iter().zip(expected) {
+            assert!(sentence.starts_with(start), "{sentence}");
+        }
+        assert_eq!(remarks.last().map(ChannelRemark::channel), Some(5));
+    }
+
+    #[test]
+    fn channels_that_are_nearly_the_same_are_not_duplicates() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut readings = Array2::from_shape_simple_fn((500, 2), || standard_normal(&mut rng));
+        for mut row in readings.rows_mut() {
+            row[1] = row[0] + 1e-6 * row[1];
+        }
+        let set = Dataset::new(readings, Array2::zeros((500, 1)), None, (0..500).collect()).unwrap();
+        assert_eq!(channel_remarks(&set), []);
+    }
+}

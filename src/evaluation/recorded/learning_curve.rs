@@ -1,0 +1,274 @@
+use rand::{Rng, RngExt, seq::SliceRandom};
+
+use super::{FittedModel, Interval, PowerLaw, resampling::Resampling};
+use crate::{
+    dataset::{Dataset, Parts, Seed, Split, SplitBy, Stream},
+    decoupling::decode_set,
+    evaluation::{Run, RunError, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
+};
+
+/// Test error as a function of the number of training samples, for one target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LearningCurve {
+    /// Errors at each number of samples, ascending.
+    pub points: Vec<LearningPoint>,
+    /// The law fitted to them; `None` with fewer than three numbers.
+    pub law: Option<PowerLaw>,
+    /// What twice the training samples would bring; `None` without a law.
+    pub doubling: Option<Doubling>,
+}
+
+/// RMSE at one number of training samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearningPoint {
+    /// Number of training samples.
+    pub samples: usize,
+    /// Mean RMSE of the fits, in the unit of the target.
+    pub rmse: f64,
+    /// RMSE of the best and of the worst fit.
+    pub range: [f64; 2],
+}
+
+/// Error with twice the training samples in proportion to that with all there are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Doubling {
+    /// Proportion with its interval: below 1 where more samples would help. The median over bootstrap samples of the test
+    /// set and of the fits, and over laws fitted from each number of samples on, since none holds down to the smallest.
+    pub ratio: Interval,
+}
+
+/// Squared errors of one fit on the test set.
+struct Fitted {
+    samples: usize,
+    /// Samples × outputs.
+    squares: ndarray::Array2<f64>,
+}
+
+impl LearningCurve {
+    /// Fits at each number of samples below all.
+    pub const REPEATS: usize = 4;
+    /// Numbers of samples, each the larger by √2, up to all. Below an eighth of a recording, stretches miss whole regions
+    /// of what is sensed, and errors follow no law that could be extended.
+    const LEVELS: i32 = 7;
+    /// Fewest training samples of a fit.
+    const FEWEST: usize = 8;
+    /// Part of the error that twice the samples must save to be called a gain.
+    const WORTH_SAYING: f64 = 0.01;
+
+    /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
+    /// test samples, target by target; `None` if cancelled. Parts of the training set are stretches of the recording, whole
+    /// groups or single samples as `by` says, so that twice as many samples mean twice as long a recording, or twice as
+    /// many groups. Takes up to 28 fits.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub fn measure(
+        settings: &RunSettings,
+        set: &Dataset,
+        (parts, by): (&Parts, SplitBy),
+        model: FittedModel,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<Self>>, RunError> {
+        let (whole, test) = (parts.split(set), parts.test_set(set));
+        let mut rng = settings.seed.rng(Stream::Resampling);
+        let mut fits = Vec::new();
+        for level in (0..Self::LEVELS).rev() {
+            let share = std::f64::consts::FRAC_1_SQRT_2.powi(level);
+            let wanted = (share * whole.training.samples() as f64).round() as usize;
+            if wanted < Self::FEWEST {
+                continue;
+            }
+            // The network's start varies where its samples do not.
+            let repeats = if level == 0 && model == FittedModel::Ridge {
+                1
+            } else {
+                Self::REPEATS
+            };
+            for repeat in 0..repeats {
+                if is_cancelled() {
+                    return Ok(None);
+                }
+                let chosen = choose(&whole.training, wanted, by, (repeat, repeats), &mut rng);
+                let split = Split {
+                    training: whole.training.select(&chosen),
+                    validation: whole.validation.clone(),
+                };
+                let seed = nth_seed(settings.seed, repeat);
+                let Some(squares) = squared_errors(settings, seed, split, &test, model, is_cancelled)? else {
+                    return Ok(None);
+                };
+                fits.push(Fitted {
+                    samples: chosen.len(),
+                    squares,
+                });
+            }
+        }
+        let curve = |target| Self::of_target(&fits, &test, target, by, &mut rng);
+        Ok(Some((0..set.outputs()).map(curve).collect()))
+    }
+
+    fn of_target(fits: &[Fitted], test: &Dataset, target: usize, by: SplitBy, rng: &mut impl Rng) -> Self {
+        let levels: Vec<&[Fitted]> = fits.chunk_by(|one, other| near(one.samples, other.samples)).collect();
+        let rmse = |fit: &Fitted| fit.squares.column(target).mean().unwrap_or(0.0).sqrt();
+        let points: Vec<LearningPoint> = levels.iter().map(|level| point(level, rmse)).collect();
+        let law = law_of(&points);
+        let doubling = law.and(points.last()).and_then(|all| {
+            let whole = all.samples as f64;
+            let columns: Vec<Vec<f64>> = fits.iter().map(|fit| fit.squares.column(target).to_vec()).collect();
+            let resampling = Resampling::of(test, by, columns.last().map(Vec::as_slice));
+            // Squared errors of every fit in every unit of the test set.
+            let sums: Vec<Vec<[f64; 2]>> = columns
+                .iter()
+                .map(|squares| resampling.sums(|sample| [1.0, squares[sample]]))
+                .collect();
+            let mut picks = Seed(rng.random()).rng(Stream::Resampling);
+            let mut replicates = Vec::new();
+            resampling.draw(rng, |times| {
+                let rmse = |fit: usize| {
+                    let [count, squares] = super::resampling::weighted(&sums[fit], times);
+                    (squares / count).sqrt()
+                };
+                let (mut drawn, mut before, mut first): (Vec<(f64, f64)>, Vec<f64>, usize) = Default::default();
+                for level in &levels {
+                    let errors: Vec<f64> = (first..first + level.len()).map(rmse).collect();
+                    first += level.len();
+                    let mut pick = |errors: &[f64]| errors[picks.random_range(0..errors.len())];
+                    let picked = errors.iter().map(|_| pick(&errors)).sum::<f64>() / errors.len() as f64;
+                    // A single fit has the luck of its samples, as much as one of the level before.
+                    let luck = if errors.len() == 1 && !before.is_empty() {
+                        pick(&before) * before.len() as f64 / before.iter().sum::<f64>()
+                    } else {
+                        1.0
+                    };
+                    let samples = level.iter().map(|fit| fit.samples as f64).sum::<f64>() / level.len() as f64;
+                    drawn.push((samples, picked * luck));
+                    before = errors;
+                }
+                // A law holds only so far down: how far, no one knows.
+                let lowest = picks.random_range(0..=drawn.len().saturating_sub(3));
+                replicates.push(PowerLaw::fit(&drawn[lowest..]).map_or(f64::NAN, |law| law.doubling(whole)));
+            });
+            let mut finite: Vec<f64> = replicates.iter().copied().filter(|ratio| ratio.is_finite()).collect();
+            finite.sort_by(f64::total_cmp);
+            let ratio = Interval::of_replicates(*finite.get(finite.len() / 2)?, &replicates)?;
+            Some(Doubling { ratio })
+        });
+        Self { points, law, doubling }
+    }
+
+    /// Tells whether twice the samples would lower the error by more than the interval shows.
+    pub fn gains(&self) -> bool {
+        self.doubling
+            .is_some_and(|doubling| doubling.ratio.high < 1.0 - Self::WORTH_SAYING)
+    }
+
+    /// A sentence on what twice the samples would bring for the target of this name.
+    pub fn sentence(&self, name: &str) -> String {
+        let percent = |ratio: f64| 100.0 * (1.0 - ratio);
+        match self.doubling {
+            None => format!("too few samples to tell what more would bring for {name}"),
+            Some(Doubling { ratio }) if self.gains() => format!(
+                "twice the samples would lower the error of {name} by about {:.0} % ({:.0} to {:.0} %)",
+                percent(ratio.value),
+                percent(ratio.high),
+                percent(ratio.low)
+            ),
+            Some(Doubling { ratio }) => format!(
+                "no gain seen for {name} from more samples like these (twice as many: {:.0} %, {:.0} to {:.0} %)",
+                percent(ratio.value),
+                percent(ratio.high),
+                percent(ratio.low)
+            ),
+        }
+    }
+}
+
+/// Numbers of samples of one level: whole groups cannot be halved exactly.
+fn near(one: usize, other: usize) -> bool {
+    let ratio = one as f64 / other as f64;
+    (0.85..1.18).contains(&ratio)
+}
+
+fn point(level: &[Fitted], rmse: impl Fn(&Fitted) -> f64) -> LearningPoint {
+    let errors: Vec<f64> = level.iter().map(rmse).collect();
+    let count = level.len();
+    LearningPoint {
+        samples: (level.iter().map(|fit| fit.samples).sum::<usize>() + count / 2) / count,
+        rmse: errors.iter().sum::<f64>() / count as f64,
+        range: [
+            errors.iter().copied().fold(f64::INFINITY, f64::min),
+            errors.iter().copied().fold(0.0, f64::max),
+        ],
+    }
+}
+
+fn law_of(points: &[LearningPoint]) -> Option<PowerLaw> {
+    let points: Vec<(f64, f64)> = points.iter().map(|point| (point.samples as f64, point.rmse)).collect();
+    PowerLaw::fit(&points)
+}
+
+/// Chooses about `wanted` samples for one of several repeats: a stretch that begins later with each repeat, groups or
+/// samples at random.
+fn choose(
+    training: &Dataset,
+    wanted: usize,
+    by: SplitBy,
+    (repeat, repeats): (usize, usize),
+    rng: &mut impl Rng,
+) -> Vec<usize> {
+    let all = training.samples();
+    match by {
+        SplitBy::Time => {
+            let first = (all - wanted) * repeat / (repeats - 1).max(1);
+            (first..first + wanted).collect()
+        }
+        SplitBy::Group => {
+            let mut groups = training.snapshots();
+            groups.shuffle(rng);
+            let mut chosen = Vec::new();
+            for group in groups {
+                // The nearest number, but never none.
+                if !chosen.is_empty() && (chosen.len() + group.len() / 2) >= wanted {
+                    break;
+                }
+                chosen.extend(group);
+            }
+            chosen.sort_unstable();
+            chosen
+        }
+        SplitBy::Random => {
+            let mut chosen: Vec<usize> = (0..all).collect();
+            chosen.shuffle(rng);
+            chosen.truncate(wanted);
+            chosen.sort_unstable();
+            chosen
+        }
+    }
+}
+
+/// Squared errors on `test` (samples × outputs) of a fit to `split`; `None` if cancelled.
+fn squared_errors(
+    settings: &RunSettings,
+    seed: Seed,
+    split: Split,
+    test: &Dataset,
+    model: FittedModel,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<ndarray::Array2<f64>>, RunError> {
+    let answers = match model {
+        FittedModel::Ridge => {
+            let (_, mut ridge) = fit_baselines(&split.training, settings)?;
+            decode_set(&mut ridge, test)?
+        }
+        FittedModel::Network => {
+            let mut run = Run::on_sets(RunSettings { seed, ..*settings }, split, test.clone())?;
+            while run.step().is_none() {
+                if is_cancelled() {
+                    return Ok(None);
+                }
+            }
+            run.decouple_test()
+        }
+    };
+    Ok(Some((answers - test.targets()).mapv(|error| error * error)))
+}

@@ -1,0 +1,27 @@
+//! What recorded readings can tell: of each target, by each channel, and with more samples.
+//!
+//! Everything is judged on held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and every
+//! figure has a 95 % confidence interval from resampling blocks or groups of samples, because neighbouring samples of a
+//! recording are nearly the same.
+
+mod block_length;
+mod channel_importance;
+mod channel_remark;
+mod determination;
+mod held_out;
+mod interval;
+mod learning_curve;
+mod nonlinear_gain;
+mod power_law;
+mod resampling;
+mod split_comparison;
+
+pub use channel_importance::{ChannelImportance, channel_importance};
+pub use channel_remark::{ChannelRemark, channel_remarks};
+pub use determination::{Determination, Standing};
+pub use held_out::FittedModel;
+pub use interval::Interval;
+pub use learning_curve::{Doubling, LearningCurve, LearningPoint};
+pub use nonlinear_gain::NonlinearGain;
+pub use power_law::PowerLaw;
+pub use split_comparison::SplitComparison;

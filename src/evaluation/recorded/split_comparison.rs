@@ -1,0 +1,86 @@
+use crate::{
+    dataset::{Dataset, Folds, SplitBy, Stream},
+    evaluation::{CrossValidated, RunError, RunSettings, TargetErrors},
+};
+
+/// Held-out errors of the same settings on the same samples, once with folds by time or group, once with random folds:
+/// the difference is how much a random split flatters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SplitComparison {
+    /// Rule of the folds that do not flatter.
+    pub by: SplitBy,
+    /// Errors of the network by that rule, target by target.
+    pub network: Vec<TargetErrors>,
+    /// Errors of ridge regression by that rule.
+    pub ridge: Vec<TargetErrors>,
+    /// Errors of the network on random folds.
+    pub random_network: Vec<TargetErrors>,
+    /// Errors of ridge regression on random folds.
+    pub random_ridge: Vec<TargetErrors>,
+}
+
+impl SplitComparison {
+    /// Share of the error that a random split must hide to be worth a sentence.
+    const WORTH_SAYING: f64 = 0.05;
+
+    /// Cross-validates `set` with `folds` folds twice, by `by` and at random; `None` if cancelled. Takes 2 × folds
+    /// trainings.
+    ///
+    /// # Errors
+    /// If the folds cannot be filled, or the settings are invalid.
+    pub fn measure(
+        settings: &RunSettings,
+        set: &Dataset,
+        folds: usize,
+        by: SplitBy,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let validate = |by| -> Result<Option<CrossValidated>, RunError> {
+            let folds = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split))?;
+            CrossValidated::on_folds(settings, set, folds, is_cancelled)
+        };
+        let Some(honest) = validate(by)? else { return Ok(None) };
+        let Some(random) = validate(SplitBy::Random)? else {
+            return Ok(None);
+        };
+        let errors = |answers: &ndarray::Array2<f64>| TargetErrors::measure(set.targets(), answers.view());
+        Ok(Some(Self {
+            by,
+            network: errors(&honest.network),
+            ridge: errors(&honest.linear),
+            random_network: errors(&random.network),
+            random_ridge: errors(&random.linear),
+        }))
+    }
+
+    /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds flatter.
+    /// `None` if the latter is 0.
+    pub fn network_ratio(&self, target: usize) -> Option<f64> {
+        ratio(&self.random_network[target], &self.network[target])
+    }
+
+    /// As [`Self::network_ratio`], of ridge regression.
+    pub fn ridge_ratio(&self, target: usize) -> Option<f64> {
+        ratio(&self.random_ridge[target], &self.ridge[target])
+    }
+
+    /// A sentence on what a random split would have reported for the target of this name.
+    pub fn sentence(&self, target: usize, name: &str) -> String {
+        let (honest, random) = (self.network[target].rmse, self.random_network[target].rmse);
+        let by = self.by;
+        match self.network_ratio(target) {
+            Some(ratio) if ratio < 1.0 - Self::WORTH_SAYING => format!(
+                "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: random \
+                 flatters by {:.0} %, because neighbouring samples are nearly the same",
+                100.0 * (1.0 - ratio)
+            ),
+            _ => format!(
+                "a random split does not flatter here: RMSE {random:.4} for {name}, and {honest:.4} split by {by}"
+            ),
+        }
+    }
+}
+
+fn ratio(random: &TargetErrors, honest: &TargetErrors) -> Option<f64> {
+    Some(random.rmse / honest.rmse).filter(|ratio| ratio.is_finite())
+}

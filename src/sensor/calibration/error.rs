@@ -1,0 +1,65 @@
+use thiserror::Error;
+
+use super::super::{SensorError, short};
+
+/// Reason why a sensor cannot be calibrated.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// The nominal sensor is impossible.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The array has no such row-wire, or a row has another number of nodes or readings.
+    #[error("sample {}: {found} {what}, where the array {scale} has {expected}; give samples of this array", .sample + 1)]
+    Shape {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Part at fault.
+        what: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number of the array.
+        expected: usize,
+        /// Name of the array scale.
+        scale: String,
+    },
+    /// A reading is not a resistance.
+    #[error(
+        "sample {}, column {}: the reading {} is not a resistance; leave this sample out",
+        .sample + 1, .column + 1, short(*.ohm)
+    )]
+    Reading {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Column-wire, from 0.
+        column: usize,
+        /// The reading.
+        ohm: f64,
+    },
+    /// A displacement is not finite, or puts a node on or below the column-wires of the nominal sensor.
+    #[error(
+        "sample {}, node {}: this displacement puts the node on or below the column-wires; check the unit (mm, downwards \
+         positive) and the height of the nominal sensor",
+        .sample + 1, .node + 1
+    )]
+    Displacement {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+    },
+    /// There are fewer readings than parameters, or none.
+    #[error("{readings} readings are too few to fit {parameters} parameters; give more frames")]
+    TooFew {
+        /// Number of readings.
+        readings: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// The fit did not come to an end.
+    #[error(
+        "the fit did not converge: the readings do not follow Eq. (2) from this nominal geometry; check the array scale, the \
+         order of the wires, and that displacements are in millimetres"
+    )]
+    NotConverged,
+}

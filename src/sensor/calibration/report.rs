@@ -1,0 +1,223 @@
+use std::fmt;
+
+use super::{
+    super::{SensorError, SensorModel, short},
+    CalibrationError, PressedRow, SensorParameter,
+    covariance::{Decomposition, variances},
+    equations::{COUNT, Slopes},
+    levenberg_marquardt::{Linearised, fit},
+};
+
+/// A sensor model fitted to readings of known deformations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// The fitted model; parameters that the readings do not tell have their nominal values.
+    pub model: SensorModel,
+    /// Every parameter with what the readings tell of it.
+    pub parameters: Vec<CalibratedParameter>,
+    /// Number of readings fitted.
+    pub readings: usize,
+    /// Number of iterations of the last fit.
+    pub iterations: usize,
+    /// Root mean square of the relative errors of the nominal model's resistances.
+    pub nominal_residual: f64,
+    /// Root mean square of the relative errors of the fitted model's resistances.
+    pub residual: f64,
+    /// Singular values of the Jacobian of ln R by relative changes of the parameters, largest first, divided by the
+    /// residual: a pattern is known to one part in so many. 0 for a pattern that the readings do not see.
+    pub patterns: Vec<f64>,
+}
+
+/// A parameter of a calibrated sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibratedParameter {
+    /// The parameter.
+    pub parameter: SensorParameter,
+    /// Value before calibration, in the parameter's unit.
+    pub nominal: f64,
+    /// Value of the fitted model.
+    pub value: f64,
+    /// Standing of the value.
+    pub standing: Standing,
+}
+
+/// Standing of a calibrated value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Standing {
+    /// The readings tell it: the true value is within ± this, in the parameter's unit. The intervals of all parameters
+    /// together hold with 95 % confidence (Bonferroni), given readings that follow Eq. (2).
+    Told(f64),
+    /// The readings do not tell it to ±10 %: it keeps its nominal value.
+    Held,
+}
+
+impl Calibration {
+    /// Nominal values are taken to be right to ± this, in proportion to [`SensorParameter::reference`]: readings must tell
+    /// a parameter better than that to change it.
+    const NOMINAL_TOLERANCE: f64 = 0.1;
+
+    /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
+    ///
+    /// Parameters that the readings do not tell to ±10 % are held at their nominal values, one after another, the least
+    /// known first. The intervals of the others allow for nominal values wrong by ±10 %, for a misfit of single crossings
+    /// and for a drift from frame to frame.
+    ///
+    /// # Errors
+    /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
+    /// resistance, or the fit does not converge.
+    pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
+        check(nominal, samples)?;
+        let readings = samples.len() * nominal.scale.columns();
+        if readings <= COUNT {
+            return Err(CalibrationError::TooFew {
+                readings,
+                parameters: COUNT,
+            });
+        }
+        let references: Slopes = SensorParameter::ALL.map(|parameter| parameter.reference(nominal));
+        let start = Linearised::at(nominal, &references, samples);
+        // A parameter that moves no reading, such as the row pitch where only the first row is read.
+        let mut free: Vec<usize> = (0..COUNT).filter(|&index| start.gram[index][index] > 0.0).collect();
+        loop {
+            let (model, iterations) = fit(nominal, &free, &references, samples)?;
+            let here = Linearised::at(&model, &references, samples);
+            let decomposition = Decomposition::of(&here.gram, &free)?;
+            let noise_variance = here.squares / (readings - free.len()) as f64;
+            let fit_variances = variances(&model, &free, &references, samples, (&decomposition, noise_variance));
+            let factor = two_sided_quantile(0.05 / free.len().max(1) as f64);
+            let least_known = fit_variances
+                .iter()
+                .enumerate()
+                .max_by(|(_, one), (_, other)| one.total_cmp(other));
+            // False for NaN.
+            let is_told = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
+            if let Some((index, &variance)) = least_known
+                && !is_told(variance)
+            {
+                free.remove(index);
+                continue;
+            }
+            let of_held = held_variances(&here, &free, &decomposition);
+            let half_width = |place: usize| factor * (fit_variances[place] + of_held[place]).sqrt();
+            let parameters = SensorParameter::ALL.into_iter().enumerate().map(|(index, parameter)| {
+                let place = free.iter().position(|&free| free == index);
+                CalibratedParameter {
+                    parameter,
+                    nominal: parameter.of(nominal),
+                    value: parameter.of(&model),
+                    standing: place.map_or(Standing::Held, |place| {
+                        Standing::Told(half_width(place) * references[index])
+                    }),
+                }
+            });
+            let whole = Decomposition::of(&here.gram, &Vec::from_iter(0..COUNT))?;
+            let rms = |squares: f64| (squares / readings as f64).sqrt();
+            let noise = noise_variance.sqrt().max(f64::EPSILON);
+            return Ok(Self {
+                model,
+                parameters: parameters.collect(),
+                readings,
+                iterations,
+                nominal_residual: rms(start.squares),
+                residual: rms(here.squares),
+                patterns: whole.values.iter().map(|value| value.max(0.0).sqrt() / noise).collect(),
+            });
+        }
+    }
+
+    /// Returns the fitted parameter of this kind.
+    pub fn parameter(&self, parameter: SensorParameter) -> CalibratedParameter {
+        let found = self.parameters.iter().find(|fitted| fitted.parameter == parameter);
+        *found.expect("every parameter is listed")
+    }
+}
+
+/// Variances that nominal values of the held parameters, wrong by their tolerance (two standard deviations), give to the
+/// fitted ones: those of −(J_fᵀJ_f)⁻¹ J_fᵀJ_h.
+fn held_variances(here: &Linearised, free: &[usize], decomposition: &Decomposition) -> Vec<f64> {
+    let mut sums = vec![0.0; free.len()];
+    for held in (0..COUNT).filter(|index| !free.contains(index)) {
+        let right: Vec<f64> = free.iter().map(|&index| here.gram[index][held]).collect();
+        for (sum, part) in sums.iter_mut().zip(decomposition.solve(&right, 0.0)) {
+            *sum += (part * Calibration::NOMINAL_TOLERANCE / 2.0).powi(2);
+        }
+    }
+    sums
+}
+
+/// The z beyond which, on either side, a standard normal value lies with this probability.
+fn two_sided_quantile(probability: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..80 {
+        let middle: f64 = 0.5 * (low + high);
+        if libm::erfc(middle * std::f64::consts::FRAC_1_SQRT_2) > probability {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
+fn check(nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
+    nominal
+        .check()
+        .map_err(|source: SensorError| CalibrationError::Sensor(source))?;
+    let scale = nominal.scale;
+    for (sample, pressed) in samples.iter().enumerate() {
+        let counts = [
+            ("displacements", pressed.displacements_mm.len(), scale.nodes_per_row()),
+            ("readings", pressed.resistances_ohm.len(), scale.columns()),
+        ];
+        let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
+        let row = ("as the number of its row-wire", pressed.row + 1, scale.rows());
+        let wrong = wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row));
+        if let Some((what, found, expected)) = wrong {
+            return Err(CalibrationError::Shape {
+                sample,
+                what,
+                found,
+                expected,
+                scale: scale.to_string(),
+            });
+        }
+        let height = nominal.geometry.height_mm;
+        let mut nodes = pressed.displacements_mm.iter();
+        if let Some(node) = nodes.position(|displacement| !(displacement.is_finite() && displacement.z < height)) {
+            return Err(CalibrationError::Displacement { sample, node });
+        }
+        let mut readings = pressed.resistances_ohm.iter().enumerate();
+        if let Some((column, &ohm)) = readings.find(|(_, ohm)| !(**ohm > 0.0 && ohm.is_finite())) {
+            return Err(CalibrationError::Reading { sample, column, ohm });
+        }
+    }
+    Ok(())
+}
+
+impl fmt::Display for CalibratedParameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            parameter,
+            nominal,
+            value,
+            standing,
+        } = self;
+        let unit = parameter.unit();
+        match standing {
+            Standing::Told(half_width) => {
+                // Two digits of the interval, and the value to the same place.
+                let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize;
+                write!(
+                    f,
+                    "{parameter}: {value:.digits$} ± {half_width:.digits$} {unit} (nominal {})",
+                    short(*nominal)
+                )
+            }
+            Standing::Held => write!(
+                f,
+                "{parameter}: {} {unit}, its nominal value: these readings do not tell it",
+                short(*nominal)
+            ),
+        }
+    }
+}

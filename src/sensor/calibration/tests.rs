@@ -1,0 +1,188 @@
+use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+use super::*;
+use crate::sensor::SensorModel;
+
+fn nominal() -> SensorModel {
+    SensorModel::new("10x6_3x18".parse().unwrap())
+}
+
+/// A sensor whose height, pitches and column position are off by 5 %, each up or down.
+fn real(rng: &mut impl Rng) -> SensorModel {
+    let mut real = nominal();
+    let geometry = &mut real.geometry;
+    for length in [
+        &mut geometry.height_mm,
+        &mut geometry.row_pitch_mm,
+        &mut geometry.node_pitch_mm,
+        &mut geometry.column_node_x0_mm,
+    ] {
+        *length *= if rng.random() { 1.05 } else { 0.95 };
+    }
+    real
+}
+
+/// Frames of random presses, read with this relative noise.
+fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &mut impl Rng) -> Vec<PressedRow> {
+    let mut samples = Vec::new();
+    for frame in 0..frames {
+        for &row in rows {
+            let displacements_mm: Vec<DVec3> = (0..real.scale.nodes_per_row())
+                .map(|_| DVec3::new(0.0, 0.0, rng.random_range(0.0..1.0)))
+                .collect();
+            let mut resistances_ohm = real.row_resistances(row, &displacements_mm).unwrap();
+            for ohm in &mut resistances_ohm {
+                // The sum of 12 uniform values is nearly normal with variance 1.
+                let normal: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                *ohm *= 1.0 + noise * normal;
+            }
+            samples.push(PressedRow {
+                frame,
+                row,
+                displacements_mm,
+                resistances_ohm,
+            });
+        }
+    }
+    samples
+}
+
+/// Tells whether every interval holds the truth.
+fn holds(calibration: &Calibration, real: &SensorModel) -> bool {
+    let mut told = calibration.parameters.iter();
+    told.all(|fitted| match fitted.standing {
+        Standing::Told(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
+        Standing::Held => fitted.value == fitted.nominal,
+    })
+}
+
+fn told(calibration: &Calibration) -> Vec<SensorParameter> {
+    let told = calibration
+        .parameters
+        .iter()
+        .filter(|fitted| fitted.standing != Standing::Held);
+    told.map(|fitted| fitted.parameter).collect()
+}
+
+/// All intervals of a calibration together hold with 95 %; 45 of 50 leaves room for chance.
+#[test]
+fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
+    let mut within = 0;
+    for seed in 0..50 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let real = real(&mut rng);
+        let samples = frames(&real, &Vec::from_iter(0..10), 12, 1e-3, &mut rng);
+        let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+        for parameter in [
+            SensorParameter::Height,
+            SensorParameter::RowPitch,
+            SensorParameter::NodePitch,
+            SensorParameter::ColumnNodeX,
+        ] {
+            let fitted = calibration.parameter(parameter);
+            assert!(fitted.standing != Standing::Held, "seed {seed}: {fitted}");
+        }
+        assert!(
+            (calibration.residual / 1e-3 - 1.0).abs() < 0.1,
+            "{}",
+            calibration.residual
+        );
+        assert!(calibration.nominal_residual > 10.0 * calibration.residual);
+        within += usize::from(holds(&calibration, &real));
+    }
+    assert!(within >= 45, "{within} of 50");
+}
+
+#[test]
+fn readings_without_noise_give_the_sensor_exactly() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let real = real(&mut rng);
+    let samples = frames(&real, &Vec::from_iter(0..10), 6, 0.0, &mut rng);
+    let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+    assert_eq!(told(&calibration), SensorParameter::ALL);
+    for fitted in &calibration.parameters {
+        let truth = fitted.parameter.of(&real);
+        assert!((fitted.value - truth).abs() < 1e-6, "{fitted}: {truth}");
+    }
+}
+
+/// With one row-wire read, its pitch and the x of the columns cannot be told apart.
+#[test]
+fn what_one_row_cannot_tell_keeps_its_nominal_value_and_widens_the_others() {
+    for row in [0, 6] {
+        let mut within = 0;
+        for seed in 0..20 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let real = real(&mut rng);
+            let samples = frames(&real, &[row], 60, 1e-4, &mut rng);
+            let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+            let told = told(&calibration);
+            let apart = [SensorParameter::RowPitch, SensorParameter::ColumnNodeX];
+            assert!(
+                !apart.iter().all(|parameter| told.contains(parameter)),
+                "row {row}: {told:?}"
+            );
+            within += usize::from(holds(&calibration, &real));
+        }
+        assert!(within >= 17, "row {row}: {within} of 20");
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let samples = frames(&real(&mut rng), &[0], 20, 1e-3, &mut rng);
+    let pitch = Calibration::fit(&nominal(), &samples)
+        .unwrap()
+        .parameter(SensorParameter::RowPitch);
+    assert_eq!(
+        pitch.to_string(),
+        "row pitch: 1 mm, its nominal value: these readings do not tell it"
+    );
+}
+
+/// A wire with a resistance of its own is in all frames: its readings are not as many as there are frames.
+#[test]
+fn intervals_allow_for_wires_that_are_off() {
+    let half_width = |wire_error: f64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let real = real(&mut rng);
+        let mut samples = frames(&real, &Vec::from_iter(0..10), 40, 1e-3, &mut rng);
+        let wires: Vec<f64> = (0..180)
+            .map(|_| 1.0 + wire_error * rng.random_range(-1.0..1.0))
+            .collect();
+        for sample in &mut samples {
+            let crossings = &wires[18 * sample.row..][..18];
+            sample
+                .resistances_ohm
+                .iter_mut()
+                .zip(crossings)
+                .for_each(|(ohm, factor)| *ohm *= factor);
+        }
+        let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+        match calibration.parameter(SensorParameter::Height).standing {
+            Standing::Told(half_width) => half_width / calibration.residual,
+            Standing::Held => f64::INFINITY,
+        }
+    };
+    assert!(half_width(0.01) > 3.0 * half_width(0.0));
+}
+
+#[test]
+fn samples_that_do_not_fit_are_named() {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let good = frames(&nominal(), &[0, 1, 2], 4, 1e-3, &mut rng);
+    let message = |spoil: &dyn Fn(&mut PressedRow)| {
+        let mut samples = good.clone();
+        spoil(&mut samples[4]);
+        Calibration::fit(&nominal(), &samples).unwrap_err().to_string()
+    };
+    assert!(message(&|sample| sample.row = 10).contains("sample 5"));
+    assert!(message(&|sample| sample.resistances_ohm.truncate(3)).contains("3 readings"));
+    assert!(message(&|sample| sample.resistances_ohm[1] = -1.0).contains("sample 5, column 2: the reading -1"));
+    assert!(message(&|sample| sample.displacements_mm[2].z = 5.0).contains("sample 5, node 3"));
+    assert!(message(&|sample| sample.displacements_mm[2].x = f64::NAN).contains("node 3"));
+    assert_eq!(
+        Calibration::fit(&nominal(), &[]),
+        Err(CalibrationError::TooFew {
+            readings: 0,
+            parameters: 7
+        })
+    );
+}

@@ -1,0 +1,12 @@
+//! Sweeps in the terminal: divided, repeated, killed, by several programs at once, and merged.
+
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod driver;
+mod filling;
+#[cfg(target_os = "linux")]
+mod job_scripts;
+mod merging;
+mod specifications;
+mod stopping;
