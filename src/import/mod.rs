@@ -1,0 +1,38 @@
+//! Measured data out of files: tables of text, NumPy and MATLAB, joined by time, with a meaning for each column.
+mod arrays;
+mod column;
+mod condition;
+mod csv_table;
+mod detection;
+mod dialect;
+mod element;
+mod error;
+mod gather;
+mod importing;
+mod inspection;
+mod join;
+mod matlab;
+mod missing;
+mod names;
+mod npz;
+mod number;
+mod numpy;
+mod read;
+mod recipe;
+mod recording;
+mod rows;
+mod table;
+mod utf16;
+mod watch;
+
+pub use column::{Cells, Column, Fault, Faults};
+pub use condition::Condition;
+pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
+pub use error::{ImportError, TableError};
+pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
+pub use missing::Missing;
+pub use read::read_table;
+pub use recipe::{Joined, Recipe};
+pub use recording::{Channel, Dropped, FileReport, JoinReport, Recording};
+pub use table::{Excess, Format, Table};
+pub use watch::{Progress, Watch};
