@@ -61,7 +61,7 @@ fn a_network_learns_what_a_linear_map_cannot() {
     let table = run.target_table();
     assert_eq!(
         table.iter().map(|row| row.name).collect::<Vec<_>>(),
-        ["training mean", "linear map", "network"]
+        ["training mean", "ridge", "network"]
     );
     for target in 0..2 {
         let [mean, linear, network] = [0, 1, 2].map(|row| table[row].targets[target].rmse);

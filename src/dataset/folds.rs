@@ -4,7 +4,7 @@ use rand::{Rng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Dataset;
+use super::{Dataset, SplitBy};
 
 /// Unit of the folds of a cross-validation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -17,17 +17,23 @@ pub enum FoldUnit {
     Snapshot,
 }
 
-impl fmt::Display for FoldUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+impl FoldUnit {
+    /// Name of one unit.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
             Self::Sample => "sample",
             Self::Snapshot => "snapshot",
-        })
+        }
     }
 }
 
-/// Random folds of a k-fold cross-validation: every sample is in exactly one, and their sizes differ by at most one
-/// sample (or snapshot).
+impl fmt::Display for FoldUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Folds of a k-fold cross-validation: every sample is in exactly one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Folds {
     /// Indices of the samples in each fold, ascending.
@@ -42,24 +48,40 @@ pub struct FoldsError {
     pub folds: usize,
     /// Number of units in the set.
     pub units: usize,
-    /// Unit of the folds.
-    pub unit: FoldUnit,
+    /// Name of the unit of the folds: sample, snapshot or group.
+    pub unit: &'static str,
 }
 
 impl Folds {
-    /// Shuffles the samples of `set` and divides them into `folds` folds.
+    /// Shuffles the samples of `set` and divides them into `folds` folds, whose sizes differ by at most one sample (or
+    /// snapshot).
     ///
     /// # Errors
     /// If there are fewer than two folds, or more folds than units.
     pub fn deal(set: &Dataset, folds: usize, unit: FoldUnit, rng: &mut impl Rng) -> Result<Self, FoldsError> {
-        let units: Vec<Vec<usize>> = match unit {
-            FoldUnit::Sample => (0..set.samples()).map(|sample| vec![sample]).collect(),
-            FoldUnit::Snapshot => set.snapshots(),
+        let units = match unit {
+            FoldUnit::Sample => SplitBy::Random.units(set),
+            FoldUnit::Snapshot => SplitBy::Group.units(set),
         };
-        if !(2..=units.len()).contains(&folds) {
-            let units = units.len();
-            return Err(FoldsError { folds, units, unit });
-        }
+        check(folds, units.len(), unit.name())?;
+        Ok(Self::shuffled(&units, folds, rng))
+    }
+
+    /// Divides `set` into `folds` folds by the rule of a split: consecutive blocks of about the same number of samples,
+    /// whole groups at random, or single samples at random.
+    ///
+    /// # Errors
+    /// If there are fewer than two folds, or more folds than samples (or groups).
+    pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, FoldsError> {
+        let units = by.units(set);
+        check(folds, units.len(), by.unit_name(units.len(), set.samples()))?;
+        Ok(match by {
+            SplitBy::Time => Self::blocks(&units, folds),
+            SplitBy::Group | SplitBy::Random => Self::shuffled(&units, folds, rng),
+        })
+    }
+
+    fn shuffled(units: &[Vec<usize>], folds: usize, rng: &mut impl Rng) -> Self {
         let mut order: Vec<usize> = (0..units.len()).collect();
         order.shuffle(rng);
         let deal = |fold: usize| {
@@ -68,9 +90,29 @@ impl Folds {
             samples.sort_unstable();
             samples
         };
-        Ok(Self {
+        Self {
             folds: (0..folds).map(deal).collect(),
-        })
+        }
+    }
+
+    /// Blocks of consecutive units, at least one each.
+    fn blocks(units: &[Vec<usize>], folds: usize) -> Self {
+        let samples: usize = units.iter().map(Vec::len).sum();
+        let (mut blocks, mut first, mut before) = (Vec::with_capacity(folds), 0, 0);
+        for fold in 0..folds {
+            // Each later fold needs a unit of its own.
+            let most = units.len() - (folds - fold - 1);
+            let end_of_fold = samples as f64 * (fold + 1) as f64 / folds as f64;
+            let (mut end, mut within) = (first + 1, before + units[first].len());
+            while end < most && within as f64 + 0.5 * units[end].len() as f64 <= end_of_fold {
+                within += units[end].len();
+                end += 1;
+            }
+            let end = if fold + 1 == folds { units.len() } else { end };
+            blocks.push(units[first..end].concat());
+            (first, before) = (end, within);
+        }
+        Self { folds: blocks }
     }
 
     /// Number of folds, k.
@@ -89,6 +131,14 @@ impl Folds {
         let mut samples: Vec<usize> = kept.flat_map(|(_, samples)| samples).copied().collect();
         samples.sort_unstable();
         samples
+    }
+}
+
+fn check(folds: usize, units: usize, unit: &'static str) -> Result<(), FoldsError> {
+    if (2..=units).contains(&folds) {
+        Ok(())
+    } else {
+        Err(FoldsError { folds, units, unit })
     }
 }
 
@@ -177,5 +227,46 @@ mod tests {
             assert!(error.to_string().contains(&folds.to_string()), "{error}");
         }
         assert_eq!(deal(&set, 100, FoldUnit::Sample, 0).test(0).len(), 1);
+    }
+
+    #[test]
+    fn folds_in_time_are_blocks_one_after_another() {
+        let set = set(130);
+        let dealt = Folds::by(&set, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let mut next = 0;
+        for fold in 0..4 {
+            let block = dealt.test(fold);
+            assert_eq!(block, Vec::from_iter(next..next + block.len()));
+            assert!(
+                block.len() % 10 == 0 && (30..=40).contains(&block.len()),
+                "{}",
+                block.len()
+            );
+            next += block.len();
+        }
+        assert_eq!(next, 130);
+        // Runs of very different lengths still give every fold one.
+        let readings = ndarray::Array2::zeros((103, 1));
+        let groups = (0..103usize).map(|sample| sample.saturating_sub(99)).collect();
+        let uneven = Dataset::new(readings.clone(), readings, None, groups).unwrap();
+        let dealt = Folds::by(&uneven, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+        assert_eq!(
+            (0..4).map(|fold| dealt.test(fold).len()).collect::<Vec<_>>(),
+            [100, 1, 1, 1]
+        );
+        let error = Folds::by(&uneven, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap_err();
+        assert!(error.to_string().contains("5 folds of 4 groups"), "{error}");
+    }
+
+    #[test]
+    fn folds_by_group_or_at_random_are_those_by_snapshot_or_sample() {
+        let set = set(130);
+        for (by, unit) in [
+            (SplitBy::Group, FoldUnit::Snapshot),
+            (SplitBy::Random, FoldUnit::Sample),
+        ] {
+            let dealt = Folds::by(&set, 5, by, &mut Seed(6).rng(Stream::Split)).unwrap();
+            assert_eq!(dealt, deal(&set, 5, unit, 6), "{by}");
+        }
     }
 }

@@ -2,10 +2,11 @@
 //! and the snapshot it belongs to.
 //!
 //! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
-//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`] and [`Folds`]
-//! divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
+//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
+//! and [`Folds`] divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
 
 mod csv_fields;
+mod division;
 mod folds;
 mod frames;
 mod per_row;
@@ -15,9 +16,11 @@ mod samples;
 mod seed;
 mod simulation;
 mod split;
+mod split_by;
 mod system_error;
 
 pub(crate) use csv_fields::CsvFields;
+pub use division::{Division, DivisionError, Parts};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError};
 pub use per_row::PerRow;
@@ -28,4 +31,5 @@ pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::SimulationError;
 pub use split::{Split, hold_out};
+pub use split_by::{SplitBy, SplitByError};
 pub(crate) use system_error::system_cause;

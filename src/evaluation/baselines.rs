@@ -2,9 +2,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Errors, RunError, RunSettings, Source};
 use crate::{
-    dataset::Dataset,
+    dataset::{Dataset, PerRow},
     decoupling::{AffineMap, TrainingMean},
     network::Quantity,
+    scene::NoiseSource,
 };
 
 /// Errors of the baselines on the nodes, shown beside the network in every error table.
@@ -21,14 +22,26 @@ pub struct Baselines {
     pub reference: Option<Errors>,
 }
 
-/// Fits the baselines: the training mean, and the affine map of least squares on the readings.
-pub(super) fn fit_baselines(training: &Dataset, settings: &RunSettings) -> Result<(TrainingMean, AffineMap), RunError> {
-    let quantity = match settings.source {
-        Source::Simulated(_) => Quantity::Resistance,
-        Source::Measured(_) => Quantity::Raw,
+/// Name of the linear baseline in tables.
+pub(super) fn linear_name(source: &Source) -> &'static str {
+    match source {
+        Source::Simulated(_) => "linear map",
+        Source::Measured(_) => "ridge",
+    }
+}
+
+/// Fits the baselines: the training mean, and an affine map on the readings. For simulated samples that is the one of
+/// least squares; measured ones can be too few or too alike for it, so theirs is ridge regression.
+pub(super) fn fit_baselines(
+    training: &Dataset,
+    settings: &RunSettings,
+) -> Result<(TrainingMean, PerRow<AffineMap>), RunError> {
+    let linear = match settings.source {
+        Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
+        Source::Measured(measured) => {
+            let ridge = |set: &Dataset| AffineMap::ridge(set, settings.inputs, NoiseSource::default());
+            PerRow::fit(training, measured.rows, ridge)?
+        }
     };
-    Ok((
-        TrainingMean::fit(training),
-        AffineMap::least_squares(training, quantity)?,
-    ))
+    Ok((TrainingMean::fit(training), linear))
 }

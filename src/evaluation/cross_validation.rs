@@ -4,13 +4,16 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{Run, RunError, RunSettings, TargetErrors, TargetRow, baselines::fit_baselines};
+use super::{
+    Run, RunError, RunSettings, TargetErrors, TargetRow,
+    baselines::{fit_baselines, linear_name},
+};
 use crate::{
     dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
     decoupling::decode_set,
 };
 
-/// A k-fold cross-validation, repeated with the samples reshuffled.
+/// A k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] takes other folds.
 ///
 /// Each fold in turn is the test set and the fold after it the validation set, which selects the best weights and ends
 /// the training; the others are the training set. With two folds there is no validation set.
@@ -47,6 +50,8 @@ pub struct CrossValidated {
     pub mean: Array2<f64>,
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
+    /// Name of the linear maps in tables.
+    linear_name: &'static str,
     /// Epochs and time of the trainings.
     pub effort: Effort,
 }
@@ -75,8 +80,24 @@ impl CrossValidation {
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<CrossValidated>, RunError> {
-        let own_seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(set, self.folds, self.unit, &mut own_seed.rng(Stream::Split))?;
+        let seed = nth_seed(settings.seed, repeat);
+        let folds = Folds::deal(set, self.folds, self.unit, &mut seed.rng(Stream::Split))?;
+        CrossValidated::on_folds(&RunSettings { seed, ..*settings }, set, folds, is_cancelled)
+    }
+}
+
+impl CrossValidated {
+    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`. Returns `None` if
+    /// cancelled.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub fn on_folds(
+        settings: &RunSettings,
+        set: &Dataset,
+        folds: Folds,
+        is_cancelled: impl Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
         let mut effort = Effort::default();
         let empty = || Array2::zeros(set.targets().dim());
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
@@ -87,7 +108,7 @@ impl CrossValidation {
             scatter(&mut mean, samples, &decode_set(&mut of_mean, &test)?);
             scatter(&mut linear, samples, &decode_set(&mut of_linear, &test)?);
             let settings = RunSettings {
-                seed: nth_seed(own_seed, fold),
+                seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
             let mut run = Run::on_sets(settings, split, test)?;
@@ -97,17 +118,16 @@ impl CrossValidation {
             scatter(&mut network, samples, &run.decouple_test());
             effort.add(of_fold);
         }
-        Ok(Some(CrossValidated {
+        Ok(Some(Self {
             folds,
             network,
             mean,
             linear,
+            linear_name: linear_name(&settings.source),
             effort,
         }))
     }
-}
 
-impl CrossValidated {
     /// Returns the training samples for test fold `fold` of `set`, the set that was cross-validated.
     pub(super) fn training(&self, set: &Dataset, fold: usize) -> Dataset {
         split(set, &self.folds, fold).training
@@ -124,7 +144,7 @@ impl CrossValidated {
         };
         vec![
             row("training mean", &self.mean),
-            row("linear map", &self.linear),
+            row(self.linear_name, &self.linear),
             row("network", &self.network),
         ]
     }

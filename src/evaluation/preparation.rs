@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     Baselines, Errors, Run, RunError, RunSettings, SimulatedSettings, StartTrainer, TargetErrors, TargetRow,
-    baselines::fit_baselines,
+    baselines::{fit_baselines, linear_name},
     reference_errors,
     sets::check_sets,
     task::{Task, tasks},
@@ -126,7 +126,8 @@ impl Run {
             }
             None => None,
         };
-        let target_baselines = [("training mean", &mean), ("linear map", &linear)].map(|(name, answers)| TargetRow {
+        let linear_row = (linear_name(&settings.source), &linear);
+        let target_baselines = [("training mean", &mean), linear_row].map(|(name, answers)| TargetRow {
             name,
             targets: TargetErrors::measure(test.targets(), answers.view()),
         });

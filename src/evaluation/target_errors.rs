@@ -10,10 +10,12 @@ pub struct TargetErrors {
     /// Mean absolute error.
     pub mae: f64,
     /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these very targets,
-    /// negative for worse. `None` if the target is constant.
+    /// negative for worse. `None` if the target is constant, where it is undefined.
     pub r2: Option<f64>,
     /// Largest absolute error.
     pub worst: f64,
+    /// Index of the sample with the largest error, among those measured.
+    pub worst_sample: usize,
     /// [`Self::mae`] in percent of the range of the target. `None` if the target is constant.
     pub percent_of_range: Option<f64>,
 }
@@ -46,21 +48,25 @@ impl TargetErrors {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
                 (low.min(value), high.max(value))
             });
-        let (mut squares, mut sum, mut worst, mut variation) = (0.0, 0.0, 0.0_f64, 0.0);
-        for (target, answer) in targets.iter().zip(answers) {
+        let (mut squares, mut sum, mut worst, mut worst_sample, mut variation) = (0.0, 0.0, 0.0, 0, 0.0);
+        for (sample, (target, answer)) in targets.iter().zip(answers).enumerate() {
             let error = (answer - target).abs();
             squares += error * error;
             sum += error;
-            worst = worst.max(error);
+            if error > worst {
+                (worst, worst_sample) = (error, sample);
+            }
             variation += (target - mean) * (target - mean);
         }
         let varies = highest > lowest;
         Self {
             rmse: (squares / count).sqrt(),
             mae: sum / count,
-            r2: varies.then(|| 1.0 - squares / variation),
+            r2: Some(1.0 - squares / variation).filter(|r2| varies && r2.is_finite()),
             worst,
-            percent_of_range: varies.then(|| 100.0 * sum / count / (highest - lowest)),
+            worst_sample,
+            percent_of_range: Some(100.0 * sum / count / (highest - lowest))
+                .filter(|percent| varies && percent.is_finite()),
         }
     }
 }
@@ -82,7 +88,7 @@ mod tests {
         assert!((varying.rmse - 0.375_f64.sqrt()).abs() < 1e-15);
         assert!((varying.mae - 0.5).abs() < 1e-15);
         assert!((varying.r2.unwrap() - 0.948_608_137_044_967_8).abs() < 1e-15);
-        assert_eq!(varying.worst, 1.0);
+        assert_eq!((varying.worst, varying.worst_sample), (1.0, 3));
         assert!((varying.percent_of_range.unwrap() - 100.0 * 0.5 / 7.5).abs() < 1e-13);
         assert_eq!(
             (constant.r2, constant.percent_of_range, constant.mae),
@@ -95,5 +101,18 @@ mod tests {
         let targets = array![[1.0], [2.0], [6.0]];
         let answers = array![[3.0], [3.0], [3.0]];
         assert_eq!(TargetErrors::measure(targets.view(), answers.view())[0].r2, Some(0.0));
+    }
+
+    #[test]
+    fn figures_are_numbers_or_missing_whatever_the_size_of_the_targets() {
+        for size in [0.0, 1e-300, 1e-160, 1e160, 1e308] {
+            let targets = array![[size], [-size], [0.0]];
+            for answer in [0.0, size] {
+                let answers = array![[answer], [answer], [answer]];
+                let errors = &TargetErrors::measure(targets.view(), answers.view())[0];
+                let figures = [errors.r2, errors.percent_of_range];
+                assert!(figures.into_iter().flatten().all(f64::is_finite), "{errors:?}");
+            }
+        }
     }
 }

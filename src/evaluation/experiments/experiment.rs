@@ -181,6 +181,7 @@ impl Experiment {
         if (2..=units).contains(&folds) {
             Ok(())
         } else {
+            let unit = unit.name();
             Err(FoldsError { folds, units, unit }.into())
         }
     }
