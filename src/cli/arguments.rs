@@ -9,8 +9,8 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, export::Export, failure::Failure, interruption, reproduce::Reproduce, simulate::Simulate,
-    trade::Trade, train::Train,
+    decode::Decode, export::Export, failure::Failure, inspect::Inspect, interruption, reproduce::Reproduce,
+    simulate::Simulate, trade::Trade, train::Train,
 };
 use crate::export::exit_leaving_nothing;
 
@@ -30,6 +30,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Train(Box<Train>),
+    Inspect(Inspect),
     Decode(Decode),
     Export(Export),
     Simulate(Box<Simulate>),
@@ -73,6 +74,7 @@ impl Arguments {
         }
         match self.command {
             Some(Command::Train(train)) => train.run(),
+            Some(Command::Inspect(inspect)) => inspect.run(),
             Some(Command::Decode(decode)) => decode.run(),
             Some(Command::Export(export)) => export.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),

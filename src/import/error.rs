@@ -2,7 +2,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
-use crate::dataset::{DatasetError, system_cause};
+use crate::dataset::{DatasetError, DivisionError, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
 #[derive(Debug, Error)]
@@ -74,6 +74,16 @@ pub enum ImportError {
         /// Number of further cells of this column that are no numbers, in words.
         others: String,
     },
+    /// A reading that a network needs is missing.
+    #[error("'{}': line {line}: {name} is missing; a network needs all of its inputs, so leave the line out", .path.display())]
+    MissingInput {
+        /// The file.
+        path: PathBuf,
+        /// Line of the cell.
+        line: u64,
+        /// Name of the column.
+        name: String,
+    },
     /// A condition cannot be understood.
     #[error("the condition '{text}' is not understood: {reason}; write for example \"c4<145.1 and c5!=0\"")]
     Condition {
@@ -109,6 +119,9 @@ pub enum ImportError {
     /// The samples do not make a set.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// The samples cannot be divided.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
     /// The caller ended the import.
     #[error("the import was cancelled")]
     Cancelled,
@@ -154,6 +167,12 @@ pub enum TableError {
         line: u64,
         /// Largest number of cells.
         limit: usize,
+    },
+    /// A row has more cells than there are columns.
+    #[error("line {line}: it has more cells than there are columns; correct it")]
+    Uneven {
+        /// Line of the row.
+        line: u64,
     },
     /// More rows than a set may have.
     #[error("it has more than {0} rows; take every second one, or a part")]

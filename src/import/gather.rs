@@ -1,4 +1,4 @@
-use ndarray::{Array2, s};
+use ndarray::Array2;
 
 use super::{Table, column::Cells, names::ColumnId};
 
@@ -10,7 +10,7 @@ pub(super) struct Source<'a> {
     pub(super) tables: &'a mut [Table],
     /// Partners in each joined file; `None` where rows are joined row by row.
     pub(super) partners: &'a [Option<Vec<Option<u32>>>],
-    /// Rows of the first file that are samples, in ascending order.
+    /// Rows of the first file that are samples.
     pub(super) rows: &'a [usize],
 }
 
@@ -27,7 +27,9 @@ pub(super) fn gather(source: &mut Source<'_>, columns: &[ColumnId], kept: &[Colu
             }
         }
     }
+    let is_ascending = source.rows.is_sorted();
     let mut all = Array2::zeros((source.rows.len(), columns.len()));
+    let numbers = all.as_slice_mut().expect("a new array is contiguous");
     let mut end = source.rows.len();
     while end > 0 {
         let start = end.saturating_sub(BLOCK);
@@ -38,16 +40,16 @@ pub(super) fn gather(source: &mut Source<'_>, columns: &[ColumnId], kept: &[Colu
                 .checked_sub(1)
                 .and_then(|joined| source.partners[joined].as_deref());
             let cells = &mut source.tables[id.file].columns[id.column].cells;
-            let mut column = all.slice_mut(s![start..end, place]);
-            for (to, &row) in column.iter_mut().zip(rows) {
-                *to = match partners {
+            let block = numbers[start * columns.len()..end * columns.len()].chunks_exact_mut(columns.len());
+            for (sample, &row) in block.zip(rows) {
+                sample[place] = match partners {
                     None => cells.number(row),
                     Some(partners) => partners[row].map_or(f64::NAN, |row| cells.number(row as usize)),
                 };
             }
-            if let (None, Cells::Numbers(numbers), Some(&first)) = (partners, cells, rows.first()) {
-                numbers.truncate(first);
-                numbers.shrink_to_fit();
+            if let (None, Cells::Numbers(moved), true) = (partners, cells, is_ascending) {
+                moved.truncate(rows[0]);
+                moved.shrink_to_fit();
             }
         }
         end = start;

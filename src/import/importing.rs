@@ -38,7 +38,7 @@ impl Recipe {
         for (number, joined) in self.join.iter().enumerate() {
             joins.push(self.partners(number + 1, joined, &files, &names, &meanings, &mut warnings)?);
         }
-        let mut rows = Rows {
+        let rows = Rows {
             recipe: self,
             files: &files,
             names: &names,
@@ -46,11 +46,13 @@ impl Recipe {
             joins: &joins,
         };
         rows.check_numbers()?;
-        let (kept, dropped) = rows.select()?;
+        let (mut kept, dropped) = rows.select()?;
+        if let Some(id) = meanings.time {
+            warnings.extend(rows.put_in_order(id, &mut kept));
+        }
         let times = meanings
             .time
-            .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect::<Vec<f64>>());
-        warnings.extend(times.as_deref().and_then(|times| backwards(times, &kept, &files[0].1)));
+            .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
         let groups = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
@@ -83,7 +85,7 @@ impl Recipe {
     }
 
     /// Names in front of the columns of the joined files.
-    fn stems(&self) -> Vec<String> {
+    pub(super) fn stems(&self) -> Vec<String> {
         let mut stems: Vec<String> = Vec::new();
         for joined in &self.join {
             let wanted = joined.stem.clone().unwrap_or_else(|| stem(&joined.file));
@@ -98,7 +100,7 @@ impl Recipe {
     }
 
     /// Reads one file; `prefix` is the stem of a joined one.
-    fn read(
+    pub(super) fn read(
         &self,
         folder: &Path,
         number: usize,
@@ -319,7 +321,7 @@ impl Rows<'_> {
     }
 
     /// Rows that are samples, and the others by reason.
-    fn select(&mut self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
+    fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = &self.files[0].1;
         let mut used: Vec<ColumnId> = Vec::new();
         self.meanings.used().for_each(|id| {
@@ -388,6 +390,18 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
+    /// Sorts the rows by their time; tells of rows that were not in this order.
+    fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
+        let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
+        let first = kept.windows(2).find(|pair| falls(pair))?[1];
+        let count = kept.windows(2).filter(|pair| falls(pair)).count();
+        kept.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
+        Some(format!(
+            "the times run backwards {count} times, first on line {}; the samples are put in the order of their times",
+            self.files[0].1.line(first)
+        ))
+    }
+
     /// Number of each sample's group, in the order in which groups first occur.
     fn groups(&self, kept: &[usize]) -> Vec<usize> {
         let Some(id) = self.meanings.group else {
@@ -406,15 +420,7 @@ impl Rows<'_> {
         let Some(id) = self.meanings.row_wire else {
             return Ok(None);
         };
-        let of = |&row: &usize| {
-            let value = self.number(id, row);
-            if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE).contains(&value) {
-                Ok(value as usize - 1)
-            } else {
-                let name = self.names.name(id).to_owned();
-                Err(ImportError::RowWire { name, value })
-            }
-        };
+        let of = |&row: &usize| row_wire(self.names.name(id), self.number(id, row));
         kept.iter().map(of).collect::<Result<_, _>>().map(Some)
     }
 
@@ -483,7 +489,7 @@ impl Counts {
 }
 
 /// Refuses a column with cells that are neither numbers nor missing.
-fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: ColumnId) -> Result<(), ImportError> {
+pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: ColumnId) -> Result<(), ImportError> {
     let (path, table) = &files[id.file];
     let faults = &table.columns[id.column].faults;
     let Some(first) = &faults.first else { return Ok(()) };
@@ -498,6 +504,16 @@ fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: ColumnId) -> Resu
             count => format!(", nor are {} other cells of the column", count - 1),
         },
     })
+}
+
+/// Index of the row-wire with the number `value`.
+pub(super) fn row_wire(name: &str, value: f64) -> Result<usize, ImportError> {
+    if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE).contains(&value) {
+        Ok(value as usize - 1)
+    } else {
+        let name = name.to_owned();
+        Err(ImportError::RowWire { name, value })
+    }
 }
 
 /// What is to be known of the files themselves.
@@ -525,17 +541,4 @@ fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
         }
     }
     notes
-}
-
-/// Tells of times that are not in ascending order.
-fn backwards(times: &[f64], kept: &[usize], table: &Table) -> Option<String> {
-    let falls: Vec<usize> = (1..times.len())
-        .filter(|&sample| times[sample] < times[sample - 1])
-        .collect();
-    let first = falls.first()?;
-    Some(format!(
-        "time runs backwards {} times, first on line {}; a split by time goes by the times, not by the order of the rows",
-        falls.len(),
-        table.line(kept[*first])
-    ))
 }

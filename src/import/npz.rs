@@ -11,8 +11,9 @@ pub(super) fn read(source: impl Read + Seek, watch: Watch<'_>) -> Result<(Vec<Ar
     let mut left_out = Vec::new();
     for index in 0..archive.len() {
         let entry = archive.by_index(index).map_err(|error| defect("the archive", error))?;
-        let Some(name) = entry.name().strip_suffix(".npy").map(str::to_owned) else {
-            left_out.push(format!("{} is no .npy file", entry.name()));
+        let file_name = entry.name().map_err(|error| defect("the archive", error))?.into_owned();
+        let Some(name) = file_name.strip_suffix(".npy").map(str::to_owned) else {
+            left_out.push(format!("{file_name} is no .npy file"));
             continue;
         };
         let size = entry.size();

@@ -8,8 +8,8 @@ use crate::dataset::Dataset;
 /// Measured samples with the meaning of their columns.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Samples: readings and targets in the order of [`Self::inputs`] and [`Self::targets`]. Without a column of groups each
-    /// sample is a group of its own.
+    /// Samples in the order of their times, or of the file; readings and targets in the order of [`Self::inputs`] and
+    /// [`Self::targets`]. Without a column of groups each sample is a group of its own.
     pub set: Dataset,
     /// Names and units of the readings.
     pub inputs: Vec<Channel>,
