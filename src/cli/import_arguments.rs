@@ -85,7 +85,8 @@ pub(super) struct ImportArguments {
     /// Share of the samples for the test [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
-    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0.2]
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with --method
+    /// br, the default; else 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
     /// File of the test samples, with the columns of --data
@@ -145,6 +146,11 @@ impl ImportArguments {
     /// Returns `true` if the samples come from files.
     pub(super) fn is_given(&self) -> bool {
         self.data.is_some() || self.recipe.is_some()
+    }
+
+    /// Returns `true` if the share for validation is given, in an argument or a recipe.
+    pub(super) fn holds_out(&self) -> bool {
+        self.validation_fraction.is_some() || self.recipe.is_some()
     }
 
     /// Refuses arguments that have no meaning without own data.

@@ -12,13 +12,17 @@ use crate::{
     evaluation::{CrossValidated, Run, RunSettings},
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
     import::{Plan, PlannedSets},
+    training::Method,
 };
 
 impl Train {
     /// Trains on the samples of files.
     pub(super) fn run_measured(&self) -> Result<(), Failure> {
-        let plan = self.import.plan(self.training.scene.columns())?;
+        let mut plan = self.import.plan(self.training.scene.columns())?;
         let settings = self.training.measured(plan.import.row_wire.is_some())?;
+        if let (Method::BayesianRegularization(_), false) = (settings.training.method, self.import.holds_out()) {
+            plan.division.validation_fraction = 0.0;
+        }
         if let Some(folds) = self.import.folds {
             return self.cross_validate(&plan, &settings, folds);
         }

@@ -1,4 +1,4 @@
-//! The work in a terminal: `decoupler train`, `decode`, `export`, `simulate`, `reproduce` and `trade`.
+//! The work in a terminal: `decoupler train`, `inspect`, `decode`, `export`, `simulate`, `reproduce` and `trade`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
@@ -19,6 +19,7 @@ mod inspect;
 mod interruption;
 mod measured_decode;
 mod measured_report;
+mod measured_table;
 mod measured_train;
 mod output;
 mod outside_training;

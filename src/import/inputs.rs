@@ -42,7 +42,7 @@ impl Recipe {
             .map(|id| id.column);
         let files = [file];
         for &column in columns.iter().chain(&row_wire) {
-            super::importing::not_a_number(&files, &names, super::names::ColumnId { file: 0, column })?;
+            super::selection::not_a_number(&files, &names, super::names::ColumnId { file: 0, column })?;
         }
         let table = &files[0].1;
         for &column in columns.iter().chain(&row_wire) {
@@ -62,7 +62,7 @@ impl Recipe {
             None => None,
             Some(column) => {
                 let name = &table.columns[column].name;
-                let of = |row| super::importing::row_wire(name, table.columns[column].cells.number(row));
+                let of = |row| super::selection::row_wire(name, table.columns[column].cells.number(row));
                 Some((0..table.rows).map(of).collect::<Result<_, _>>()?)
             }
         };

@@ -1,4 +1,9 @@
 //! Measured data out of files: tables of text, NumPy and MATLAB, joined by time, with a meaning for each column.
+//!
+//! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
+//! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
+//! [`Plan`] adds how the samples are divided for training and test.
+
 mod arrays;
 mod column;
 mod condition;
@@ -13,6 +18,7 @@ mod inputs;
 mod inspection;
 mod join;
 mod matlab;
+mod meanings;
 mod missing;
 mod names;
 mod npz;
@@ -23,6 +29,7 @@ mod read;
 mod recipe;
 mod recording;
 mod rows;
+mod selection;
 mod table;
 mod utf16;
 mod watch;
