@@ -56,7 +56,7 @@ pub(super) enum Saving {
     /// Of own data.
     Measured {
         /// Files and division of the samples.
-        plan: Plan,
+        plan: Box<Plan>,
         /// Checksum of the samples.
         samples_crc32: String,
     },

@@ -32,7 +32,7 @@ impl Train {
         let plan = plan.absolute();
         let saving = Saving::Measured {
             samples_crc32: MeasuredCheckpointFile::checksum(&sets),
-            plan: plan.clone(),
+            plan: Box::new(plan.clone()),
         };
         let PlannedSets {
             split, test, recording, ..
@@ -61,7 +61,7 @@ impl Train {
         let report = Report::new(&plan, &sets);
         let saving = Saving::Measured {
             samples_crc32: found,
-            plan: plan.clone(),
+            plan: Box::new(plan.clone()),
         };
         let channels = (sets.recording.inputs.clone(), sets.recording.targets.clone());
         let mut run = file.resume(sets).map_err(|source| Failure::Resume {

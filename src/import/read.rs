@@ -31,7 +31,7 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
     if metadata.is_dir() {
         return Err(refused(std::io::ErrorKind::IsADirectory.into()));
     }
-    let size = metadata.is_file().then(|| metadata.len());
+    let size = metadata.is_file().then_some(metadata.len());
     read_file(path, file, size, reading, watch).map_err(|source| match source {
         TableError::Io(source) => refused(source),
         TableError::Cancelled => ImportError::Cancelled,
