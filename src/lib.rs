@@ -14,6 +14,7 @@
 //! | [`decoupling`] | readings to deformation, every way we know, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
+//! | `import` | measured data out of files: tables, joins by time, meanings of columns (feature `files`) |
 //! | [`live`] | frames as they come: sources, re-zero, recorder, faults named from the residual |
 //! | `figure` | what a picture says, for the window and for print (feature `figures`) |
 //! | `export` | files for other programs (feature `files`); `export::bundle` writes networks (feature `bundle`), `export::figures` draws (feature `figures`) |
@@ -108,6 +109,8 @@ pub mod evaluation;
 pub mod export;
 #[cfg(feature = "figures")]
 pub mod figure;
+#[cfg(feature = "files")]
+pub mod import;
 pub mod live;
 pub mod network;
 pub mod scene;

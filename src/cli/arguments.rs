@@ -8,8 +8,8 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, export::Export, failure::Failure, interruption, parse_error::one_line, reproduce::Reproduce,
-    simulate::Simulate, sweep::Sweep, trade::Trade, train::Train,
+    decode::Decode, export::Export, failure::Failure, inspect::Inspect, interruption, parse_error::one_line,
+    reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade, train::Train,
 };
 use crate::export::exit_leaving_nothing;
 
@@ -29,6 +29,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Train(Box<Train>),
+    Inspect(Inspect),
     Decode(Decode),
     Export(Export),
     Simulate(Box<Simulate>),
@@ -74,6 +75,7 @@ impl Arguments {
         }
         match self.command {
             Some(Command::Train(train)) => train.run(),
+            Some(Command::Inspect(inspect)) => inspect.run(),
             Some(Command::Decode(decode)) => decode.run(),
             Some(Command::Export(export)) => export.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),

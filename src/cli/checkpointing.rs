@@ -9,7 +9,8 @@ use clap::Args;
 use super::failure::Failure;
 use crate::{
     evaluation::Run,
-    export::{CheckpointFile, DocumentError},
+    export::{CheckpointFile, DocumentError, MeasuredCheckpointFile},
+    import::Plan,
 };
 
 /// Saving takes at most one part in this many of the time.
@@ -45,24 +46,44 @@ pub(super) struct Checkpointing {
     interval: Duration,
     next: Instant,
     has_warned: bool,
+    saving: Saving,
+}
+
+/// Kind of the checkpoints.
+pub(super) enum Saving {
+    /// Of a simulated sensor.
+    Simulated,
+    /// Of own data.
+    Measured {
+        /// Files and division of the samples.
+        plan: Box<Plan>,
+        /// Checksum of the samples.
+        samples_crc32: String,
+    },
 }
 
 impl CheckpointArguments {
-    /// The checkpoints asked for. An existing file is overwritten only if its training is resumed.
-    pub(super) fn checkpointing(&self) -> Result<Option<Checkpointing>, Failure> {
-        let Some(path) = &self.checkpoint else { return Ok(None) };
+    /// The checkpoints asked for.
+    pub(super) fn checkpointing(&self, saving: Saving) -> Option<Checkpointing> {
+        Some(Checkpointing {
+            path: self.checkpoint.clone()?,
+            interval: Duration::from_secs_f64(self.checkpoint_interval),
+            next: Instant::now(),
+            has_warned: false,
+            saving,
+        })
+    }
+
+    /// Refuses to overwrite an existing file unless its training is resumed.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        let Some(path) = &self.checkpoint else { return Ok(()) };
         if !self.resume && path.symlink_metadata().is_ok() {
             let path = path.display();
             return Err(Failure::Arguments(format!(
                 "--checkpoint '{path}' exists: add --resume to resume it, or give another name"
             )));
         }
-        Ok(Some(Checkpointing {
-            path: path.clone(),
-            interval: Duration::from_secs_f64(self.checkpoint_interval),
-            next: Instant::now(),
-            has_warned: false,
-        }))
+        Ok(())
     }
 }
 
@@ -74,6 +95,7 @@ impl Checkpointing {
             interval,
             next: Instant::now() + interval,
             has_warned: false,
+            saving: Saving::Simulated,
         }
     }
 
@@ -94,6 +116,11 @@ impl Checkpointing {
     }
 
     pub(super) fn save(&self, run: &Run) -> Result<(), DocumentError> {
-        CheckpointFile::from_run(run)?.save(&self.path)
+        match &self.saving {
+            Saving::Simulated => CheckpointFile::from_run(run)?.save(&self.path),
+            Saving::Measured { plan, samples_crc32 } => {
+                MeasuredCheckpointFile::from_run(run, plan, samples_crc32)?.save(&self.path)
+            }
+        }
     }
 }

@@ -7,10 +7,12 @@ use std::{
 use clap::Args;
 use ndarray::{Array2, Axis, Slice};
 
-use super::{failure::Failure, follow::Follow, outside_training::OutsideTraining, same_file::is_same};
+use super::{failure::Failure, follow::Follow, measured_decode, outside_training::OutsideTraining, same_file::is_same};
 use crate::{
     dataset::{ReadError, Reading, ResistanceReader, SimulationError},
-    export::{AtomicFile, NetworkFile, WriteError, write_decoded, write_decoded_header},
+    export::{
+        AtomicFile, DocumentError, MeasuredNetworkFile, NetworkFile, WriteError, write_decoded, write_decoded_header,
+    },
     network::Networks,
     scene::RowModel,
 };
@@ -26,7 +28,8 @@ const BLOCK: usize = 1024;
 /// each line of the input, then readings_outside, the number of its readings that are outside the range seen in training
 /// by more than a tenth of that, and coordinates_outside, the number of coordinates that are outside by more than all of
 /// it; a warning names such lines. With --follow, frames are decoded as they come, from standard input, a serial port or
-/// a socket too.
+/// a socket too. A network trained on own data (train --data) reads columns of the names of its inputs (or as many without names), from
+/// CSV, .npy, .npz or .mat, and gives its targets under their names.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -47,6 +50,11 @@ impl Decode {
         if let Some((input, output)) = self.input.as_ref().zip(self.output.as_ref()) {
             self.check_output(input, output)?;
         }
+        match MeasuredNetworkFile::load(&self.network) {
+            // It is of another kind.
+            Err(DocumentError::Other { .. }) => {}
+            file => return self.decode_measured(&file?),
+        }
         let file = NetworkFile::load(&self.network)?;
         if let Some(warning) = file.old_version_warning() {
             // Nobody is left to tell if this fails.
@@ -61,6 +69,18 @@ impl Decode {
                 let standard_input = Path::new("-");
                 self.follow.run(input.as_deref().unwrap_or(standard_input), &file)
             }
+        }
+    }
+
+    fn decode_measured(&self, file: &MeasuredNetworkFile) -> Result<(), Failure> {
+        match (&self.input, &self.output) {
+            (Some(input), Some(output)) if !self.follow.follow => {
+                self.follow.check_unused()?;
+                measured_decode::decode_file(file, input, output)
+            }
+            (input, _) => self
+                .follow
+                .run_measured(input.as_deref().unwrap_or(Path::new("-")), file),
         }
     }
 

@@ -12,6 +12,7 @@ use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
     export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError},
+    import::ImportError,
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::SensorError,
@@ -37,6 +38,10 @@ pub(super) enum Failure {
     Bundle(#[from] BundleError),
     #[error("'{}': {source}", .path.display())]
     Resume { path: PathBuf, source: RunError },
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    #[error("'{}': the samples of '{}' are not those of the checkpoint; restore the file, or start a new training", .path.display(), .data.display())]
+    OtherSamples { path: PathBuf, data: PathBuf },
     #[error("{0}")]
     Interrupted(Interruption),
     #[error(transparent)]
@@ -99,6 +104,10 @@ pub(super) enum Failure {
         row: usize,
         rows: Rows,
     },
+    #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
+    UnknownRow { path: PathBuf, line: u64, row: usize },
+    #[error("'{}': it has no column '{column}' with the number of each line's row-wire, and there is a network for each; add it", .path.display())]
+    NoRowWires { path: PathBuf, column: String },
     #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
     PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
     #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
@@ -152,6 +161,15 @@ impl Failure {
             Self::Specification(SpecificationError::Read { .. }) => 1,
             Self::Specification(_) => 2,
             Self::InterruptedSweep { status, .. } => *status,
+            Self::Import(
+                ImportError::Unknown { .. }
+                | ImportError::Ambiguous { .. }
+                | ImportError::Range(_)
+                | ImportError::TwoMeanings { .. }
+                | ImportError::NoColumns(_)
+                | ImportError::Condition { .. }
+                | ImportError::Division(_),
+            ) => 2,
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_)

@@ -15,11 +15,12 @@ use super::{
     follow_faults::Faults,
     follow_report::Report,
     interruption::Graceful,
+    measured_decode::{Answered, MeasuredAnswers},
     parsers::number,
 };
 use crate::{
     dataset::SimulationError,
-    export::NetworkFile,
+    export::{MeasuredNetworkFile, NetworkFile},
     live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
 };
 
@@ -65,8 +66,56 @@ impl Follow {
         }
     }
 
-    /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
-    pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
+    /// Decodes `input` with a network of own data until it ends, or until Ctrl-C.
+    pub(super) fn run_measured(&self, input: &Path, file: &MeasuredNetworkFile) -> Result<(), Failure> {
+        if self.noise.is_some() {
+            return Err(wrong(
+                "--noise",
+                "a network of own data knows no sensor whose faults could be judged; leave it out",
+            ));
+        }
+        let source = self.source(input)?;
+        let mut answers = MeasuredAnswers::new(file, self.format.unwrap_or_default());
+        let keeping = source.keeping();
+        let opened = source.open().map_err(Failure::Source)?;
+        let mut lines = Lines::spawn(opened, keeping, source.begins_anywhere()).map_err(Failure::Reader)?;
+        let graceful = Graceful::begin();
+        let mut report = Report::new(source);
+        let every = self.report.map(Duration::from_secs_f64);
+        let end = loop {
+            if every.is_some_and(|every| report.is_due(every)) {
+                report.tell(lines.dropped());
+            }
+            if graceful.is_end_requested() {
+                break Err(Failure::InterruptedFollow);
+            }
+            let line = match lines.next(WAIT) {
+                NextLine::Line(line) => line,
+                NextLine::None => continue,
+                NextLine::End(Some(error)) => {
+                    let input = report.source().clone();
+                    break Err(Failure::Lost { input, source: error });
+                }
+                NextLine::End(None) => break Ok(()),
+            };
+            let (number, read_at) = (line.number, line.read_at);
+            match line.text.map(|text| answers.write(number, text)) {
+                Some(Ok(Answered::Yes)) => report.good(read_at.elapsed()),
+                Some(Ok(Answered::Heading)) => {}
+                Some(Ok(Answered::Bad(reason))) => report.bad(&format_args!("line {number}: {reason}")),
+                Some(Err(error)) => break Err(Failure::Output(error)),
+                None => report.bad(&format_args!(
+                    "line {number}: it is longer than {} bytes",
+                    Lines::LONGEST
+                )),
+            }
+        };
+        report.tell(lines.dropped());
+        end
+    }
+
+    /// The source that `input` names, after a check of the other arguments.
+    fn source(&self, input: &Path) -> Result<Source, Failure> {
         let input = input
             .to_str()
             .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
@@ -74,6 +123,12 @@ impl Follow {
         if self.report.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
             return Err(wrong("--report", "give a number of seconds above 0"));
         }
+        Ok(source)
+    }
+
+    /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
+    pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
+        let source = self.source(input)?;
         let keeping = source.keeping();
         let (scene, scale) = (&file.settings.source.scene, file.settings.source.sensor.scale);
         let mut parser = LineParser::new(scale, scene.rows, keeping == Keeping::All).map_err(SimulationError::from)?;

@@ -1,4 +1,4 @@
-//! The work in a terminal: `decoupler train`, `decode`, `export`, `simulate`, `reproduce`, `trade` and
+//! The work in a terminal: `decoupler train`, `inspect`, `decode`, `export`, `simulate`, `reproduce`, `trade` and
 //! `sweep`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
@@ -15,7 +15,13 @@ mod follow;
 mod follow_answers;
 mod follow_faults;
 mod follow_report;
+mod import_arguments;
+mod inspect;
 mod interruption;
+mod measured_decode;
+mod measured_report;
+mod measured_table;
+mod measured_train;
 mod output;
 mod outside_training;
 mod parse_error;

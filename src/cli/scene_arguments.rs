@@ -8,7 +8,7 @@ use crate::{
     decoupling::DecoderKind,
     evaluation::{Preset, SimulatedSettings},
     network::{Quantity, ScalingChoice},
-    scene::{Loading, Movement, Noise, NoisySets, Rows},
+    scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows},
 };
 
 // Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the value of the
@@ -28,9 +28,9 @@ pub(super) struct SceneArguments {
     /// :cylinder, :edge)
     #[arg(long, value_name = "random|smooth:MM|indenter")]
     loading: Option<Loading>,
-    /// Quantity that the network reads
-    #[arg(long, value_name = "resistance|conductance|log")]
-    inputs: Option<Quantity>,
+    /// Quantity that the network reads; of own data (train --data) the columns, separated by commas
+    #[arg(long, value_name = "resistance|conductance|log", value_delimiter = ',')]
+    inputs: Vec<String>,
     /// Scaling of the inputs: each to its range, or whitened principal components
     #[arg(long, value_name = "minmax|whiten")]
     scaling: Option<ScalingChoice>,
@@ -88,6 +88,74 @@ impl SceneArguments {
         Ok(())
     }
 
+    /// Quantity that the network reads, if it is given.
+    fn quantity(&self) -> Result<Option<Quantity>, Failure> {
+        match &self.inputs[..] {
+            [] => Ok(None),
+            [name] => {
+                let quantity = name
+                    .parse()
+                    .map_err(|error| Failure::Arguments(format!("--inputs: {error}")));
+                quantity.map(Some)
+            }
+            _ => {
+                let message =
+                    "--inputs: columns need --data; give resistance, conductance or log for a simulated sensor";
+                Err(Failure::Arguments(message.to_owned()))
+            }
+        }
+    }
+
+    /// Columns read, of own data.
+    pub(super) fn columns(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// Row model and scaling for own data.
+    ///
+    /// # Errors
+    /// Names the first argument given that has a meaning for a simulated sensor only.
+    pub(super) fn measured(&self, has_row_wires: bool) -> Result<(RowModel, Option<ScalingChoice>), Failure> {
+        let refuse = |argument: &str, reason: &str| Err(Failure::Arguments(format!("{argument}: {reason}")));
+        let scene = "own data (--data) have no scene to be drawn from; leave it out";
+        let given = [
+            (self.preset.is_some(), "--preset"),
+            (self.axes.is_some(), "--axes"),
+            (self.loading.is_some(), "--loading"),
+        ];
+        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
+            return refuse(argument, scene);
+        }
+        let given = [
+            (!self.noise.is_empty(), "--noise"),
+            (self.noise_ohm.is_some(), "--noise-ohm"),
+            (self.adc_bits.is_some(), "--adc-bits"),
+            (self.drift.is_some(), "--drift"),
+            (self.noise_in.is_some(), "--noise-in"),
+        ];
+        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
+            return refuse(argument, "own data (--data) have their own noise already; leave it out");
+        }
+        if !self.decoder.is_empty() {
+            return refuse(
+                "--decoder",
+                "own data (--data) are tested with the mean, ridge and the network; leave it out",
+            );
+        }
+        let rows = match self.rows {
+            None | Some(Rows::All) => RowModel::Shared,
+            Some(Rows::Known) if has_row_wires => RowModel::Each,
+            Some(Rows::Known) => return refuse("--rows known", "name the column of row-wires with --row-wire"),
+            Some(Rows::One(_)) => {
+                return refuse(
+                    "--rows",
+                    "choose one row of own data with --where, for example \"row=3\"",
+                );
+            }
+        };
+        Ok((rows, self.scaling))
+    }
+
     /// `present` with the given parts of the noise.
     fn noise(&self, present: Noise, relative: Option<f64>) -> Noise {
         let bits = self.adc_bits.and_then(|bits| u8::try_from(bits).ok());
@@ -111,7 +179,7 @@ impl SceneArguments {
         scene.movement = self.axes.unwrap_or(scene.movement);
         scene.loading = self.loading.unwrap_or(scene.loading);
         scene.noise = self.noise(scene.noise, relative_noise);
-        settings.inputs.quantity = self.inputs.unwrap_or(settings.inputs.quantity);
+        settings.inputs.quantity = self.quantity()?.unwrap_or(settings.inputs.quantity);
         settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
         scene
             .check()

@@ -8,8 +8,9 @@ use indicatif::ProgressBar;
 
 use super::{
     announcement::announce,
-    checkpointing::{CheckpointArguments, Checkpointing},
+    checkpointing::{CheckpointArguments, Checkpointing, Saving},
     failure::{Failure, Interruption},
+    import_arguments::ImportArguments,
     interruption::Graceful,
     output::{print_object, progress_bar},
     same_file::is_same,
@@ -20,37 +21,61 @@ use super::{
 use crate::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
-    export::{CheckpointFile, NetworkFile, check_writable, format_number, report::RunReport},
+    export::{CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, check_writable, report::RunReport},
+    training::TrainingSettings,
 };
 
 /// Train a network and print its errors
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
 /// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
-/// with the published figures where there are any. Ctrl-C stops after the epoch,
+/// with the published figures where there are any. With --data it trains on samples of a real sensor from files, and compares
+/// the network with the mean and with ridge regression, target by target. Ctrl-C stops after the epoch,
 /// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
     #[command(flatten)]
-    training: TrainingArguments,
+    pub(super) training: TrainingArguments,
     #[command(flatten)]
-    checkpoint: CheckpointArguments,
+    pub(super) import: ImportArguments,
+    #[command(flatten)]
+    pub(super) checkpoint: CheckpointArguments,
     /// File for the network, to be opened in the window or given to decode
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl Train {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let checkpointing = self.checkpoint.checkpointing()?;
+        self.checkpoint.check()?;
         self.check_paths()?;
+        if let Some(path) = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume) {
+            match MeasuredCheckpointFile::load(path) {
+                // It is of another kind.
+                Err(DocumentError::Other { .. }) => {}
+                file if self.import.is_given() => {
+                    file?;
+                    let message = "--data: the checkpoint names the files; leave it out to resume";
+                    return Err(Failure::Arguments(message.to_owned()));
+                }
+                file => {
+                    self.check_no_report()?;
+                    return self.resume_measured(path, file?);
+                }
+            }
+        }
+        if self.import.is_given() {
+            self.check_no_report()?;
+            return self.run_measured();
+        }
+        self.import.check_unused()?;
         let mut run = match &self.checkpoint.checkpoint {
             Some(path) if self.checkpoint.resume => self.resume(path)?,
             _ => {
@@ -59,7 +84,7 @@ impl Train {
                 Run::prepare(settings)?
             }
         };
-        let end = self.train(&mut run, checkpointing);
+        let end = self.train(&mut run, self.checkpoint.checkpointing(Saving::Simulated));
         let file = NetworkFile::from_run(&run)?;
         // Whatever fails now, the figures are printed.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
@@ -86,13 +111,20 @@ impl Train {
         measured?;
         let saved = saved.map_err(Failure::from);
         let reported = reported.map_err(Failure::from);
-        let mut failures = [saved, reported, end].into_iter().filter_map(Result::err);
-        let Some(first) = failures.next() else { return Ok(()) };
-        for other in failures {
-            // Nobody is left to tell if this fails.
-            let _ = writeln!(stderr(), "{other}");
+        first_failure([saved, reported, end])
+    }
+
+    /// Joins what saving the network and training came to.
+    pub(super) fn end(&self, saved: Result<(), DocumentError>, end: Result<(), Failure>) -> Result<(), Failure> {
+        first_failure([saved.map_err(Failure::from), end])
+    }
+
+    fn check_no_report(&self) -> Result<(), Failure> {
+        if self.report.is_none() {
+            return Ok(());
         }
-        Err(first)
+        let message = "--report: reports are written of simulated sensors; leave it out, or use --json with --data";
+        Err(Failure::Arguments(message.to_owned()))
     }
 
     /// Checks that every file has a path of its own that can be written.
@@ -124,6 +156,17 @@ impl Train {
             path: path.to_owned(),
             source,
         })?;
+        self.continue_run(&mut run, saved, training)?;
+        Ok(run)
+    }
+
+    /// Gives a resumed run the method and stopping rules asked for, where they differ from those `saved`.
+    pub(super) fn continue_run(
+        &self,
+        run: &mut Run,
+        saved: TrainingSettings,
+        training: TrainingSettings,
+    ) -> Result<(), Failure> {
         run.set_stopping(training.stopping)?;
         if training.method != saved.method {
             run.continue_with(training.method)?;
@@ -134,12 +177,12 @@ impl Train {
                 )));
             }
         }
-        Ok(run)
+        Ok(())
     }
 
     /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
     /// terminal.
-    fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
+    pub(super) fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
         let bar = progress_bar(
             self.json,
             run.settings().training.stopping.epochs,
@@ -192,6 +235,17 @@ impl Train {
         }
         command
     }
+}
+
+/// Returns the first failure, and tells the others.
+fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<(), Failure> {
+    let mut failures = ends.into_iter().filter_map(Result::err);
+    let Some(first) = failures.next() else { return Ok(()) };
+    for other in failures {
+        // Nobody is left to tell if this fails.
+        let _ = writeln!(stderr(), "{other}");
+    }
+    Err(first)
 }
 
 /// Measures decoders of these kinds on the test samples of `run`, whose network is in `file`.

@@ -10,10 +10,11 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MOST_STARTS, SimulatedSettings, Simulation},
-    network::LARGEST_HIDDEN,
+    evaluation::{MOST_STARTS, Measured, RunSettings, SimulatedSettings, Simulation},
+    export::MeasuredSettings,
+    network::{InputChoice, LARGEST_HIDDEN},
     sensor::{ArrayScale, SensorModel},
-    training::{Method, StoppingRules, TrainingSettings},
+    training::{Damping, Method, StoppingRules, TrainingSettings},
 };
 
 // The run to train. Arguments that are not given have their default or the checkpoint's value.
@@ -83,6 +84,79 @@ impl TrainingArguments {
         })
     }
 
+    /// Settings of a new run on own data.
+    ///
+    /// The defaults are those that fit noisy recordings: Bayesian regularisation, which needs no validation samples, so that the
+    /// samples nearest to the test in time train too; of three starts the best.
+    pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        const STARTS: usize = 3;
+        const STOPPING: StoppingRules = StoppingRules {
+            epochs: 150,
+            goal_mse: 0.0,
+            min_gradient: 1e-7,
+            max_fail: 30,
+        };
+        let (rows, scaling) = self.scene.measured(has_row_wires)?;
+        let given = [
+            (
+                self.array.is_some(),
+                "--array",
+                "own data (--data) have no array; leave it out",
+            ),
+            (
+                self.samples.is_some(),
+                "--samples",
+                "all rows of own data (--data) are used; choose some with --where",
+            ),
+            (
+                self.test_samples.is_some(),
+                "--test-samples",
+                "of own data (--data) a share tests; give --test-fraction or --test-data",
+            ),
+            (
+                self.validation_samples.is_some(),
+                "--validation-samples",
+                "of own data (--data) a share is held out; give --validation-fraction",
+            ),
+        ];
+        if let Some((_, argument, reason)) = given.into_iter().find(|(is_given, ..)| *is_given) {
+            return Err(Failure::Arguments(format!("{argument}: {reason}")));
+        }
+        let default = RunSettings::from(Measured { rows });
+        Ok(RunSettings {
+            inputs: InputChoice {
+                scaling: scaling.unwrap_or(default.inputs.scaling),
+                ..default.inputs
+            },
+            hidden: self.hidden.unwrap_or(default.hidden),
+            starts: self.starts.unwrap_or(STARTS),
+            training: self.training(TrainingSettings {
+                method: Method::BayesianRegularization(Damping::default()),
+                stopping: STOPPING,
+            })?,
+            seed: self.seed.map_or(default.seed, Seed),
+            ..default
+        })
+    }
+
+    /// Refuses arguments that differ from the settings `saved` of a training on own data.
+    pub(super) fn check_resumed(&self, saved: &MeasuredSettings) -> Result<(), Failure> {
+        let given = [
+            ("hidden", self.hidden.map(|hidden| hidden as u64), saved.hidden as u64),
+            ("starts", self.starts.map(|starts| starts as u64), saved.starts as u64),
+            ("seed", self.seed, saved.seed.0),
+        ];
+        for (argument, given, saved) in given {
+            if let Some(given) = given.filter(|given| *given != saved) {
+                return Err(Failure::Arguments(format!(
+                    "--{argument} {given}: the checkpoint has {saved}; leave it out to resume, or start a new training \
+                     with another --checkpoint"
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// The sensor, if an array scale is given.
     pub(super) fn sensor(&self) -> Option<SensorModel> {
         self.array.map(SensorModel::new)
@@ -122,7 +196,7 @@ impl TrainingArguments {
     }
 
     /// The given method and stopping rules; those not given are as in `present`.
-    fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
+    pub(super) fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
         let mut method = self.method.unwrap_or(present.method);
         for (name, value) in &self.set {
             let short_name = method.short_name();

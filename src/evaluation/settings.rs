@@ -63,8 +63,7 @@ impl From<Measured> for RunSettings {
     ///
     /// Recordings are short, noisy, and differ from one stretch to the next, so a validation part in time costs samples
     /// and can end the training by chance: Levenberg-Marquardt stopped by the last fifth of a recording of forces has
-    /// errors that vary twofold with the seed, which Bayesian regularisation on all of it has not. Held-out samples of the
-    /// training part of three recordings are answered as well by either otherwise.
+    /// errors that vary twofold with the seed, which Bayesian regularisation on all of it has not.
     fn from(measured: Measured) -> Self {
         let mut settings = Self::of(measured.into(), InputChoice::MEASURED);
         settings.training.method = Method::bayesian_regularization();

@@ -23,6 +23,12 @@ pub enum DocumentKind {
     Network,
     /// A training to be resumed: [`super::CheckpointFile`].
     Checkpoint,
+    /// A network trained on measured samples: [`super::MeasuredNetworkFile`].
+    MeasuredNetwork,
+    /// A training on measured samples to be resumed: [`super::MeasuredCheckpointFile`].
+    MeasuredCheckpoint,
+    /// How measured samples are made of files: [`super::RecipeFile`].
+    Recipe,
     /// A name or choice of the run list: [`super::RunFolder`].
     RunList,
     /// A finished trial of `decoupler sweep`.
@@ -37,6 +43,9 @@ impl DocumentKind {
         match self {
             Self::Network => "decoupler network",
             Self::Checkpoint => "decoupler checkpoint",
+            Self::MeasuredNetwork => "decoupler measured network",
+            Self::MeasuredCheckpoint => "decoupler measured checkpoint",
+            Self::Recipe => "decoupler import",
             Self::RunList => "decoupler run list",
             Self::Trial => "decoupler trial",
             Self::SweepPlan => "decoupler sweep plan",
@@ -51,14 +60,16 @@ impl DocumentKind {
             Self::Network => 1..=3,
             // Version 1 had the paper's scene only, version 3 has the wall time.
             Self::Checkpoint => 1..=3,
+            Self::MeasuredNetwork | Self::MeasuredCheckpoint | Self::Recipe => 1..=1,
             Self::RunList | Self::Trial | Self::SweepPlan => 1..=1,
         }
     }
 
     fn cure(self) -> &'static str {
         match self {
-            Self::Network => "copy or save it again",
-            Self::Checkpoint => "copy it again, or start a new training",
+            Self::Network | Self::MeasuredNetwork => "copy or save it again",
+            Self::Recipe => "correct it, or write it again with --save-recipe",
+            Self::Checkpoint | Self::MeasuredCheckpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",
             Self::Trial | Self::SweepPlan => "delete it and run the sweep again",
         }
@@ -124,6 +135,9 @@ impl fmt::Display for DocumentKind {
         f.write_str(match self {
             Self::Network => "network file",
             Self::Checkpoint => "checkpoint",
+            Self::MeasuredNetwork => "network file of measured samples",
+            Self::MeasuredCheckpoint => "checkpoint of measured samples",
+            Self::Recipe => "recipe of an import",
             Self::RunList => "part of a run list",
             Self::Trial => "trial",
             Self::SweepPlan => "sweep plan",
@@ -192,6 +206,9 @@ pub enum DocumentError {
         "a run on measured samples has no {0}; save its networks with serde, or its states and samples, and resume it on the same sets"
     )]
     Measured(DocumentKind),
+    /// A run on simulated samples, where the file tells of measured ones.
+    #[error("a run on simulated samples has no {0}; save it as a network file or checkpoint of its own kind")]
+    Simulated(DocumentKind),
     /// The run has values that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
     Unsound {

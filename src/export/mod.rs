@@ -13,9 +13,12 @@ pub mod figures;
 mod heading;
 mod kept_files;
 mod limited;
+mod measured_checkpoint;
+mod measured_network;
 mod network_document;
 mod network_file;
 mod old_run_list;
+mod recipe_file;
 #[cfg(feature = "figures")]
 pub mod report;
 mod run_folder;
@@ -39,7 +42,10 @@ pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
+pub use measured_checkpoint::MeasuredCheckpointFile;
+pub use measured_network::{MeasuredNetworkFile, MeasuredSettings};
 pub use network_file::{NetworkFile, TrainingRecord};
+pub use recipe_file::RecipeFile;
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};

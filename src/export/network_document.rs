@@ -37,7 +37,7 @@ pub(super) struct UnsealedDocument {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct TrainingDocument {
+pub(super) struct TrainingDocument {
     stop_reason: Option<StopReason>,
     best_epoch: usize,
     epochs: usize,
@@ -75,15 +75,7 @@ impl RunDocument {
         Self {
             settings,
             network,
-            training: TrainingDocument {
-                stop_reason: training.stop_reason,
-                best_epoch: training.best_epoch,
-                epochs: training.history.last().map_or(0, |record| record.epoch),
-                seconds: training.seconds,
-                history: History(training.history),
-                stages: training.stages,
-                starts: training.starts,
-            },
+            training: TrainingDocument::of(training),
             errors,
             baselines,
         }
@@ -94,29 +86,49 @@ impl RunDocument {
     /// # Errors
     /// A description of the first number that contradicts another.
     pub(super) fn into_file(self, program: String, version: u64) -> Result<NetworkFile, String> {
-        let training = self.training;
-        let last = training.history.0.last().map_or(0, |record| record.epoch);
-        if training.epochs != last {
-            let epochs = training.epochs;
-            return Err(format!(
-                "training.epochs: it is {epochs}, but the history ends with epoch {last}"
-            ));
-        }
         Ok(NetworkFile {
             program,
             version,
             settings: self.settings,
             network: self.network,
-            training: TrainingRecord {
-                stop_reason: training.stop_reason,
-                best_epoch: training.best_epoch,
-                seconds: training.seconds,
-                history: training.history.0,
-                stages: training.stages,
-                starts: training.starts,
-            },
+            training: self.training.into_record()?,
             errors: self.errors,
             baselines: self.baselines,
+        })
+    }
+}
+
+impl TrainingDocument {
+    pub(super) fn of(training: TrainingRecord) -> Self {
+        Self {
+            stop_reason: training.stop_reason,
+            best_epoch: training.best_epoch,
+            epochs: training.history.last().map_or(0, |record| record.epoch),
+            seconds: training.seconds,
+            history: History(training.history),
+            stages: training.stages,
+            starts: training.starts,
+        }
+    }
+
+    /// Returns the record.
+    ///
+    /// # Errors
+    /// A description of the number of epochs that contradicts the history.
+    pub(super) fn into_record(self) -> Result<TrainingRecord, String> {
+        let (epochs, last) = (self.epochs, self.history.0.last().map_or(0, |record| record.epoch));
+        if epochs != last {
+            return Err(format!(
+                "training.epochs: it is {epochs}, but the history ends with epoch {last}"
+            ));
+        }
+        Ok(TrainingRecord {
+            stop_reason: self.stop_reason,
+            best_epoch: self.best_epoch,
+            seconds: self.seconds,
+            history: self.history.0,
+            stages: self.stages,
+            starts: self.starts,
         })
     }
 }

@@ -58,6 +58,21 @@ pub struct TrainingRecord {
     pub starts: Vec<StartRecord>,
 }
 
+impl TrainingRecord {
+    /// Takes the record of `run` so far.
+    pub(super) fn of(run: &Run) -> Self {
+        let trainer = run.leader();
+        Self {
+            stop_reason: run.stop_reason(),
+            best_epoch: trainer.best_epoch(),
+            seconds: trainer.elapsed().as_secs_f64(),
+            history: trainer.history().to_vec(),
+            stages: trainer.stages().to_vec(),
+            starts: run.starts(),
+        }
+    }
+}
+
 impl NetworkFile {
     /// Takes the best network of `run` so far, with its record and errors.
     ///
@@ -66,20 +81,12 @@ impl NetworkFile {
     pub fn from_run(run: &Run) -> Result<Self, DocumentError> {
         let simulated = run.settings().simulated().zip(run.node_scores());
         let (settings, scores) = simulated.ok_or(DocumentError::Measured(KIND))?;
-        let trainer = run.leader();
         Ok(Self {
             program: PROGRAM.to_owned(),
             version: *KIND.versions().end(),
             settings,
             network: run.network(),
-            training: TrainingRecord {
-                stop_reason: run.stop_reason(),
-                best_epoch: trainer.best_epoch(),
-                seconds: trainer.elapsed().as_secs_f64(),
-                history: trainer.history().to_vec(),
-                stages: trainer.stages().to_vec(),
-                starts: run.starts(),
-            },
+            training: TrainingRecord::of(run),
             errors: scores.network,
             baselines: scores.baselines,
         })

@@ -12,6 +12,7 @@
 mod arguments;
 mod checkpoint_file;
 mod corpus;
+mod import;
 mod mutation;
 mod names;
 mod network_file;

@@ -1,0 +1,167 @@
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::{
+    failure::Failure,
+    import_arguments::{DialectArguments, with_bar},
+    measured_report::format_words,
+    output::{print, print_object},
+};
+use crate::{
+    export::format_number,
+    import::{ColumnKind, ColumnSummary, Dialect, Inspection, TimeSummary},
+};
+
+/// Show what is in a file of own data: layout, columns, and how times follow each other
+///
+/// Reads CSV, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram over
+/// its range. The names are those that train --data takes.
+#[derive(Args)]
+pub(super) struct Inspect {
+    /// The file
+    #[arg(long, value_name = "FILE")]
+    data: PathBuf,
+    /// Column of the times [default: a column named time or t, or the first if it always grows]
+    #[arg(long, value_name = "COLUMN")]
+    time: Option<String>,
+    /// Print one JSON object instead of text
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    dialect: DialectArguments,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    file: &'a PathBuf,
+    format: String,
+    dialect: Option<&'a Dialect>,
+    #[serde(flatten)]
+    inspection: &'a Inspection,
+}
+
+impl Inspect {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        let (inspection, table) = with_bar(self.json, |watch| {
+            Inspection::read(&self.data, self.dialect.choice(), self.time.as_deref(), watch)
+        })?;
+        if self.json {
+            return print_object(&Report {
+                file: &self.data,
+                format: format_words(&table.format),
+                dialect: table.dialect(),
+                inspection: &inspection,
+            });
+        }
+        print(|out| {
+            writeln!(
+                out,
+                "{}: {} rows × {} columns",
+                self.data.display(),
+                inspection.rows,
+                inspection.columns.len()
+            )?;
+            writeln!(out, "{}\n", format_words(&table.format))?;
+            write_columns(&inspection.columns, out)?;
+            if let Some(time) = &inspection.time {
+                write_time(time, out)?;
+            }
+            inspection
+                .warnings
+                .iter()
+                .try_for_each(|warning| writeln!(out, "Warning: {warning}"))
+        })
+    }
+}
+
+fn write_columns(columns: &[ColumnSummary], out: &mut impl Write) -> io::Result<()> {
+    let width = |of: fn(&ColumnSummary) -> usize, least: usize| columns.iter().map(of).max().unwrap_or(0).max(least);
+    let name_width = width(|column| column.name.chars().count(), 6);
+    let unit_width = width(
+        |column| column.unit.as_deref().map_or(0, |unit| unit.chars().count()),
+        4,
+    );
+    writeln!(
+        out,
+        "{:<name_width$}  {:<unit_width$}  {:<8}{:>14}{:>14}{:>9}  histogram",
+        "column", "unit", "kind", "least", "largest", "missing"
+    )?;
+    for column in columns {
+        let kind = match column.kind {
+            ColumnKind::Number => "number",
+            ColumnKind::Integer => "integer",
+            ColumnKind::Text => "text",
+            ColumnKind::Empty => "empty",
+        };
+        let number = |number: Option<f64>| number.map_or("–".to_owned(), plain);
+        write!(
+            out,
+            "{:<name_width$}  {:<unit_width$}  {kind:<8}{:>14}{:>14}{:>9}  {:<16}",
+            column.name,
+            column.unit.as_deref().unwrap_or(""),
+            number(column.min),
+            number(column.max),
+            column.missing,
+            bars(&column.histogram)
+        )?;
+        let mut notes = Vec::new();
+        if column.is_constant {
+            notes.push("constant".to_owned());
+        }
+        if let Some(other) = &column.duplicate_of {
+            notes.push(format!("the same as {other}"));
+        }
+        if let Some((line, text)) = &column.first_text {
+            notes.push(format!(
+                "{} cells are no numbers, first '{text}' on line {line}",
+                column.texts
+            ));
+        }
+        writeln!(out, "{}", notes.join("; "))?;
+    }
+    Ok(())
+}
+
+/// A number as short as it can be within 13 characters.
+fn plain(number: f64) -> String {
+    let short = format!("{number}");
+    if short.len() <= 13 {
+        short
+    } else {
+        format!("{number:.6e}")
+    }
+}
+
+fn bars(histogram: &[usize]) -> String {
+    const HEIGHTS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = histogram.iter().copied().max().unwrap_or(0).max(1);
+    // What is there at all is seen.
+    let height = |&count: &usize| (count * (HEIGHTS.len() - 1)).div_ceil(most);
+    histogram.iter().map(|count| HEIGHTS[height(count)]).collect()
+}
+
+fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
+    let guessed = if time.is_guessed { " (taken for the time)" } else { "" };
+    write!(out, "\nTime {}{guessed}: ", time.column)?;
+    match time.median_interval {
+        Some(median) => write!(
+            out,
+            "median interval {}, {} gaps of more than 5 times that",
+            format_number(median),
+            time.gaps
+        )?,
+        None => write!(out, "no two times differ")?,
+    }
+    if let (Some(longest), Some(line)) = (time.longest, time.longest_after_line) {
+        write!(out, ", the longest {} after line {line}", format_number(longest))?;
+    }
+    if time.backwards > 0 {
+        write!(out, "; it runs backwards {} times", time.backwards)?;
+    }
+    writeln!(out)
+}

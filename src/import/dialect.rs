@@ -1,0 +1,224 @@
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Character between the cells of a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Separator {
+    /// `,`
+    #[default]
+    Comma,
+    /// `;`
+    Semicolon,
+    /// Tabulator.
+    Tab,
+    /// `|`
+    Bar,
+    /// Any number of spaces or tabulators.
+    Space,
+}
+
+/// Character before the decimal places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decimal {
+    /// `1.5`
+    #[default]
+    Point,
+    /// `1,5`
+    Comma,
+}
+
+/// Encoding of a file of text.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Encoding {
+    /// UTF-8, with or without a byte-order mark.
+    #[default]
+    #[serde(rename = "utf-8")]
+    Utf8,
+    /// ISO 8859-1.
+    #[serde(rename = "latin-1")]
+    Latin1,
+    /// UTF-16, little-endian.
+    #[serde(rename = "utf-16le")]
+    Utf16Le,
+    /// UTF-16, big-endian.
+    #[serde(rename = "utf-16be")]
+    Utf16Be,
+}
+
+/// Layout of a file of text, as found or as told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Dialect {
+    /// Encoding of the text.
+    pub encoding: Encoding,
+    /// Separator of the cells.
+    pub separator: Separator,
+    /// Decimal separator.
+    pub decimal: Decimal,
+    /// `true` if the first row has the names of the columns.
+    pub header: bool,
+    /// `true` if every row ends with a separator after its last cell.
+    pub trailing_separator: bool,
+    /// `true` if the first line is `sep=` and the separator.
+    pub sep_line: bool,
+    /// Number of lines before the table, without the `sep=` line.
+    pub skipped_lines: usize,
+    /// `true` if lines end with a carriage return alone.
+    pub carriage_returns: bool,
+}
+
+/// What the user says of a file's layout; the rest is found from its beginning.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DialectChoice {
+    /// Encoding of the text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoding: Option<Encoding>,
+    /// Separator of the cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separator: Option<Separator>,
+    /// Decimal separator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decimal: Option<Decimal>,
+    /// `true` if the first row has the names of the columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub header: Option<bool>,
+    /// Number of lines before the table, without the `sep=` line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skip_lines: Option<usize>,
+}
+
+/// Error for a word that names no part of a layout.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{text}' is not a {what}: give {choices}")]
+pub struct DialectError {
+    text: String,
+    what: &'static str,
+    choices: &'static str,
+}
+
+impl Separator {
+    /// All separators, in the order in which they are tried.
+    pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Bar, Self::Space];
+
+    /// The character.
+    pub(super) fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+            Self::Bar => b'|',
+            Self::Space => b' ',
+        }
+    }
+}
+
+impl fmt::Display for Separator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Comma => "comma",
+            Self::Semicolon => "semicolon",
+            Self::Tab => "tab",
+            Self::Bar => "bar",
+            Self::Space => "space",
+        })
+    }
+}
+
+impl FromStr for Separator {
+    type Err = DialectError;
+
+    fn from_str(text: &str) -> Result<Self, DialectError> {
+        let found = Self::ALL.into_iter().find(|separator| {
+            let character = char::from(separator.byte()).to_string();
+            text == character
+                || text.eq_ignore_ascii_case(&separator.to_string())
+                || (text == "\\t" && *separator == Self::Tab)
+        });
+        found.ok_or_else(|| DialectError {
+            text: text.to_owned(),
+            what: "separator",
+            choices: "comma, semicolon, tab, bar or space, or the character",
+        })
+    }
+}
+
+impl fmt::Display for Decimal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Point => "point",
+            Self::Comma => "comma",
+        })
+    }
+}
+
+impl FromStr for Decimal {
+    type Err = DialectError;
+
+    fn from_str(text: &str) -> Result<Self, DialectError> {
+        match text {
+            "point" | "." => Ok(Self::Point),
+            "comma" | "," => Ok(Self::Comma),
+            _ => Err(DialectError {
+                text: text.to_owned(),
+                what: "decimal separator",
+                choices: "point or comma",
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Encoding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Utf8 => "utf-8",
+            Self::Latin1 => "latin-1",
+            Self::Utf16Le => "utf-16le",
+            Self::Utf16Be => "utf-16be",
+        })
+    }
+}
+
+impl FromStr for Encoding {
+    type Err = DialectError;
+
+    fn from_str(text: &str) -> Result<Self, DialectError> {
+        let all = [Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
+        let found = all
+            .into_iter()
+            .find(|encoding| text.eq_ignore_ascii_case(&encoding.to_string()));
+        found.ok_or_else(|| DialectError {
+            text: text.to_owned(),
+            what: "encoding",
+            choices: "utf-8, latin-1, utf-16le or utf-16be",
+        })
+    }
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let header = if self.header { "a header" } else { "no header" };
+        write!(
+            f,
+            "separator {}, decimal {}, {header}, {}",
+            self.separator, self.decimal, self.encoding
+        )?;
+        if self.sep_line {
+            write!(f, ", a sep= line")?;
+        }
+        if self.trailing_separator {
+            write!(f, ", a separator at the end of each row")?;
+        }
+        if self.skipped_lines > 0 {
+            write!(f, ", {} lines before the table", self.skipped_lines)?;
+        }
+        if self.carriage_returns {
+            write!(f, ", lines end with CR")?;
+        }
+        Ok(())
+    }
+}

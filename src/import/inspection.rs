@@ -1,0 +1,243 @@
+use std::{collections::HashMap, path::Path};
+
+use serde::Serialize;
+
+use super::{Cells, Column, DialectChoice, ImportError, Table, Watch, join::median_interval, read_table};
+
+/// Number of bars of a histogram.
+const BARS: usize = 16;
+/// A gap is an interval that is this many times the median.
+const GAP: f64 = 5.0;
+
+/// A file column by column, to choose from.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// Number of rows.
+    pub rows: usize,
+    /// Columns.
+    pub columns: Vec<ColumnSummary>,
+    /// Intervals of the column of times, if there is one.
+    pub time: Option<TimeSummary>,
+    /// What the user should look at.
+    pub warnings: Vec<String>,
+}
+
+/// A column in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnSummary {
+    /// Name.
+    pub name: String,
+    /// Unit, if the header has one.
+    pub unit: Option<String>,
+    /// Kind of the cells.
+    pub kind: ColumnKind,
+    /// Number of missing cells.
+    pub missing: usize,
+    /// Number of cells that are neither numbers nor missing.
+    pub texts: usize,
+    /// Line and text of the first cell that is neither a number nor missing.
+    pub first_text: Option<(u64, String)>,
+    /// Least number.
+    pub min: Option<f64>,
+    /// Largest number.
+    pub max: Option<f64>,
+    /// `true` if all numbers are the same.
+    pub is_constant: bool,
+    /// Name of an earlier column with the same cells.
+    pub duplicate_of: Option<String>,
+    /// Number of cells in each part of the range, from the least to the largest number.
+    pub histogram: Vec<usize>,
+}
+
+/// Kind of the cells of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ColumnKind {
+    /// Numbers of which some are not whole.
+    Number,
+    /// Whole numbers.
+    Integer,
+    /// Mostly texts.
+    Text,
+    /// Nothing.
+    Empty,
+}
+
+/// Intervals of a column of times.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TimeSummary {
+    /// Name of the column.
+    pub column: String,
+    /// `true` if nobody said that the column is the time.
+    pub is_guessed: bool,
+    /// Median interval, in the unit of the column.
+    pub median_interval: Option<f64>,
+    /// Number of intervals longer than five times the median.
+    pub gaps: usize,
+    /// Longest interval.
+    pub longest: Option<f64>,
+    /// Line after which the longest interval is.
+    pub longest_after_line: Option<u64>,
+    /// Number of times that are before the time on the line above.
+    pub backwards: usize,
+}
+
+impl Inspection {
+    /// Reads the file at `path` and looks at each column; `time` is the column of times, else a first column that always grows
+    /// is taken for it.
+    ///
+    /// # Errors
+    /// As [`read_table`], or if there is no column `time`.
+    pub fn read(
+        path: &Path,
+        choice: DialectChoice,
+        time: Option<&str>,
+        watch: Watch<'_>,
+    ) -> Result<(Self, Table), ImportError> {
+        let table = read_table(path, choice, watch)?;
+        let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
+        name_duplicates(&table, &mut columns);
+        let chosen = match time {
+            Some(name) => Some((super::names::Names::of(&[&table], &[]).find(name)?.column, false)),
+            None => guess_time(&table, &columns).map(|column| (column, true)),
+        };
+        let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(&table, column, is_guessed));
+        let mut warnings = table.notes.clone();
+        if let Some(line) = table.too_short.first_line {
+            let rows = table.too_short.rows;
+            warnings.push(format!(
+                "{rows} rows, the first on line {line}, end before the last column"
+            ));
+        }
+        if let Some(line) = table.too_long.first_line {
+            let rows = table.too_long.rows;
+            warnings.push(format!(
+                "{rows} rows, the first on line {line}, have more cells than there are columns and are left out"
+            ));
+        }
+        let inspection = Self {
+            rows: table.rows,
+            columns,
+            time,
+            warnings,
+        };
+        Ok((inspection, table))
+    }
+}
+
+impl ColumnSummary {
+    fn of(column: &Column) -> Self {
+        let numbers: &[f64] = match &column.cells {
+            Cells::Numbers(numbers) => numbers,
+            Cells::Labels { .. } => &[],
+        };
+        let present = || numbers.iter().copied().filter(|number| !number.is_nan());
+        let (mut min, mut max, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+        for number in present() {
+            (min, max, count) = (min.min(number), max.max(number), count + 1);
+        }
+        let kind = match count {
+            0 if column.faults.count > 0 => ColumnKind::Text,
+            0 => ColumnKind::Empty,
+            _ if column.faults.count > count => ColumnKind::Text,
+            _ if present().all(|number| number.fract() == 0.0) => ColumnKind::Integer,
+            _ => ColumnKind::Number,
+        };
+        Self {
+            name: column.name.clone(),
+            unit: column.unit.clone(),
+            kind,
+            missing: column.missing,
+            texts: column.faults.count,
+            first_text: column
+                .faults
+                .first
+                .as_ref()
+                .map(|fault| (fault.line, fault.text.clone())),
+            min: (count > 0).then_some(min),
+            max: (count > 0).then_some(max),
+            is_constant: count > 0 && min == max,
+            duplicate_of: None,
+            histogram: histogram(present(), min, max),
+        }
+    }
+}
+
+fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usize> {
+    if min >= max {
+        return Vec::new();
+    }
+    let mut bars = vec![0; BARS];
+    for number in numbers {
+        // Halves, since the range of the largest numbers is infinite.
+        let share = (number / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0);
+        bars[((share * BARS as f64) as usize).min(BARS - 1)] += 1;
+    }
+    bars
+}
+
+/// Names the columns that have the same cells as an earlier one.
+fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
+    let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
+    for index in 0..columns.len() {
+        let Cells::Numbers(numbers) = &table.columns[index].cells else {
+            continue;
+        };
+        if columns[index].min.is_none() {
+            continue;
+        }
+        // FNV-1a over the bits.
+        let hash = numbers.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, number| {
+            (hash ^ number.to_bits()).wrapping_mul(0x0100_0000_01b3)
+        });
+        let same = |other: &usize| match &table.columns[*other].cells {
+            Cells::Numbers(others) => others
+                .iter()
+                .zip(numbers)
+                .all(|(one, other)| one.to_bits() == other.to_bits()),
+            Cells::Labels { .. } => false,
+        };
+        let earlier = known.entry(hash).or_default();
+        match earlier.iter().find(|other| same(other)) {
+            Some(&other) => columns[index].duplicate_of = Some(columns[other].name.clone()),
+            None => earlier.push(index),
+        }
+    }
+}
+
+/// The first column, if it always grows.
+fn guess_time(table: &Table, columns: &[ColumnSummary]) -> Option<usize> {
+    let by_name = columns.iter().position(|column| {
+        let name = column.name.to_lowercase();
+        ["time", "timestamp", "t"].contains(&name.as_str()) && column.min.is_some()
+    });
+    let grows = || match &table.columns.first()?.cells {
+        Cells::Numbers(numbers) => (numbers.len() > 2 && numbers.windows(2).all(|pair| pair[0] < pair[1])).then_some(0),
+        Cells::Labels { .. } => None,
+    };
+    by_name.or_else(grows)
+}
+
+impl TimeSummary {
+    fn of(table: &Table, column: usize, is_guessed: bool) -> Option<Self> {
+        let Cells::Numbers(times) = &table.columns[column].cells else {
+            return None;
+        };
+        let intervals = || times.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
+        let median = median_interval(times);
+        let longest = intervals()
+            .filter(|(_, interval)| *interval > 0.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        Some(Self {
+            column: table.columns[column].name.clone(),
+            is_guessed,
+            median_interval: median,
+            gaps: median.map_or(0, |median| {
+                intervals().filter(|(_, interval)| *interval > GAP * median).count()
+            }),
+            longest: longest.map(|(_, interval)| interval),
+            longest_after_line: longest.map(|(row, _)| table.line(row)),
+            backwards: intervals().filter(|(_, interval)| *interval < 0.0).count(),
+        })
+    }
+}

@@ -1,0 +1,106 @@
+/// Partners in a joined recording.
+pub(super) struct Partners {
+    /// Row of the joined file for each row; `None` if none is near enough.
+    pub(super) rows: Vec<Option<u32>>,
+    /// Largest time between partners.
+    pub(super) limit: f64,
+    /// Median of the time of the row minus that of its partner.
+    pub(super) median_offset: Option<f64>,
+}
+
+/// Finds for each of `times` the nearest of `joined`, if it is within `limit`; of two as near the earlier. Times may be in any
+/// order, and NaN where they are missing.
+pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
+    let mut order: Vec<u32> = (0..joined.len() as u32)
+        .filter(|&row| !joined[row as usize].is_nan())
+        .collect();
+    order.sort_by(|&one, &other| joined[one as usize].total_cmp(&joined[other as usize]));
+    let of = |place: usize| joined[order[place] as usize];
+    let mut offsets = Vec::new();
+    let rows = times
+        .iter()
+        .map(|&time| {
+            // Not the first that is not before: of equal times the first row is taken.
+            let after = order.partition_point(|&row| joined[row as usize] < time);
+            let before = after
+                .checked_sub(1)
+                .map(|place| order.partition_point(|&row| joined[row as usize] < of(place)));
+            let candidates = [before, (after < order.len()).then_some(after)];
+            let gap = |place: &usize| (of(*place) - time).abs();
+            let nearest = candidates
+                .into_iter()
+                .flatten()
+                .min_by(|one, other| gap(one).total_cmp(&gap(other)))?;
+            // A missing time is near nothing.
+            (gap(&nearest) <= limit).then(|| {
+                offsets.push(time - of(nearest));
+                order[nearest]
+            })
+        })
+        .collect();
+    Partners {
+        rows,
+        limit,
+        median_offset: median(&mut offsets),
+    }
+}
+
+/// Median of the intervals between the times in ascending order; intervals of zero do not count.
+pub(super) fn median_interval(times: &[f64]) -> Option<f64> {
+    let mut sorted: Vec<f64> = times.iter().copied().filter(|time| !time.is_nan()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let mut intervals: Vec<f64> = sorted
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|interval| *interval > 0.0)
+        .collect();
+    median(&mut intervals)
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+
+    #[test]
+    fn partners_are_those_of_a_full_search() {
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        for _ in 0..200 {
+            // Few values, so that times are equal and as far from two others.
+            let mut draw = |count: usize| -> Vec<f64> {
+                let missing_or = |time: i32| if time == 0 { f64::NAN } else { f64::from(time) };
+                (0..count).map(|_| missing_or(rng.random_range(0..30))).collect()
+            };
+            let (times, joined) = (draw(20), draw(12));
+            let limit = 2.0;
+            let expected: Vec<Option<u32>> = times
+                .iter()
+                .map(|time| {
+                    let gap = |row: &u32| (joined[*row as usize] - time).abs();
+                    let near = (0..joined.len() as u32).filter(|row| gap(row) <= limit);
+                    near.min_by(|one, other| {
+                        let key = |row: &u32| (gap(row), joined[*row as usize]);
+                        key(one).partial_cmp(&key(other)).unwrap()
+                    })
+                })
+                .collect();
+            assert_eq!(nearest(&times, &joined, limit).rows, expected, "{times:?} {joined:?}");
+        }
+    }
+
+    #[test]
+    fn the_median_interval_needs_two_times() {
+        assert_eq!(median_interval(&[3.0, f64::NAN, 1.0, 2.0, 2.0, 7.0]), Some(1.0));
+        assert_eq!(median_interval(&[1.0, 1.0]), None);
+        assert_eq!(median_interval(&[]), None);
+    }
+}

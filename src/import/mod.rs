@@ -1,0 +1,49 @@
+//! Measured data out of files: tables of text, NumPy and MATLAB, joined by time, with a meaning for each column.
+//!
+//! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
+//! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
+//! [`Plan`] adds how the samples are divided for training and test.
+
+mod arrays;
+mod column;
+mod condition;
+mod csv_table;
+mod detection;
+mod dialect;
+mod element;
+mod error;
+mod gather;
+mod importing;
+mod inputs;
+mod inspection;
+mod join;
+mod matlab;
+mod meanings;
+mod missing;
+mod names;
+mod npz;
+mod number;
+mod numpy;
+mod plan;
+mod read;
+mod recipe;
+mod recording;
+mod rows;
+mod selection;
+mod table;
+mod utf16;
+mod watch;
+
+pub use column::{Cells, Column, Fault, Faults};
+pub use condition::Condition;
+pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
+pub use error::{ImportError, TableError};
+pub use inputs::InputTable;
+pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
+pub use missing::Missing;
+pub use plan::{Plan, PlannedSets, TestFiles};
+pub use read::read_table;
+pub use recipe::{Joined, Recipe};
+pub use recording::{Channel, Dropped, FileReport, JoinReport, Recording};
+pub use table::{Excess, Format, Table};
+pub use watch::{Progress, Watch};

@@ -1,0 +1,219 @@
+//! The `.npy` format, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
+//! The header is one line with three known keys, for which a parser of all literals of Python would be too much: nested
+//! brackets of a damaged header would exhaust its stack.
+
+use std::io::Read;
+
+use super::{
+    TableError,
+    element::{Array, Element, Endian},
+    watch::table_error,
+};
+
+/// Longest header that is read, in bytes.
+const LONGEST_HEADER: usize = 1 << 16;
+/// Number of bytes that are read at once, so that a header that lies costs no memory.
+const BLOCK: usize = 1 << 20;
+
+/// Shape and type of an array.
+#[derive(Debug, PartialEq)]
+struct Header {
+    element: Element,
+    endian: Endian,
+    is_by_column: bool,
+    shape: Vec<usize>,
+}
+
+/// Reads an array of one or two dimensions.
+pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableError> {
+    let wrong = |reason: String| TableError::array(name, reason);
+    let mut start = [0; 8];
+    fill(&mut source, &mut start)
+        .map_err(|error| error.unwrap_or_else(|| wrong("it is cut off; copy it again".to_owned())))?;
+    let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = start else {
+        return Err(wrong("it is no NumPy file; save it with numpy.save".to_owned()));
+    };
+    let mut length = [0; 4];
+    let bytes = match major {
+        1 => 2,
+        2 | 3 => 4,
+        _ => {
+            return Err(wrong(format!(
+                "version {major} of the format is unknown; save it with numpy.save"
+            )));
+        }
+    };
+    let cut_off = || wrong("it is cut off; copy it again".to_owned());
+    fill(&mut source, &mut length[..bytes]).map_err(|error| error.unwrap_or_else(cut_off))?;
+    let length = u32::from_le_bytes(length) as usize;
+    if length > LONGEST_HEADER {
+        return Err(wrong(format!("its header has {length} bytes; save it with numpy.save")));
+    }
+    let mut header = vec![0; length];
+    fill(&mut source, &mut header).map_err(|error| error.unwrap_or_else(cut_off))?;
+    let header = Header::parse(&String::from_utf8_lossy(&header)).map_err(wrong)?;
+    let (rows, width) = match header.shape[..] {
+        [] => (1, 1),
+        [rows] => (rows, 1),
+        [rows, width] => (rows, width),
+        _ => {
+            let shape = header
+                .shape
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(" × ");
+            return Err(wrong(format!("it is {shape}; reshape it to samples × columns")));
+        }
+    };
+    let size = header.element.size();
+    let expected = rows.checked_mul(width).and_then(|count| count.checked_mul(size));
+    let expected = expected.ok_or_else(|| wrong(format!("{rows} × {width} numbers fit in no memory")))?;
+    if expected == 0 {
+        return Err(wrong(format!("it is {rows} × {width}, without a number")));
+    }
+    let mut numbers = Vec::new();
+    let mut left = expected;
+    let mut block = Vec::new();
+    while left > 0 {
+        block.clear();
+        let wanted = left.min(BLOCK);
+        (&mut source)
+            .take(wanted as u64)
+            .read_to_end(&mut block)
+            .map_err(table_error)?;
+        if block.len() < wanted {
+            let found = (expected - left + block.len()) / size;
+            return Err(wrong(format!(
+                "it is cut off: its header promises {rows} × {width} numbers, it has {found}; copy it again"
+            )));
+        }
+        left -= wanted;
+        numbers.extend(header.element.read(&block, header.endian));
+    }
+    Array::new(name.to_owned(), rows, width, numbers, header.is_by_column)
+}
+
+/// Fills `buffer`, or fails with `None` if the source is too short.
+fn fill(source: &mut impl Read, buffer: &mut [u8]) -> Result<(), Option<TableError>> {
+    source.read_exact(buffer).map_err(|error| match error.kind() {
+        std::io::ErrorKind::UnexpectedEof => None,
+        _ => Some(table_error(error)),
+    })
+}
+
+impl Header {
+    /// Parses a header such as `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }`.
+    ///
+    /// # Errors
+    /// Cause and cure.
+    fn parse(text: &str) -> Result<Self, String> {
+        let value = |key: &str| {
+            let quoted = [format!("'{key}'"), format!("\"{key}\"")];
+            let after = quoted.iter().find_map(|key| text.split_once(key.as_str()))?.1;
+            Some(after.trim_start().strip_prefix(':')?.trim_start())
+        };
+        let missing = |key: &str| format!("its header has no {key}; save it with numpy.save");
+        let descr = value("descr").ok_or_else(|| missing("descr"))?;
+        if descr.starts_with('[') {
+            return Err("it has named fields; save its columns as one array of numbers".to_owned());
+        }
+        let quote = descr.chars().next().filter(|quote| "'\"".contains(*quote));
+        let descr = quote
+            .and_then(|quote| descr[1..].split_once(quote))
+            .ok_or_else(|| missing("descr"))?
+            .0;
+        let (endian, code) = match descr.chars().next() {
+            Some('>') => (Endian::Big, &descr[1..]),
+            Some('<' | '|' | '=') => (Endian::Little, &descr[1..]),
+            _ => (Endian::Little, descr),
+        };
+        let element = match code {
+            "f4" => Element::F32,
+            "f8" => Element::F64,
+            "i1" => Element::I8,
+            "i2" => Element::I16,
+            "i4" => Element::I32,
+            "i8" => Element::I64,
+            "u1" | "b1" | "?" => Element::U8,
+            "u2" => Element::U16,
+            "u4" => Element::U32,
+            "u8" => Element::U64,
+            _ => {
+                let descr: String = descr.chars().take(20).collect();
+                return Err(format!(
+                    "its type '{descr}' is not read; convert it with .astype(float)"
+                ));
+            }
+        };
+        let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
+        let is_by_column = order.starts_with("True");
+        if !is_by_column && !order.starts_with("False") {
+            return Err(missing("fortran_order"));
+        }
+        let shape = value("shape").and_then(|shape| shape.strip_prefix('(')?.split_once(')'));
+        let (shape, _) = shape.ok_or_else(|| missing("shape"))?;
+        let sizes = shape.split(',').map(str::trim).filter(|size| !size.is_empty());
+        // Python 2 wrote long integers with an L.
+        let sizes = sizes.map(|size| size.trim_end_matches('L').parse().map_err(|_| missing("shape")));
+        Ok(Self {
+            element,
+            endian,
+            is_by_column,
+            shape: sizes.collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_are_read_in_any_order() {
+        let header = Header::parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
+        let (element, endian) = (Element::F64, Endian::Little);
+        let expected = Header {
+            element,
+            endian,
+            is_by_column: false,
+            shape: vec![3, 2],
+        };
+        assert_eq!(header, expected);
+        let header = Header::parse("{\"shape\":(5L,),\"fortran_order\":True,\"descr\":\">i2\"}").unwrap();
+        assert_eq!(
+            (header.endian, header.is_by_column, header.shape),
+            (Endian::Big, true, vec![5])
+        );
+    }
+
+    #[test]
+    fn headers_that_promise_what_is_not_read_say_so() {
+        let of = |descr: &str, shape: &str| {
+            let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}");
+            let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+            bytes.extend((header.len() as u16).to_le_bytes());
+            bytes.extend(header.bytes());
+            bytes.extend([0; 16]);
+            read("a", &bytes[..]).unwrap_err().to_string()
+        };
+        for (descr, shape, cause) in [
+            ("'|O'", "(2,)", "'|O' is not read"),
+            ("'<c16'", "(1,)", "'<c16' is not read"),
+            ("[('x', '<f8')]", "(2,)", "named fields"),
+            ("'<f8'", "(1, 1, 2)", "1 × 1 × 2"),
+            ("'<f8'", "(18446744073709551615, 2)", "no memory"),
+            (
+                "'<f8'",
+                "(99999999999, 2)",
+                "promises 99999999999 × 2 numbers, it has 2",
+            ),
+            ("'<f8'", "(0, 2)", "without a number"),
+            ("'<f8'", "(x, 2)", "no shape"),
+            ("'<f8", "(2,)", "no shape"),
+        ] {
+            let error = of(descr, shape);
+            assert!(error.contains(cause), "{descr} {shape}: {error}");
+        }
+    }
+}

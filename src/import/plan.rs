@@ -1,0 +1,154 @@
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{ImportError, Joined, Recipe, Recording, Watch};
+use crate::dataset::{Dataset, Division, Seed, Split, SplitBy, Stream};
+
+/// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
+/// repeated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// How samples are made of the files.
+    pub import: Recipe,
+    /// Files of the test samples; without them a part of the samples tests.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<TestFiles>,
+    /// Division of the samples. Only the share for validation counts if the test samples have files of their own.
+    #[serde(default)]
+    pub division: Division,
+}
+
+/// Files of the test samples, in the place of those of the recipe.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TestFiles {
+    /// In the place of the first file.
+    pub data: PathBuf,
+    /// In the place of the joined files, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub join: Vec<PathBuf>,
+}
+
+/// Sets of a run on measured samples.
+#[derive(Clone, Debug)]
+pub struct PlannedSets {
+    /// All samples but those of the test files.
+    pub recording: Recording,
+    /// Samples of the test files, if there are any.
+    pub test_recording: Option<Recording>,
+    /// Training and validation samples.
+    pub split: Split,
+    /// Test samples.
+    pub test: Dataset,
+}
+
+impl Plan {
+    /// Imports the files, relative to `folder`, and divides the samples; `seed` is that of the run.
+    ///
+    /// # Errors
+    /// If the files cannot be imported or the samples not be divided.
+    pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
+        let recording = self.recording(folder, watch)?;
+        let set = &recording.set;
+        let mut rng = seed.rng(Stream::Split);
+        let test_recording = match &self.test {
+            None => None,
+            Some(files) => Some(self.import.of_test(files)?.import(folder, watch)?),
+        };
+        let (split, test) = match &test_recording {
+            None => {
+                let parts = self.division.divide(set, &mut rng)?;
+                (parts.split(set), parts.test_set(set))
+            }
+            Some(recording) => {
+                let parts = self.division.divide_for_training(set, &mut rng)?;
+                let read = set.row_wires_read().unwrap_or_default();
+                (parts.split(set), recording.set.clone().among_rows(read)?)
+            }
+        };
+        Ok(PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        })
+    }
+
+    /// Imports the samples without those of the test files.
+    ///
+    /// # Errors
+    /// If the files cannot be imported, or a division by group has no groups.
+    pub fn recording(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
+        if self.division.by == SplitBy::Group && self.import.group.is_none() {
+            return Err(ImportError::NoColumns("the group, by which the samples are divided"));
+        }
+        self.import.import(folder, watch)
+    }
+
+    /// This plan with paths that do not depend on the working folder: relative to `folder` where they lead below it, else
+    /// absolute.
+    #[must_use]
+    pub fn relative_to(&self, folder: &Path) -> Self {
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let relative = |path: &PathBuf| {
+            let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+            absolute.strip_prefix(&folder).map(Path::to_owned).unwrap_or(absolute)
+        };
+        self.with_paths(relative)
+    }
+
+    /// This plan with absolute paths.
+    #[must_use]
+    pub fn absolute(&self) -> Self {
+        self.with_paths(|path| std::path::absolute(path).unwrap_or_else(|_| path.clone()))
+    }
+
+    /// This plan with the paths in `folder`.
+    #[must_use]
+    pub fn within(&self, folder: &Path) -> Self {
+        self.with_paths(|path| folder.join(path))
+    }
+
+    fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {
+        let mut plan = self.clone();
+        plan.import.data = of(&plan.import.data);
+        plan.import
+            .join
+            .iter_mut()
+            .for_each(|joined| joined.file = of(&joined.file));
+        if let Some(test) = &mut plan.test {
+            test.data = of(&test.data);
+            test.join.iter_mut().for_each(|file| *file = of(file));
+        }
+        plan
+    }
+}
+
+impl Recipe {
+    /// This recipe with other files; the names of the columns stay.
+    fn of_test(&self, files: &TestFiles) -> Result<Self, ImportError> {
+        if files.join.len() != self.join.len() {
+            return Err(ImportError::Join {
+                path: files.data.clone(),
+                reason: format!(
+                    "the test data need {} joined files and have {}; give one --test-join for each --join",
+                    self.join.len(),
+                    files.join.len()
+                ),
+            });
+        }
+        let joined = self.join.iter().zip(&files.join).zip(self.stems());
+        let join = joined.map(|((joined, file), stem)| Joined {
+            file: file.clone(),
+            stem: Some(stem),
+            ..joined.clone()
+        });
+        Ok(Self {
+            data: files.data.clone(),
+            join: join.collect(),
+            ..self.clone()
+        })
+    }
+}

@@ -1,0 +1,267 @@
+use std::{
+    io::{BufRead, BufReader, Read},
+    ops::Range,
+};
+
+use csv_core::ReadRecordResult;
+
+use super::{Separator, TableError, watch::table_error};
+
+/// Largest length of a row in bytes: 16 MiB, of ten thousand columns and more.
+pub(super) const LONGEST_ROW: usize = 1 << 24;
+/// Largest number of cells in a row.
+pub(super) const MOST_CELLS: usize = 20_000;
+const BUFFER: usize = 1 << 18;
+
+/// Rows of a file of text, cell by cell and with their line numbers. A row may extend over several lines if the line
+/// breaks are quoted.
+pub(super) struct Rows<R> {
+    source: BufReader<R>,
+    separator: Separator,
+    line_break: u8,
+    text: Vec<u8>,
+    /// Line on which the current row begins, from 1.
+    line: u64,
+    /// Number of lines read.
+    lines: u64,
+    cells: Cells,
+}
+
+/// Cells of one row, kept between rows so that none allocates.
+#[derive(Default)]
+struct Cells {
+    /// Text of the cells of a row with quotes.
+    unquoted: Vec<u8>,
+    is_quoted: bool,
+    ends: Vec<usize>,
+    ranges: Vec<Range<usize>>,
+}
+
+impl<R: Read> Rows<R> {
+    pub(super) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
+        Self {
+            source: BufReader::with_capacity(BUFFER, source),
+            separator,
+            line_break: if has_carriage_returns { b'\r' } else { b'\n' },
+            text: Vec::new(),
+            line: 0,
+            lines: 0,
+            cells: Cells::default(),
+        }
+    }
+
+    /// Skips `lines` lines.
+    pub(super) fn skip(&mut self, lines: usize) -> Result<(), TableError> {
+        for _ in 0..lines {
+            self.text.clear();
+            self.line = self.lines + 1;
+            if !self.append_line()? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Advances to the next row that is not blank; returns `false` at the end.
+    pub(super) fn advance(&mut self) -> Result<bool, TableError> {
+        loop {
+            self.text.clear();
+            self.line = self.lines + 1;
+            if !self.append_line()? {
+                return Ok(false);
+            }
+            if self.lines == 1 {
+                let mark: &[u8] = b"\xef\xbb\xbf";
+                if self.text.starts_with(mark) {
+                    self.text.drain(..mark.len());
+                }
+            }
+            // Spaces only: an empty cell between tabulators is a cell.
+            if self.text.iter().all(|byte| b" \r\n".contains(byte)) {
+                continue;
+            }
+            let mut quotes = count_quotes(&self.text);
+            while !quotes.is_multiple_of(2) {
+                let before = self.text.len();
+                if !self.append_line()? {
+                    return Err(TableError::Quote { line: self.line });
+                }
+                quotes += count_quotes(&self.text[before..]);
+            }
+            while self.text.last().is_some_and(|byte| b"\r\n".contains(byte)) {
+                self.text.pop();
+            }
+            self.cells.split(&self.text, self.separator, quotes > 0);
+            if self.cells.ranges.len() > MOST_CELLS {
+                let limit = MOST_CELLS;
+                return Err(TableError::Wide { line: self.line, limit });
+            }
+            return Ok(true);
+        }
+    }
+
+    /// Appends the next line to the text; returns `false` at the end.
+    fn append_line(&mut self) -> Result<bool, TableError> {
+        let left = LONGEST_ROW.saturating_sub(self.text.len());
+        let mut limited = (&mut self.source).take(left as u64 + 1);
+        let read = limited
+            .read_until(self.line_break, &mut self.text)
+            .map_err(table_error)?;
+        if read > left {
+            return Err(TableError::Endless {
+                line: self.line,
+                limit: LONGEST_ROW,
+            });
+        }
+        self.lines += u64::from(read > 0);
+        let start = self.text.len() - read;
+        if self.text[start..].contains(&0) {
+            return Err(TableError::Binary { line: self.lines });
+        }
+        Ok(read > 0)
+    }
+
+    /// Line on which the current row begins, from 1.
+    pub(super) fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// Number of cells in the current row.
+    pub(super) fn len(&self) -> usize {
+        self.cells.ranges.len()
+    }
+
+    /// Cells of the current row, without surrounding spaces.
+    pub(super) fn cells(&self) -> impl Iterator<Item = &[u8]> + Clone {
+        let text = if self.cells.is_quoted {
+            &self.cells.unquoted
+        } else {
+            &self.text
+        };
+        self.cells.ranges.iter().map(|range| text[range.clone()].trim_ascii())
+    }
+}
+
+fn count_quotes(text: &[u8]) -> usize {
+    text.iter().filter(|&&byte| byte == b'"').count()
+}
+
+impl Cells {
+    fn split(&mut self, text: &[u8], separator: Separator, has_quotes: bool) {
+        self.ranges.clear();
+        self.is_quoted = has_quotes;
+        match (has_quotes, separator) {
+            (true, _) => self.split_quoted(text, separator),
+            (false, Separator::Space) => {
+                let mut start = None;
+                for (place, byte) in text.iter().enumerate() {
+                    match (byte.is_ascii_whitespace(), start) {
+                        (false, None) => start = Some(place),
+                        (true, Some(first)) => {
+                            self.ranges.push(first..place);
+                            start = None;
+                        }
+                        _ => {}
+                    }
+                }
+                self.ranges.extend(start.map(|first| first..text.len()));
+            }
+            (false, _) => {
+                let separator = separator.byte();
+                let mut start = 0;
+                for (place, &byte) in text.iter().enumerate() {
+                    if byte == separator {
+                        self.ranges.push(start..place);
+                        start = place + 1;
+                    }
+                }
+                self.ranges.push(start..text.len());
+            }
+        }
+    }
+
+    fn split_quoted(&mut self, text: &[u8], separator: Separator) {
+        let mut parser = csv_core::ReaderBuilder::new().delimiter(separator.byte()).build();
+        let Self {
+            unquoted, ends, ranges, ..
+        } = self;
+        // The text of the cells is never longer than that of the row.
+        unquoted.resize(unquoted.len().max(text.len() + 1), 0);
+        ends.resize(MOST_CELLS + 2, 0);
+        let (mut rest, mut written, mut count) = (text, 0, 0);
+        loop {
+            let (result, read, copied, found) = parser.read_record(rest, &mut unquoted[written..], &mut ends[count..]);
+            rest = &rest[read..];
+            written += copied;
+            count += found;
+            match result {
+                // The parser takes the empty rest for the end of the record.
+                ReadRecordResult::InputEmpty => {}
+                ReadRecordResult::Record
+                | ReadRecordResult::End
+                | ReadRecordResult::OutputFull
+                | ReadRecordResult::OutputEndsFull => break,
+            }
+        }
+        let mut start = 0;
+        for &end in &ends[..count] {
+            if separator != Separator::Space || end > start {
+                ranges.push(start..end);
+            }
+            start = end;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str, separator: Separator) -> Vec<(u64, Vec<String>)> {
+        let mut rows = Rows::new(text.as_bytes(), separator, false);
+        let mut all = Vec::new();
+        while rows.advance().unwrap() {
+            let cells = rows.cells().map(|cell| String::from_utf8_lossy(cell).into_owned());
+            all.push((rows.line(), cells.collect()));
+        }
+        all
+    }
+
+    #[test]
+    fn rows_are_split_as_by_the_csv_crate_and_know_their_line() {
+        let text = "\u{feff}a, \"b\nc\" ,d\r\n\r\n1,\"say \"\"yes\"\"\",\n  \n,,\n\"x,y\",2\n3";
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(
+                // The quotes are no longer at the beginning of their cell.
+                "a,\"b\nc\",d\n1,\"say \"\"yes\"\"\",\n,,\n\"x,y\",2\n3".as_bytes(),
+            );
+        let expected: Vec<Vec<String>> = reader
+            .records()
+            .map(|record| record.unwrap().iter().map(str::to_owned).collect())
+            .collect();
+        let found = rows(&text.replace(" \"b", "\"b").replace("c\" ", "c\""), Separator::Comma);
+        assert_eq!(
+            found.iter().map(|(_, cells)| cells.clone()).collect::<Vec<_>>(),
+            expected
+        );
+        assert_eq!(found.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [1, 4, 6, 7, 8]);
+    }
+
+    #[test]
+    fn any_number_of_spaces_separates_two_cells() {
+        let found = rows("  1   2\t3 \n \"a b\"  4\n", Separator::Space);
+        assert_eq!(found[0].1, ["1", "2", "3"]);
+        assert_eq!(found[1].1, ["a b", "4"]);
+    }
+
+    #[test]
+    fn an_open_quote_does_not_swallow_memory() {
+        let text = format!("1,\"2\n{}", "3,4\n".repeat(5_000_000));
+        let mut rows = Rows::new(text.as_bytes(), Separator::Comma, false);
+        let error = rows.advance().unwrap_err().to_string();
+        assert!(error.contains("line 1") && error.contains("16 MiB"), "{error}");
+    }
+}
