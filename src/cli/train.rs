@@ -21,7 +21,10 @@ use super::{
 use crate::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
-    export::{CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, check_writable, report::RunReport},
+    export::{
+        CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, check_writable, format_number,
+        report::RunReport,
+    },
     training::TrainingSettings,
 };
 
