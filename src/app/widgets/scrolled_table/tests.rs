@@ -4,6 +4,7 @@ use eframe::egui::{Event, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhas
 use egui_kittest::{Harness, kittest::Queryable as _};
 
 use super::*;
+use crate::app::theme;
 
 const COLUMNS: [TableColumn<'_>; 2] = [
     TableColumn {
@@ -41,13 +42,16 @@ fn row(place: usize) -> TableRow {
 #[test]
 fn only_the_rows_in_view_are_laid_out_and_the_head_stays() {
     let made = Cell::new(0);
-    let mut harness = Harness::builder().with_size(vec2(400.0, 300.0)).build_ui(|ui| {
-        made.set(0);
-        scrolled_table_ui(ui, "table", &COLUMNS, Some(SortBy::default()), 10_000, |place| {
-            made.set(made.get() + 1);
-            row(place)
+    let mut harness = Harness::builder()
+        .with_size(vec2(400.0, 300.0))
+        .with_context_setup(|ctx| theme::install(ctx, true))
+        .build_ui(|ui| {
+            made.set(0);
+            scrolled_table_ui(ui, "table", &COLUMNS, Some(SortBy::default()), 10_000, |place| {
+                made.set(made.get() + 1);
+                row(place)
+            });
         });
-    });
     harness.run();
     assert!((8..=14).contains(&made.get()), "{} rows", made.get());
     let head = harness.get_by_label("Sort by Z %").rect();
@@ -71,13 +75,16 @@ fn only_the_rows_in_view_are_laid_out_and_the_head_stays() {
 fn headings_sort_and_rows_are_marked_wherever_they_are_clicked() {
     let clicks = RefCell::new(Vec::new());
     let sort = Cell::new(SortBy::default());
-    let mut harness = Harness::builder().with_size(vec2(400.0, 300.0)).build_ui(|ui| {
-        let click = scrolled_table_ui(ui, "table", &COLUMNS, Some(sort.get()), 3, row);
-        if let Some(TableClick::Sort(by)) = click {
-            sort.set(by);
-        }
-        clicks.borrow_mut().extend(click);
-    });
+    let mut harness = Harness::builder()
+        .with_size(vec2(400.0, 300.0))
+        .with_context_setup(|ctx| theme::install(ctx, true))
+        .build_ui(|ui| {
+            let click = scrolled_table_ui(ui, "table", &COLUMNS, Some(sort.get()), 3, row);
+            if let Some(TableClick::Sort(by)) = click {
+                sort.set(by);
+            }
+            clicks.borrow_mut().extend(click);
+        });
     for label in ["Sort by Z %", "Sort by Z %", "Row 2", "1, Z %"] {
         harness.get_by_label(label).click();
         harness.run();
