@@ -126,11 +126,6 @@ fn trade_off_view() {
 }
 
 #[test]
-fn live_view() {
-    looks_as_before(&mut open_view("Live"), "live");
-}
-
-#[test]
 fn a_shifted_button_is_a_failure() {
     let picture = RgbaImage::from_fn(64, 64, |x, y| {
         let is_inside = (10..40).contains(&x) && (20..40).contains(&y);
