@@ -238,7 +238,7 @@ mod tests {
             let block = dealt.test(fold);
             assert_eq!(block, Vec::from_iter(next..next + block.len()));
             assert!(
-                block.len() % 10 == 0 && (30..=40).contains(&block.len()),
+                block.len().is_multiple_of(10) && (30..=40).contains(&block.len()),
                 "{}",
                 block.len()
             );

@@ -43,10 +43,10 @@ pub fn ready_settings(source: &Simulation) -> Option<SimulatedSettings> {
             quantity: Quantity::Conductance,
             scaling: ScalingChoice::MinMax,
         },
-        hidden: 4,
+        hidden: 6,
         training: TrainingSettings {
             stopping: StoppingRules {
-                epochs: 20,
+                epochs: 30,
                 ..StoppingRules::default()
             },
             ..TrainingSettings::default()

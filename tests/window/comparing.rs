@@ -303,6 +303,7 @@ fn saved_surfaces_are_seen_by_the_camera_in_view() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.click("Turn");
     let first = saved_surfaces(&mut driver);
     assert!(
         first == saved_surfaces(&mut driver),

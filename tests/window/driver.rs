@@ -242,11 +242,13 @@ impl Driver {
         self.click_by(&By::new().role(Role::Button).label(label));
     }
 
-    /// Clicks the last of the buttons that are labelled so: an open list lies over what is beneath.
+    /// Clicks the leftmost of the buttons that are labelled so, which in the Train view is that of the configuration.
     #[track_caller]
-    pub(crate) fn click_last_button(&mut self, label: &str) {
+    pub(crate) fn click_leftmost_button(&mut self, label: &str) {
         let by = By::new().role(Role::Button).label(label);
-        self.harness.get_all(by).last().unwrap().click();
+        let nodes = self.harness.get_all(by);
+        let leftmost = nodes.min_by(|one, other| one.rect().left().total_cmp(&other.rect().left()));
+        leftmost.unwrap().click();
         self.harness.run_steps(2);
         self.harness.remove_cursor();
         self.harness.step();

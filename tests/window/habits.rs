@@ -3,7 +3,7 @@
 use decoupler::app::Phase;
 use eframe::egui::{Key, Modifiers};
 
-use crate::driver::Driver;
+use crate::{driver::Driver, training::start_endless};
 
 const UNDO: (Modifiers, Key) = (Modifiers::COMMAND, Key::Z);
 
@@ -41,9 +41,7 @@ fn the_settings_of_a_training_that_runs_are_not_taken_back() {
     pause(&mut driver);
     driver.configure_small();
     pause(&mut driver);
-    driver.enter("Epochs", "100000");
-    driver.click("▶ Train");
-    driver.wait_for_hold();
+    start_endless(&mut driver);
     let held = driver.state().draft;
     assert!(driver.state().phase.is_busy());
     driver.press_with(UNDO.0, UNDO.1);
@@ -55,6 +53,7 @@ fn the_settings_of_a_training_that_runs_are_not_taken_back() {
 fn the_list_of_actions_finds_one_by_a_few_letters_and_does_it() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "show");
     assert!(driver.has("Show Compare") && driver.has("Show Trade-off"));
     driver.type_into("Action", "comp");
     assert!(driver.has("Show Compare") && !driver.has("Show Trade-off"));

@@ -114,7 +114,7 @@ fn an_idle_window_draws_nothing() {
 fn buttons_answer_the_pointer() {
     let mut driver = Driver::open();
     for theme in ["Light theme", "Dark theme"] {
-        for button in ["▶ Train", theme, "Fig. 4", "Type the path of a checkpoint"] {
+        for button in ["▶ Train", theme, "Best", "Type the path of a checkpoint"] {
             // Inside the edge, beside the text.
             let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);
             let colour = |driver: &mut Driver| {

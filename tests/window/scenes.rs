@@ -16,7 +16,7 @@ use crate::driver::{Driver, small, table_of, trained};
 /// Picks an option of a list.
 fn choose(driver: &mut Driver, list: &str, option: &str) {
     driver.click(list);
-    driver.click_last_button(option);
+    driver.click_leftmost_button(option);
 }
 
 /// Waits until the test set of the draft is on show.

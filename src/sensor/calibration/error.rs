@@ -48,6 +48,17 @@ pub enum CalibrationError {
         /// Node on the row-wire, from 0.
         node: usize,
     },
+    /// All samples are of one row-wire, from which the pitch of the row-wires and the place of the columns cannot be told
+    /// apart.
+    #[error(
+        "all samples are of row-wire {}: its place and that of the column-wires shift the readings alike; give presses on at \
+         least two row-wires, or on the first",
+        .row + 1
+    )]
+    OneRow {
+        /// The row-wire, from 0.
+        row: usize,
+    },
     /// There are fewer readings than parameters, or none.
     #[error("{readings} readings are too few to fit {parameters} parameters; give more frames")]
     TooFew {

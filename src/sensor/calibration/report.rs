@@ -67,6 +67,12 @@ impl Calibration {
     /// resistance, or the fit does not converge.
     pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
         check(nominal, samples)?;
+        // The place of the first row-wire is not fitted: with it alone nothing is mistaken for anything else.
+        if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
+            && samples.iter().all(|sample| sample.row == row)
+        {
+            return Err(CalibrationError::OneRow { row });
+        }
         let readings = samples.len() * nominal.scale.columns();
         if readings <= COUNT {
             return Err(CalibrationError::TooFew {

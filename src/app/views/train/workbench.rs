@@ -48,7 +48,7 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
             let width = (0.4 * lower.width()).floor();
             let (charts, readings) = lower.split_left_right_at_x(lower.right() - width);
             card_ui(ui, readings, |ui| {
-                readings_card_ui(ui, view.drops_percent(), shared.test())
+                readings_card_ui(ui, view.drops_percent(), shared.test());
             });
             (charts.with_max_x(charts.max.x - gap), false)
         }

@@ -48,17 +48,17 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
                 draft = applied(preset, &draft);
             }
             fold_ui(ui, "Samples", &summaries::of_samples(&draft), |ui| {
-                samples_section_ui(ui, &mut draft)
+                samples_section_ui(ui, &mut draft);
             });
             let geometry = summaries::of_geometry(&draft.source.sensor.geometry);
             fold_ui(ui, "Geometry", &geometry, |ui| geometry_ui(ui, &mut draft));
             fold_ui(ui, "Network inputs", &summaries::of_inputs(&draft), |ui| {
-                inputs_ui(ui, &mut draft)
+                inputs_ui(ui, &mut draft);
             });
         });
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
             fold_ui(ui, "When to stop", &summaries::of_stopping(&draft), |ui| {
-                stopping_ui(ui, &mut draft)
+                stopping_ui(ui, &mut draft);
             });
             fold_ui(ui, "Method settings", &summaries::of_method(&draft), |ui| {
                 method_settings_ui(ui, &mut draft, !is_busy);
