@@ -210,7 +210,7 @@ mod tests {
             ),
             ("'<f8'", "(0, 2)", "without a number"),
             ("'<f8'", "(x, 2)", "no shape"),
-            ("'<f8", "(2,)", "no shape"),
+            ("'<f8", "(2,)", "is not read"),
         ] {
             let error = of(descr, shape);
             assert!(error.contains(cause), "{descr} {shape}: {error}");

@@ -204,7 +204,7 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
             let spare = ui.available_width() - widths.iter().sum::<f32>();
             let padding = (0.5 * spare / tabs.len() as f32)
                 .floor()
-                .clamp(space(1), space(2) + 2.0);
+                .clamp(0.5 * space(1), space(2) + 2.0);
             ui.spacing_mut().item_spacing.x = 0.0;
             ui.spacing_mut().button_padding.x = padding;
             for (&(tab, text), width) in tabs.iter().zip(widths) {

@@ -1,4 +1,7 @@
-use eframe::egui::{Align, Button, Frame, Id, Key, Layout, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, vec2};
+use eframe::egui::{
+    Align, Button, Frame, Id, Key, Layout, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, WidgetInfo,
+    accesskit::Role, vec2,
+};
 
 use crate::app::{
     shared::Action,
@@ -48,9 +51,7 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
             .margin(vec2(space(2), space(2)))
             .desired_width(f32::INFINITY);
         let field = ui.add(field);
-        field.widget_info(|| {
-            eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::SearchInput, true, "Action")
-        });
+        field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Action"));
         field.request_focus();
         if field.changed() {
             palette.marked = 0;
@@ -89,7 +90,10 @@ fn action_ui(ui: &mut Ui, action: &Action, is_marked: bool) -> eframe::egui::Res
             let text = text
                 .min_size(vec2(width, space(7)))
                 .right_text(RichText::new(keys.unwrap_or_default()).color(dim));
-            ui.add(text)
+            let button = ui.add(text);
+            // Without the keys, by its name alone.
+            button.widget_info(|| WidgetInfo::labeled(Role::Button, action.is_possible, &action.name));
+            button
         })
         .inner
     });

@@ -166,7 +166,7 @@ fn intervals_allow_for_wires_that_are_off() {
         }
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));
-    assert!(wide > 3.0 * narrow, "{wide} and {narrow} of the residual");
+    assert!(wide > 2.0 * narrow, "{wide} and {narrow} of the residual");
 }
 
 #[test]

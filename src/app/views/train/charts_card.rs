@@ -35,8 +35,15 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
         &TABS[..TABS.len() - 1]
     };
     let has_room = ui.horizontal(|ui| {
-        view.tab = tabs_ui(ui, "Charts", tabs, view.tab).unwrap_or(view.tab);
-        if view.tab == BottomTab::Nodes && shared.result().is_some() {
+        let has_choice = view.tab == BottomTab::Nodes && shared.result().is_some();
+        let picked = ui.scope(|ui| {
+            // The choice beside them keeps its place.
+            let kept = if has_choice { space(27) } else { 0.0 };
+            ui.set_max_width(ui.available_width() - kept);
+            tabs_ui(ui, "Charts", tabs, view.tab)
+        });
+        view.tab = picked.inner.unwrap_or(view.tab);
+        if has_choice {
             error_bars_ui(ui, &mut view.has_error_bars);
         }
         figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
