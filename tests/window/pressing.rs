@@ -220,7 +220,7 @@ fn a_single_node_is_dragged_up_and_down_within_the_stroke() {
     driver.train();
     driver.wait_for_hold();
     let run = trained(small());
-    driver.click_button("One node");
+    driver.click_button("Node");
     let test = run.test().clone();
     let z_of = |node: usize| test.targets()[[node / 6, 3 * (node % 6) + 2]];
     let (at, node) = over_a_node(&mut driver);

@@ -189,7 +189,7 @@ impl Indenter {
         })
     }
 
-    /// The part of the surface that touches the indenter of [`Self::press`].
+    /// The part of the surface that touches the pressed indenter.
     pub fn contact(&self, depth_mm: f64) -> Contact {
         self.upright(DVec2::ZERO, depth_mm).contact()
     }

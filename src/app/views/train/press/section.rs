@@ -33,7 +33,7 @@ const TOOLS: [(Tool, &str, &str); 5] = [
         "Presses a bar onto the surface, along a row of nodes.",
     ),
     (Tool::Edge, "Edge", "Presses the edge of a block onto the surface."),
-    (Tool::OneNode, "One node", "Moves a single node: drag it up or down."),
+    (Tool::OneNode, "Node", "Moves a single node: drag it up or down."),
 ];
 
 const COLUMNS: [Column; 3] = [
