@@ -54,8 +54,11 @@ pub enum SourceKind {
     Tcp,
 }
 
-/// Noise of a reading where the network's scene has none.
+/// Noise of a reading of a real source where the network's scene has none.
 const USUAL_NOISE: f64 = 1e-3;
+
+/// The same of the simulated source: a network trained without noise amplifies more than this beyond recognition.
+const SLIGHT_NOISE: f64 = 1e-5;
 
 impl Default for SourceForm {
     fn default() -> Self {
@@ -78,7 +81,11 @@ impl SourceForm {
     /// Noise of a reading, relative to it, for a network of these settings.
     pub fn noise(&self, settings: &SimulatedSettings) -> f64 {
         let noise = settings.source.scene.noise.in_test();
-        let of_scene = if noise.is_none() { USUAL_NOISE } else { noise.relative };
+        let of_scene = match self.kind {
+            _ if !noise.is_none() => noise.relative,
+            SourceKind::Simulated => SLIGHT_NOISE,
+            SourceKind::Replay | SourceKind::Serial | SourceKind::Tcp => USUAL_NOISE,
+        };
         self.noise.unwrap_or(of_scene)
     }
 

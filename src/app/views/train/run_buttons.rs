@@ -10,7 +10,7 @@ use crate::app::{
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_busy = shared.phase.is_busy();
     // In a narrow window the signs must do.
-    let is_short = ui.available_width() < 2.0 * space(120);
+    let is_short = ui.available_width() < space(120);
     let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
     name(&stop, "■ Stop");
     if stop
