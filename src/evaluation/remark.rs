@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors};
+use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors, format::counted};
 use crate::{
     decoupling::{DecoderKind, Precision, SolvedRows},
     scene::{Noise, NoisySets},
@@ -93,11 +93,6 @@ impl fmt::Display for Cause {
             }
         }
     }
-}
-
-/// `1 sample`, `2 samples`.
-fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 impl Cause {

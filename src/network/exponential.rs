@@ -1,16 +1,24 @@
 /// Returns eˣ within 2 units in the last place for x from −708 to 709; below, what it is at −708.
-///
-/// x is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ is its Taylor polynomial of degree 13 (remainder below 1e-17). There are no
-/// branches, so that loops over it vectorise, and no fused operations, so that every machine gives the same bits.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
+    /// Below, powers of two are no normal numbers.
+    const LOWEST: f64 = -708.0;
+    // Written so that NaN passes through.
+    let (power, less_one) = parts(if x < LOWEST { LOWEST } else { x });
+    power * (1.0 + less_one)
+}
+
+/// Returns 2ᵏ and eʳ − 1, of which eˣ = 2ᵏ eʳ is made, for x from −708 to 709.
+///
+/// x is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor polynomial of degree 13 (remainder below 1e-17). There
+/// are no branches, so that loops over it vectorise, and no fused operations, so that every machine gives the same bits.
+#[inline(always)]
+pub(super) fn parts(x: f64) -> (f64, f64) {
     /// ln 2 in two parts; products of the first with an integer up to 2¹¹ are exact.
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
     /// Adding 1.5·2⁵² leaves the nearest integer in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// Below, powers of two are no normal numbers.
-    const LOWEST: f64 = -708.0;
     /// 1/n! from n = 13 down to 2.
     const INVERSE_FACTORIALS: [f64; 12] = [
         1.0 / 6_227_020_800.0,
@@ -27,8 +35,6 @@ pub(crate) fn exp(x: f64) -> f64 {
         1.0 / 2.0,
     ];
 
-    // Written so that NaN passes through.
-    let x = if x < LOWEST { LOWEST } else { x };
     let shifted = x * std::f64::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (x - k * LN2_HIGH) - k * LN2_LOW;
@@ -37,7 +43,7 @@ pub(crate) fn exp(x: f64) -> f64 {
         tail = tail * r + coefficient;
     }
     let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1023 << 52));
-    power * (1.0 + (r + r * r * tail))
+    (power, r + r * r * tail)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
+use super::exponential;
+
 /// Replaces each value by its hyperbolic tangent, within 3 units in the last place.
 ///
-/// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2). y is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor
-/// polynomial of degree 13 (remainder below 1e-17). There are no branches, so that the loop vectorises, and no fused
-/// operations, so that every machine gives the same bits.
+/// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2), of the parts of eʸ. There are no branches, so that the loop vectorises,
+/// and no fused operations, so that every machine gives the same bits.
 pub fn tanh_in_place(values: &mut [f64]) {
     pulp::Arch::new().dispatch(|| {
         for value in &mut *values {
@@ -13,41 +14,11 @@ pub fn tanh_in_place(values: &mut [f64]) {
 
 #[inline(always)]
 fn tanh(x: f64) -> f64 {
-    /// ln 2 in two parts; products of the first with an integer up to 2¹¹ are exact.
-    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
-    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// Adding 1.5·2⁵² leaves the nearest integer in the low bits.
-    const ROUND: f64 = 6_755_399_441_055_744.0;
     /// Beyond 2|x| = 40 the result rounds to ±1.
     const SATURATED: f64 = 40.0;
-    /// 1/n! from n = 13 down to 2.
-    const INVERSE_FACTORIALS: [f64; 12] = [
-        1.0 / 6_227_020_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        1.0 / 2.0,
-    ];
-
     let twice = 2.0 * x.abs();
     // Written so that NaN passes through.
-    let y = if twice > SATURATED { SATURATED } else { twice };
-    let shifted = y * std::f64::consts::LOG2_E + ROUND;
-    let k = shifted - ROUND;
-    let r = (y - k * LN2_HIGH) - k * LN2_LOW;
-    let mut tail = INVERSE_FACTORIALS[0];
-    for coefficient in &INVERSE_FACTORIALS[1..] {
-        tail = tail * r + coefficient;
-    }
-    let less_one = r + r * r * tail;
-    let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1023 << 52));
+    let (power, less_one) = exponential::parts(if twice > SATURATED { SATURATED } else { twice });
     let exponential_less_one = power * less_one + (power - 1.0);
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
 }

@@ -30,7 +30,7 @@ pub enum Effect {
     Copy {
         /// The text.
         text: String,
-        /// What the user is told.
+        /// Sentence that tells so.
         notice: String,
     },
     /// Call the kept run with this number so.

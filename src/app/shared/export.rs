@@ -9,7 +9,7 @@ use crate::{
     figure::Figure,
 };
 
-/// What a view can hand out, in one form, or why it cannot now.
+/// A thing that a view can hand out, in one form, or the reason why it cannot now.
 pub struct Export<'a> {
     /// Part of the menu.
     pub group: ExportGroup,
@@ -39,7 +39,7 @@ pub enum ExportGroup {
     Tables,
     /// Tables to the clipboard.
     Copies,
-    /// What this program goes on from.
+    /// Files from which this program goes on.
     Training,
 }
 

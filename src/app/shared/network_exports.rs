@@ -146,7 +146,7 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
     })
 }
 
-/// What the user is told of a bundle that was written.
+/// Sentence that tells of a bundle that was written.
 fn told(report: &BundleReport) -> String {
     let deviation_mm = report.deviation() * report.output_range_mm;
     let mut text = format!(

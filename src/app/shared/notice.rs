@@ -18,7 +18,7 @@ pub enum Matter {
     Preview,
     /// A file that the user has saved.
     File,
-    /// What was copied.
+    /// Text on the clipboard.
     Clipboard,
     /// The run list.
     RunList,

@@ -11,7 +11,7 @@ pub struct Action {
     pub is_possible: bool,
 }
 
-/// What can be done in this frame: who offers an action does it when [`Self::offer`] returns true, because its keys were
+/// The actions of this frame: who offers an action does it when [`Self::offer`] returns true, because its keys were
 /// pressed or it was picked from the list.
 #[derive(Debug)]
 pub struct Offers<'a> {

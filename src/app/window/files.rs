@@ -12,7 +12,7 @@ use crate::app::job::{Job, JobError, Wake};
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// What the user is told of a file, or why it was not written, unless the thread failed.
+/// Sentence that tells of a file, or the reason why it was not written, unless the thread failed.
 type Written = Result<Result<String, String>, JobError>;
 
 /// Files that are being written.
@@ -45,7 +45,7 @@ impl Files {
         self.under_way.push((path, job));
     }
 
-    /// What the user is told of the next file that is there, or why it is not.
+    /// Sentence that tells of the next file that is there, or the reason why it is not.
     pub fn next_written(&mut self) -> Option<Result<String, String>> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, written) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;

@@ -3,7 +3,7 @@
 use crate::{
     evaluation::SimulatedSettings,
     export::{NetworkFile, format_number},
-    scene::{IndenterShape, Loading, Movement, Noise, NoisySets},
+    scene::{Loading, Movement, Noise, NoisySets},
 };
 
 /// Names and values of all settings.
@@ -91,18 +91,7 @@ fn loading_words(loading: &Loading) -> String {
     let Loading::Indenter(indenter) = loading else {
         return loading.to_string();
     };
-    let (radius, tilt_degrees) = match indenter.shape {
-        IndenterShape::Sphere { radius_mm } => (Some(radius_mm), 0.0),
-        IndenterShape::FlatPunch {
-            radius_mm,
-            largest_tilt_degrees,
-        }
-        | IndenterShape::Cylinder {
-            radius_mm,
-            largest_tilt_degrees,
-        } => (Some(radius_mm), largest_tilt_degrees),
-        IndenterShape::Edge { largest_tilt_degrees } => (None, largest_tilt_degrees),
-    };
+    let (radius, tilt_degrees) = indenter.radius_mm_and_tilt_degrees();
     let mut words = indenter.name().to_owned();
     if let Some(radius) = radius {
         words += &format!(", radius {} to {} mm", radius.smallest, radius.largest);

@@ -122,11 +122,9 @@ impl Indenter {
         }
     }
 
-    pub(in crate::scene) fn check(&self) -> Result<(), SceneError> {
-        if !(self.spread_mm > 0.0 && self.spread_mm.is_finite()) {
-            return Err(SceneError::Spread(self.spread_mm));
-        }
-        let (radius, tilt) = match self.shape {
+    /// Its radius in mm, unless it has none, and its largest tilt in degrees.
+    pub fn radius_mm_and_tilt_degrees(&self) -> (Option<Span>, f64) {
+        match self.shape {
             IndenterShape::Sphere { radius_mm } => (Some(radius_mm), 0.0),
             IndenterShape::FlatPunch {
                 radius_mm,
@@ -137,7 +135,14 @@ impl Indenter {
                 largest_tilt_degrees,
             } => (Some(radius_mm), largest_tilt_degrees),
             IndenterShape::Edge { largest_tilt_degrees } => (None, largest_tilt_degrees),
-        };
+        }
+    }
+
+    pub(in crate::scene) fn check(&self) -> Result<(), SceneError> {
+        if !(self.spread_mm > 0.0 && self.spread_mm.is_finite()) {
+            return Err(SceneError::Spread(self.spread_mm));
+        }
+        let (radius, tilt) = self.radius_mm_and_tilt_degrees();
         if let Some(span) = radius
             && !(span.smallest > 0.0 && span.smallest <= span.largest && span.largest.is_finite())
         {

@@ -11,6 +11,7 @@ use crate::{
         theme::{Theme, space, type_size},
         widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
     },
+    evaluation::format::counted,
     export::{format_duration, format_number, format_percent},
     live::{FaultyWire, ZeroGains},
 };
@@ -122,10 +123,6 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
 }
 
 fn outside_ui(ui: &mut Ui, frame: &LiveFrame) {
-    let count = |number: usize, one: &str| match number {
-        1 => format!("1 {one}"),
-        number => format!("{number} {one}s"),
-    };
     let (readings, coordinates) = (frame.readings_outside, frame.coordinates_outside);
     let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
                 than all of it. There the network extrapolates: check these readings, or train with a scene that covers \
@@ -133,12 +130,12 @@ fn outside_ui(ui: &mut Ui, frame: &LiveFrame) {
     let value = match readings {
         None => "readings not known".to_owned(),
         Some(0) if coordinates == 0 => "none".to_owned(),
-        Some(readings) => format!("{} of {}", count(readings, "reading"), frame.drops_percent.len()),
+        Some(readings) => format!("{} of {}", counted(readings, "reading"), frame.drops_percent.len()),
     };
     let is_outside = readings.unwrap_or(0) + coordinates > 0;
     let value = match coordinates {
         0 => value,
-        number => format!("{value}, {}", count(number, "coordinate")),
+        number => format!("{value}, {}", counted(number, "coordinate")),
     };
     let palette = Theme::of(ui).palette;
     let colour = if is_outside { palette.warning } else { palette.text };

@@ -8,7 +8,7 @@ use crate::{
             note_ui, segmented_ui, slider_style,
         },
     },
-    evaluation::{SimulatedSettings, Workload},
+    evaluation::{SimulatedSettings, Workload, format::counted},
     export::describe_workload,
     network::{HiddenSuggestions, LARGEST_HIDDEN},
     sensor::ArrayScale,
@@ -35,11 +35,6 @@ pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
         note_ui(ui, &note);
     }
     ui.add_space(space(1));
-}
-
-fn counted(count: usize, noun: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {noun}{plural}")
 }
 
 /// The scale as text, taken over when it parses; until then the reason it does not stands below.

@@ -4,7 +4,7 @@ use crate::{
     app::widgets::fields::input_text,
     evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice},
-    scene::{IndenterShape, Loading, Movement, Rows},
+    scene::{Loading, Movement, Rows},
     sensor::Geometry,
 };
 
@@ -14,13 +14,7 @@ pub(super) fn of_scene(draft: &SimulatedSettings) -> String {
     let loading = match scene.loading {
         Loading::RandomNodes => "random nodes".to_owned(),
         Loading::SmoothField { .. } => "smooth field".to_owned(),
-        Loading::Indenter(indenter) => match indenter.shape {
-            IndenterShape::Sphere { .. } => "sphere",
-            IndenterShape::FlatPunch { .. } => "flat punch",
-            IndenterShape::Cylinder { .. } => "cylinder",
-            IndenterShape::Edge { .. } => "edge",
-        }
-        .to_owned(),
+        Loading::Indenter(indenter) => indenter.name().to_owned(),
     };
     let rows = match scene.rows {
         Rows::All => "all rows".to_owned(),
