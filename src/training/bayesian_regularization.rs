@@ -5,8 +5,57 @@ use serde::{Deserialize, Serialize};
 use super::{
     Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
+    correlation_time::correlation_time,
+    setting::settings,
 };
 use crate::network::{Mlp, Shape};
+
+settings! {
+    /// Settings of Bayesian regularisation: the damping mu, as in [`Damping`], and the correlation of errors.
+    #[serde(default)]
+    pub struct RegularizationSettings {
+        mu: "mu" = 0.005, in 1e-20..=1e300,
+            "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.";
+        mu_decrease: "mu decrease" = 0.1, in 1e-6..=0.999,
+            "Factor on mu after a step that lowers the error.";
+        mu_increase: "mu increase" = 10.0, in 1.001..=1e6,
+            "Factor on mu after a step that does not lower the error.";
+        mu_max: "largest mu" = 1e10, in 1e-20..=1e300,
+            "Training ends when mu exceeds this: no step lowers the error any more.";
+        correlation_lags: "correlation lags" = 0.0, in 0.0..=1000.0,
+            "Most samples over which neighbouring errors may be correlated, as in a recording. The fewer independent errors \
+             there are, the smaller the weights. 0: all errors count as independent.";
+    }
+}
+
+impl RegularizationSettings {
+    /// Largest lag for recordings; the sum of the correlations ends at the first that is not positive.
+    const RECORDING_LAGS: f64 = 50.0;
+
+    /// Settings for samples in the order in which they were recorded.
+    pub fn recorded() -> Self {
+        Self {
+            correlation_lags: Self::RECORDING_LAGS,
+            ..Self::default()
+        }
+    }
+
+    fn damping(&self) -> Damping {
+        let &Self {
+            mu,
+            mu_decrease,
+            mu_increase,
+            mu_max,
+            correlation_lags: _,
+        } = self;
+        Damping {
+            mu,
+            mu_decrease,
+            mu_increase,
+            mu_max,
+        }
+    }
+}
 
 /// Levenberg-Marquardt on `F = β Σe² + α Σw²`, with α and β estimated from the data (MacKay 1992; Foresee and Hagan
 /// 1997; `trainbr`). After every accepted step, with N weights and n errors,
@@ -16,10 +65,16 @@ use crate::network::{Mlp, Shape};
 /// α = γ / (2 Σw²)                     β = (n − γ) / (2 Σe²)
 /// ```
 ///
+/// Errors of neighbouring frames of a recording are correlated, and n of them tell only as much as n/τ independent ones, τ
+/// being their [`correlation_time`] after the step. With [`RegularizationSettings::correlation_lags`] above 0, α/β is
+/// therefore that of n/τ errors of the same size: a posterior that takes every frame for new evidence fits the noise.
+///
 /// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox switches the
 /// stopping rules on the validation error off for this method; here they hold as for every other method.
 pub(super) struct BayesianRegularization {
     damping: Damping,
+    /// Lags of the correlation of errors; 0 if they are independent.
+    lags: usize,
     state: BayesianState,
     equations: FactoredEquations,
     /// Number of errors n.
@@ -58,8 +113,17 @@ impl BayesianState {
 impl BayesianRegularization {
     /// Updates α and β from γ; each is 1 where the formula gives no positive number, and neither is so extreme that their
     /// ratio overflows.
-    fn update_weighting(&mut self, mlp: &Mlp) {
+    fn update_weighting(&mut self, mlp: &Mlp, examples: &Examples) {
         let gamma = self.state.effective_parameters;
+        let determined = match self.lags {
+            0 => self.errors - gamma,
+            lags => {
+                /// Least part of the errors that is left to tell the noise.
+                const LEAST_FREE: f64 = 0.1;
+                let independent = self.errors / correlation_time(mlp, examples, lags);
+                (independent - gamma).max(LEAST_FREE * independent)
+            }
+        };
         let bounded = |value: f64| {
             if value > 0.0 && value.is_finite() {
                 value.clamp(1e-150, 1e150)
@@ -68,7 +132,7 @@ impl BayesianRegularization {
             }
         };
         self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(mlp)));
-        self.state.beta = bounded((self.errors - gamma) / (2.0 * self.mse * self.errors));
+        self.state.beta = bounded(determined / (2.0 * self.mse * self.errors));
     }
 
     /// The present error with the gradient of F / (β n).
@@ -82,7 +146,7 @@ impl BayesianRegularization {
 }
 
 impl Algorithm for BayesianRegularization {
-    type Settings = Damping;
+    type Settings = RegularizationSettings;
     type State = BayesianState;
 
     const DESCRIPTION: Description = Description {
@@ -94,15 +158,8 @@ impl Algorithm for BayesianRegularization {
         cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
-    fn default_settings() -> Damping {
-        Damping {
-            mu: 0.005,
-            ..Damping::default()
-        }
-    }
-
-    fn check(settings: &Damping) -> Result<(), SettingError> {
-        settings.check()
+    fn check(settings: &RegularizationSettings) -> Result<(), SettingError> {
+        settings.damping().check()
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {
@@ -114,14 +171,15 @@ impl Algorithm for BayesianRegularization {
     }
 
     /// Starts with γ = N, as if the data determined all weights.
-    fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut equations = FactoredEquations::factored(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let weights = mlp.weights().len();
         let mut method = Self {
-            damping,
+            damping: settings.damping(),
+            lags: settings.correlation_lags as usize,
             state: BayesianState {
-                mu: damping.mu,
+                mu: settings.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
@@ -132,7 +190,7 @@ impl Algorithm for BayesianRegularization {
             step: vec![0.0; weights],
             candidate: mlp.clone(),
         };
-        method.update_weighting(mlp);
+        method.update_weighting(mlp, examples);
         let evaluation = method.regularized(mlp);
         (method, evaluation)
     }
@@ -161,7 +219,7 @@ impl Algorithm for BayesianRegularization {
             let weights = self.step.len() as f64;
             self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
         }
-        self.update_weighting(mlp);
+        self.update_weighting(mlp, examples);
         Ok(self.regularized(mlp))
     }
 

@@ -43,14 +43,19 @@ impl SplitComparison {
         let Some(random) = validate(SplitBy::Random)? else {
             return Ok(None);
         };
+        Ok(Some(Self::of(set, by, [&honest, &random])))
+    }
+
+    /// Compares two cross-validations of `set`, by `by` and at random.
+    pub(super) fn of(set: &Dataset, by: SplitBy, [honest, random]: [&CrossValidated; 2]) -> Self {
         let errors = |answers: &ndarray::Array2<f64>| TargetErrors::measure(set.targets(), answers.view());
-        Ok(Some(Self {
+        Self {
             by,
             network: errors(&honest.network),
             ridge: errors(&honest.linear),
             random_network: errors(&random.network),
             random_ridge: errors(&random.linear),
-        }))
+        }
     }
 
     /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds flatter.
