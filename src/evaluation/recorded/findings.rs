@@ -85,10 +85,10 @@ impl Findings {
             network = Determination::measure(set, validated.network.view(), by, &mut rng);
             ridge = Determination::measure(set, validated.linear.view(), by, &mut rng);
             gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
-            comparison = Some(if by == SplitBy::Random {
-                SplitComparison::of(set, other, [&compared, &validated])
-            } else {
-                SplitComparison::of(set, by, [&validated, &compared])
+            let tables = [&validated, &compared].map(|validated| validated.target_table(set));
+            comparison = Some(match (by, tables) {
+                (SplitBy::Random, [random, honest]) => SplitComparison::of(other, [honest, random]),
+                (by, tables) => SplitComparison::of(by, tables),
             });
         }
         let is_worth_it = gains.iter().flatten().any(NonlinearGain::is_supported);
