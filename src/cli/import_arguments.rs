@@ -203,6 +203,11 @@ impl ImportArguments {
 
     /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
     pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
+        self.plan_of(inputs, &self.targets)
+    }
+
+    /// As [`Self::plan`], with these columns as the targets.
+    pub(super) fn plan_of(&self, inputs: &[String], targets: &[String]) -> Result<Plan, Failure> {
         let mut plan = match &self.recipe {
             Some(path) => {
                 if !inputs.is_empty() {
@@ -212,7 +217,7 @@ impl ImportArguments {
                 RecipeFile::load(path)?
             }
             None => Plan {
-                import: self.import(inputs)?,
+                import: self.import(inputs, targets)?,
                 ..Plan::default()
             },
         };
@@ -239,8 +244,8 @@ impl ImportArguments {
         Ok(plan)
     }
 
-    fn import(&self, inputs: &[String]) -> Result<Recipe, Failure> {
-        for (argument, columns) in [("--inputs", inputs), ("--targets", &self.targets)] {
+    fn import(&self, inputs: &[String], targets: &[String]) -> Result<Recipe, Failure> {
+        for (argument, columns) in [("--inputs", inputs), ("--targets", targets)] {
             if columns.is_empty() {
                 let message = format!("{argument}: name the columns; decoupler inspect --data FILE lists them");
                 return Err(Failure::Arguments(message));
@@ -261,7 +266,7 @@ impl ImportArguments {
             join: self.join.iter().enumerate().map(joined).collect(),
             dialect: self.dialect.choice(),
             inputs: inputs.to_vec(),
-            targets: self.targets.clone(),
+            targets: targets.to_vec(),
             time: self.time.clone(),
             group: self.group.clone(),
             row_wire: self.row_wire.clone(),

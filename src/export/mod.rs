@@ -24,6 +24,7 @@ pub mod report;
 mod run_folder;
 mod samples;
 mod sealed;
+mod sensor_file;
 mod soundness;
 #[cfg(feature = "cli")]
 mod sweep;
@@ -52,6 +53,7 @@ pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
 #[cfg(feature = "cli")]
 pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
+pub use sensor_file::SensorFile;
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{decoder_table, error_table, write_loss_curves};
 #[cfg(feature = "figures")]

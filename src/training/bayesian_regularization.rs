@@ -22,20 +22,20 @@ settings! {
             "Factor on mu after a step that does not lower the error.";
         mu_max: "largest mu" = 1e10, in 1e-20..=1e300,
             "Training ends when mu exceeds this: no step lowers the error any more.";
-        correlation_lags: "correlation lags" = 0.0, in 0.0..=1000.0,
-            "Most samples over which neighbouring errors may be correlated, as in a recording. The fewer independent errors \
-             there are, the smaller the weights. 0: all errors count as independent.";
+        correlation_epoch: "correlation epoch" = 0.0, in 0.0..=1e6,
+            "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
+             errors count as independent, and weights are smaller. 0: never.";
     }
 }
 
 impl RegularizationSettings {
-    /// Largest lag for recordings; the sum of the correlations ends at the first that is not positive.
-    const RECORDING_LAGS: f64 = 50.0;
+    /// Before it, what is not yet learnt makes errors look more correlated than they are.
+    const EPOCH_OF_RECORDINGS: f64 = 150.0;
 
     /// Settings for samples in the order in which they were recorded.
     pub fn recorded() -> Self {
         Self {
-            correlation_lags: Self::RECORDING_LAGS,
+            correlation_epoch: Self::EPOCH_OF_RECORDINGS,
             ..Self::default()
         }
     }
@@ -46,7 +46,7 @@ impl RegularizationSettings {
             mu_decrease,
             mu_increase,
             mu_max,
-            correlation_lags: _,
+            correlation_epoch: _,
         } = self;
         Damping {
             mu,
@@ -66,15 +66,15 @@ impl RegularizationSettings {
 /// ```
 ///
 /// Errors of neighbouring frames of a recording are correlated, and n of them tell only as much as n/τ independent ones, τ
-/// being their [`correlation_time`] after the step. With [`RegularizationSettings::correlation_lags`] above 0, α/β is
+/// being their [`correlation_time`]. From [`RegularizationSettings::correlation_epoch`] on, where it is measured once, α/β is
 /// therefore that of n/τ errors of the same size: a posterior that takes every frame for new evidence fits the noise.
 ///
 /// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox switches the
 /// stopping rules on the validation error off for this method; here they hold as for every other method.
 pub(super) struct BayesianRegularization {
     damping: Damping,
-    /// Lags of the correlation of errors; 0 if they are independent.
-    lags: usize,
+    /// Epoch after which the correlation of errors is measured; 0 for never.
+    correlation_epoch: usize,
     state: BayesianState,
     equations: FactoredEquations,
     /// Number of errors n.
@@ -95,7 +95,16 @@ pub struct BayesianState {
     beta: f64,
     /// γ, the effective number of parameters.
     effective_parameters: f64,
+    /// Number of epochs so far.
+    #[serde(default)]
+    epochs: usize,
+    /// τ, once it is measured.
+    #[serde(default)]
+    correlation_time: Option<f64>,
 }
+
+/// Most samples over which errors may be correlated; the sum of the correlations ends at the first that is not positive.
+const LARGEST_LAG: usize = 50;
 
 impl Checked for BayesianState {
     fn vectors(&self) -> Vec<&[f64]> {
@@ -113,14 +122,14 @@ impl BayesianState {
 impl BayesianRegularization {
     /// Updates α and β from γ; each is 1 where the formula gives no positive number, and neither is so extreme that their
     /// ratio overflows.
-    fn update_weighting(&mut self, mlp: &Mlp, examples: &Examples) {
+    fn update_weighting(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
-        let determined = match self.lags {
-            0 => self.errors - gamma,
-            lags => {
+        let determined = match self.state.correlation_time {
+            None => self.errors - gamma,
+            Some(time) => {
                 /// Least part of the errors that is left to tell the noise.
                 const LEAST_FREE: f64 = 0.1;
-                let independent = self.errors / correlation_time(mlp, examples, lags);
+                let independent = self.errors / time;
                 (independent - gamma).max(LEAST_FREE * independent)
             }
         };
@@ -177,12 +186,14 @@ impl Algorithm for BayesianRegularization {
         let weights = mlp.weights().len();
         let mut method = Self {
             damping: settings.damping(),
-            lags: settings.correlation_lags as usize,
+            correlation_epoch: settings.correlation_epoch as usize,
             state: BayesianState {
                 mu: settings.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
+                epochs: 0,
+                correlation_time: None,
             },
             equations,
             errors: examples.errors(),
@@ -190,7 +201,7 @@ impl Algorithm for BayesianRegularization {
             step: vec![0.0; weights],
             candidate: mlp.clone(),
         };
-        method.update_weighting(mlp, examples);
+        method.update_weighting(mlp);
         let evaluation = method.regularized(mlp);
         (method, evaluation)
     }
@@ -219,7 +230,11 @@ impl Algorithm for BayesianRegularization {
             let weights = self.step.len() as f64;
             self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
         }
-        self.update_weighting(mlp, examples);
+        self.state.epochs += 1;
+        if self.state.epochs == self.correlation_epoch {
+            self.state.correlation_time = Some(correlation_time(mlp, examples, LARGEST_LAG));
+        }
+        self.update_weighting(mlp);
         Ok(self.regularized(mlp))
     }
 
