@@ -8,8 +8,9 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    calibrate::Calibrate, decode::Decode, export::Export, failure::Failure, fine_tune::FineTune, inspect::Inspect, interruption, parse_error::one_line,
-    reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade, train::Train,
+    calibrate::Calibrate, decode::Decode, export::Export, failure::Failure, fine_tune::FineTune, inspect::Inspect,
+    interruption, parse_error::one_line, reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade,
+    train::Train,
 };
 use crate::export::exit_leaving_nothing;
 

@@ -143,7 +143,9 @@ impl<'a> Report<'a> {
             hidden: settings.hidden,
             seed: settings.seed.0,
             model: name_of(findings.model),
-            targets: targets.map(|(index, channel)| Target::new(index, channel, findings)).collect(),
+            targets: targets
+                .map(|(index, channel)| Target::new(index, channel, findings))
+                .collect(),
             channels: findings.importance.iter().map(worth).collect(),
             warnings,
         }
@@ -176,7 +178,15 @@ impl<'a> Report<'a> {
                 .into_iter()
                 .flatten()
                 .collect();
-            writeln!(out, "{}", if of.len() > 1 { format!(" ({})", of.join(", ")) } else { String::new() })?;
+            writeln!(
+                out,
+                "{}",
+                if of.len() > 1 {
+                    format!(" ({})", of.join(", "))
+                } else {
+                    String::new()
+                }
+            )?;
         }
         writeln!(out)
     }
@@ -199,8 +209,18 @@ impl<'a> Report<'a> {
             "Error (RMSE) without a channel, in proportion to that with all of them (fits: {})",
             self.model
         )?;
-        let width = self.channels.iter().map(|channel| channel.name.chars().count()).max().unwrap_or(0).max(7);
-        let columns: Vec<usize> = self.targets.iter().map(|target| target.name.chars().count().max(19)).collect();
+        let width = self
+            .channels
+            .iter()
+            .map(|channel| channel.name.chars().count())
+            .max()
+            .unwrap_or(0)
+            .max(7);
+        let columns: Vec<usize> = self
+            .targets
+            .iter()
+            .map(|target| target.name.chars().count().max(19))
+            .collect();
         write!(out, "{:<width$}", "channel")?;
         for (target, column) in self.targets.iter().zip(&columns) {
             write!(out, "  {:>column$}", target.name)?;
@@ -224,7 +244,11 @@ impl<'a> Report<'a> {
         let Some(first) = self.targets.first().filter(|first| !first.learning_curve.is_empty()) else {
             return Ok(());
         };
-        writeln!(out, "Test error (RMSE) by the number of training samples (fits: {})", self.model)?;
+        writeln!(
+            out,
+            "Test error (RMSE) by the number of training samples (fits: {})",
+            self.model
+        )?;
         write!(out, "{:>8}", "samples")?;
         for target in &self.targets {
             write!(out, "  {:>12}", target.name)?;

@@ -65,7 +65,9 @@ impl FineTune {
         let frames = self.frames.read(&settings.source.sensor, self.json)?;
         let read = settings.source.scene.rows.read(settings.source.sensor.scale.rows());
         let read = read.map_err(crate::dataset::SimulationError::from)?;
-        let frames = frames.among_rows(&read).map_err(|error| Failure::Arguments(error.to_string()))?;
+        let frames = frames
+            .among_rows(&read)
+            .map_err(|error| Failure::Arguments(error.to_string()))?;
         let division = Division {
             by: SplitBy::Group,
             test_fraction: 0.2,

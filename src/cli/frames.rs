@@ -71,7 +71,12 @@ impl FrameArguments {
             let pressed = DVec3::new(0.0, 0.0, set.targets()[[sample, node]]);
             sensor.displaced_mm(row_wires[sample], node, pressed)[axis]
         });
-        let frames = Dataset::new(set.readings().to_owned(), coordinates, Some(&row_wires), set.groups().to_vec());
+        let frames = Dataset::new(
+            set.readings().to_owned(),
+            coordinates,
+            Some(&row_wires),
+            set.groups().to_vec(),
+        );
         Ok(frames.expect("the parts are those of a set"))
     }
 }

@@ -176,7 +176,9 @@ impl ImportArguments {
             return Err(Failure::Arguments(format!("{argument} needs --inputs and --targets")));
         }
         let message = "--data: name the file to inspect";
-        self.data.as_deref().ok_or_else(|| Failure::Arguments(message.to_owned()))
+        self.data
+            .as_deref()
+            .ok_or_else(|| Failure::Arguments(message.to_owned()))
     }
 
     /// Returns `true` if the share for validation is given, in an argument or a recipe.

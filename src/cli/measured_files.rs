@@ -50,7 +50,12 @@ pub(super) fn files<'a>(recordings: impl Iterator<Item = &'a Recording>) -> Vec<
         .collect()
 }
 
-pub(super) fn write_files(files: &[FileFound], rows: usize, dropped: &[Dropped], out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write_files(
+    files: &[FileFound],
+    rows: usize,
+    dropped: &[Dropped],
+    out: &mut impl Write,
+) -> io::Result<()> {
     for file in files {
         writeln!(
             out,

@@ -231,7 +231,10 @@ impl<'a> Folds<'a> {
         warnings.extend(remarks.filter_map(|(channel, gain)| gain?.remark(&channel.name)));
         let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
         warnings.extend(fallbacks.map(|(channel, better)| {
-            format!("the better answer for {} is the {better}: its held-out error is the lowest", channel.name)
+            format!(
+                "the better answer for {} is the {better}: its held-out error is the lowest",
+                channel.name
+            )
         }));
         let of = |row: usize, told: &[Option<Determination>]| targets(channels, &table[row].targets, told);
         Self {

@@ -66,7 +66,11 @@ pub(super) fn targets<'a>(
         rmse: errors.rmse,
         mae: errors.mae,
         r2: errors.r2,
-        r2_interval: told.get(index).copied().flatten().map(|told| [told.r2.low, told.r2.high]),
+        r2_interval: told
+            .get(index)
+            .copied()
+            .flatten()
+            .map(|told| [told.r2.low, told.r2.high]),
         worst: errors.worst,
         percent_of_range: errors.percent_of_range,
     };

@@ -132,7 +132,11 @@ impl Train {
                 )];
             }
         };
-        let bar = progress_bar(self.json, settings.training.stopping.epochs, "{bar:30} split by time, to compare");
+        let bar = progress_bar(
+            self.json,
+            settings.training.stopping.epochs,
+            "{bar:30} split by time, to compare",
+        );
         while in_time.step().is_none() {
             bar.inc(1);
         }

@@ -51,9 +51,9 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
+pub use sensor_file::SensorFile;
 #[cfg(feature = "cli")]
 pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
-pub use sensor_file::SensorFile;
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{decoder_table, error_table, write_loss_curves};
 #[cfg(feature = "figures")]

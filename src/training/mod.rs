@@ -37,8 +37,8 @@ mod trainer;
 mod variable_projection;
 
 pub use adaptive_descent::AdaptiveDescentSettings;
-pub use checkpoint::{ResumeError, TrainerState};
 pub use bayesian_regularization::RegularizationSettings;
+pub use checkpoint::{ResumeError, TrainerState};
 pub use damping::Damping;
 pub(crate) use epoch_columns::History;
 use evaluation::Evaluation;

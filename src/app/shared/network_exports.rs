@@ -140,7 +140,7 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
     }
     source.task(words, &format!("{format}-{precision}"), move |file, _| {
         Contents::telling(move |path| {
-            let report = export_bundle(&file, format, precision, path).map_err(|error| error.to_string())?;
+            let report = export_bundle(&*file, format, precision, path).map_err(|error| error.to_string())?;
             Ok(told(&report))
         })
     })

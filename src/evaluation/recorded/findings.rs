@@ -78,10 +78,18 @@ impl Findings {
             ridge = Determination::measure(set, answers.view(), by, &mut rng);
             (network, gains, comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
         } else {
-            let Some(validated) = validate(by)? else { return Ok(None) };
+            let Some(validated) = validate(by)? else {
+                return Ok(None);
+            };
             begin(Stage::OtherFolds);
-            let other = if by == SplitBy::Random { SplitBy::Time } else { SplitBy::Random };
-            let Some(compared) = validate(other)? else { return Ok(None) };
+            let other = if by == SplitBy::Random {
+                SplitBy::Time
+            } else {
+                SplitBy::Random
+            };
+            let Some(compared) = validate(other)? else {
+                return Ok(None);
+            };
             network = Determination::measure(set, validated.network.view(), by, &mut rng);
             ridge = Determination::measure(set, validated.linear.view(), by, &mut rng);
             gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
@@ -92,7 +100,11 @@ impl Findings {
             });
         }
         let is_worth_it = gains.iter().flatten().any(NonlinearGain::is_supported);
-        let best = if is_worth_it { FittedModel::Network } else { FittedModel::Ridge };
+        let best = if is_worth_it {
+            FittedModel::Network
+        } else {
+            FittedModel::Ridge
+        };
         let model = model.unwrap_or(best);
         begin(Stage::Channels);
         let Some(importance) = channel_importance(settings, set, (&folds_by(by)?, by), model, is_cancelled)? else {

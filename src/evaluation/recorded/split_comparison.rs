@@ -43,7 +43,10 @@ impl SplitComparison {
         let Some(random) = validate(SplitBy::Random)? else {
             return Ok(None);
         };
-        Ok(Some(Self::of(by, [honest, random].map(|validated| validated.target_table(set)))))
+        Ok(Some(Self::of(
+            by,
+            [honest, random].map(|validated| validated.target_table(set)),
+        )))
     }
 
     /// Compares the tables of errors of two runs or cross-validations, by `by` and at random: [`Run::target_table`](crate::evaluation::Run::target_table) or

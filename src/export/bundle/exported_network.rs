@@ -182,7 +182,11 @@ fn of_own_data(file: &MeasuredNetworkFile, portable: &Portable) -> Value {
     // Without their folders, which are nobody's business.
     let plan = &file.plan;
     let paths = std::iter::once(&plan.import.data).chain(plan.import.join.iter().map(|joined| &joined.file));
-    let paths = paths.chain(plan.test.iter().flat_map(|test| std::iter::once(&test.data).chain(&test.join)));
+    let paths = paths.chain(
+        plan.test
+            .iter()
+            .flat_map(|test| std::iter::once(&test.data).chain(&test.join)),
+    );
     let files = paths.map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned()));
     let errors = |errors: &[TargetErrors]| {
         let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });

@@ -9,8 +9,7 @@ use super::{
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
-    matlab,
-    numpy, onnx,
+    matlab, numpy, onnx,
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
@@ -133,8 +132,7 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model =
-            |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
+        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
         let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights));
         let mut remarks = tolerance.remarks(arithmetic, portable);
         let mut checks = Vec::new();

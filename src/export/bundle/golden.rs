@@ -4,9 +4,13 @@ use super::{portable::Portable, vectors::Vector};
 pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
     let meaning = &portable.meaning;
     let row = portable.takes_row().then(|| "row".to_owned());
-    let names = row
-        .into_iter()
-        .chain(meaning.inputs().into_iter().chain(meaning.targets()).map(|channel| channel.name));
+    let names = row.into_iter().chain(
+        meaning
+            .inputs()
+            .into_iter()
+            .chain(meaning.targets())
+            .map(|channel| channel.name),
+    );
     // The names of users may have commas.
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |fields: Vec<String>| writer.write_record(fields).expect("memory takes everything");

@@ -120,12 +120,17 @@ fn named(name: String, unit: &str) -> Channel {
 
 /// The text of a user without what would end a comment, or what compilers warn of in one.
 fn comment(text: &str) -> String {
-    let is_bidirectional = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
+    let is_bidirectional =
+        |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
     let plain: String = text
         .chars()
         .map(|c| if c.is_control() || is_bidirectional(c) { ' ' } else { c })
         .collect();
-    plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("??", "? ?")
+    plain
+        .replace("*/", "* /")
+        .replace("/*", "/ *")
+        .replace("??", "? ?")
+        .replace("??", "? ?")
 }
 
 fn wrapped(text: &str) -> Vec<String> {
@@ -163,7 +168,10 @@ mod tests {
         for forbidden in ["*/", "/*", "??", "\u{202e}", "\u{7}"] {
             assert!(!text.contains(forbidden), "{forbidden}: {text}");
         }
-        assert!(text.contains("µT") && text.ends_with("Rows: 1 is row-wire 1, 2 is row-wire 5."), "{text}");
+        assert!(
+            text.contains("µT") && text.ends_with("Rows: 1 is row-wire 1, 2 is row-wire 5."),
+            "{text}"
+        );
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     }
 

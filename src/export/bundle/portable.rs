@@ -2,9 +2,7 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{exported_network::ExportedNetwork, meaning::Meaning, twofold::Twofold};
-use crate::{
-    network::{DecouplingNetwork, InputScaling, Quantity},
-};
+use crate::network::{DecouplingNetwork, InputScaling, Quantity};
 
 /// Everything that a network computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
 /// the targets), with all scaling folded into its weights. Every writer starts from it.
@@ -204,8 +202,7 @@ impl PortableNetwork {
         let weights = self.hidden_weights.iter().chain(&self.hidden_biases);
         let mut all = weights.chain(&self.output_weights).chain(&self.output_biases);
         // Single precision has a smaller range.
-        all.all(|weight| (weight.to_f64() as f32).is_finite())
-            && self.centre.iter().all(|&ohm| quantity.accepts(ohm))
+        all.all(|weight| (weight.to_f64() as f32).is_finite()) && self.centre.iter().all(|&ohm| quantity.accepts(ohm))
     }
 }
 

@@ -11,12 +11,7 @@ use super::{
 use crate::{export::format_number, network::Quantity};
 
 /// Writes the README of a bundle: how to call it, and what it is worth.
-pub(super) fn readme(
-    name: &str,
-    portable: &Portable,
-    fixed: Option<&FixedNetworks>,
-    report: &BundleReport,
-) -> String {
+pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
     let meaning = &portable.meaning;
     let subject = match meaning {
         Meaning::Array(scale) => format!("a tactile array {scale}"),
@@ -113,7 +108,11 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                  {input} is batch x {channels}, {output} batch x {outputs}; where a reading is not a finite \
                  number{above}{row_text},\nthe {one}s are NaN. A second output, readings_outside, counts the readings \
                  of each line beyond the range\nseen in training.",
-                above = if portable.quantity == Quantity::Raw { "" } else { " above 0" },
+                above = if portable.quantity == Quantity::Raw {
+                    ""
+                } else {
+                    " above 0"
+                },
                 one = meaning.output(),
                 first = usize::from(takes_row),
                 end = channels + usize::from(takes_row),

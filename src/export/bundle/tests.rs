@@ -8,8 +8,8 @@ use super::{
     BundleError, BundleFormat, BundlePrecision, FoldError,
     exact::decode_exactly,
     export_bundle,
-    fixed_point::{FixedNetworks, HiddenWidth},
     exported_network::ExportedNetwork,
+    fixed_point::{FixedNetworks, HiddenWidth},
     matlab, numpy, onnx,
     portable::Portable,
     vectors::Vectors,
@@ -89,10 +89,7 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
             let outputs = file.network.at(vector.network).outputs();
             for coordinate in 0..portable.outputs {
                 let (low, high) = outputs.extremes(coordinate);
-                assert!(
-                    low < high || vector.answers[coordinate] == low,
-                    "{name}: {coordinate}"
-                );
+                assert!(low < high || vector.answers[coordinate] == low, "{name}: {coordinate}");
             }
         }
     }
@@ -142,11 +139,7 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
         for arithmetic in [Arithmetic::DOUBLE, Arithmetic::MIXED, Arithmetic::SINGLE] {
             let weights = Weights::of(&portable, arithmetic);
             let bytes = numpy::write_weights(&portable, &weights);
-            assert_eq!(
-                numpy::read_weights(&bytes, &portable).unwrap(),
-                weights,
-                "{name}"
-            );
+            assert_eq!(numpy::read_weights(&bytes, &portable).unwrap(), weights, "{name}");
         }
         let weights = Weights::of(&portable, Arithmetic::DOUBLE);
         let text = matlab::write("decode", &portable, &weights);

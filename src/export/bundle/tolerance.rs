@@ -29,8 +29,7 @@ impl Tolerance {
         const NEAR: f64 = 0.5;
         // Beside the sums: difference, division, logarithm, weight and tangent.
         let operations = (portable.channels + portable.hidden + 10) as f64;
-        let errors =
-            growth.hidden * arithmetic.hidden.unit_roundoff() + growth.rest * arithmetic.rest.unit_roundoff();
+        let errors = growth.hidden * arithmetic.hidden.unit_roundoff() + growth.rest * arithmetic.rest.unit_roundoff();
         let usual = match arithmetic.rest {
             Digits::Double => Self::DOUBLE,
             Digits::Single => Self::SINGLE,

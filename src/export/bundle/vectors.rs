@@ -58,8 +58,15 @@ impl Vectors {
             let exact = decode_exactly(portable, &portable.networks[network], &readings);
             growth = growth.largest(exact.growth);
             let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);
-            let of_program = exported.networks().at(network).decouple(row.expect("one row of readings"));
-            let of_program = relative(&of_program.into_raw_vec_and_offset().0, &exact.answers, &portable.scales);
+            let of_program = exported
+                .networks()
+                .at(network)
+                .decouple(row.expect("one row of readings"));
+            let of_program = relative(
+                &of_program.into_raw_vec_and_offset().0,
+                &exact.answers,
+                &portable.scales,
+            );
             program_deviation = program_deviation.max(of_program);
             all.push(Vector {
                 network,

@@ -49,7 +49,9 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
     let channels = (channels.as_str(), portable.channels);
     let outputs = (outputs.as_str(), portable.outputs);
     let nodes = ("HIDDEN", portable.hidden);
-    array(portable.meaning.centre(), hidden, &[channels], |network| &network.centre);
+    array(portable.meaning.centre(), hidden, &[channels], |network| {
+        &network.centre
+    });
     array("hidden_weights", hidden, &[channels, nodes], |network| {
         &network.hidden_weights
     });

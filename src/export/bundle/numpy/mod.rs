@@ -21,7 +21,9 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
         values: weights.networks.iter().flat_map(of).collect(),
     };
     let mut arrays = vec![
-        array(portable.meaning.centre(), hidden, &[channels], &|network| network.centre.clone()),
+        array(portable.meaning.centre(), hidden, &[channels], &|network| {
+            network.centre.clone()
+        }),
         array("hidden_weights", hidden, &[channels, portable.hidden], &|network| {
             network.hidden_weights.clone()
         }),
@@ -106,7 +108,11 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
         ""
     };
     let meaning = &portable.meaning;
-    let (input, output, centre) = (meaning.readings(), meaning.outputs(), format!("w[\"{}\"]", meaning.centre()));
+    let (input, output, centre) = (
+        meaning.readings(),
+        meaning.outputs(),
+        format!("w[\"{}\"]", meaning.centre()),
+    );
     let change = match portable.quantity {
         Quantity::Resistance | Quantity::Raw => format!("x - {centre}"),
         Quantity::Conductance => format!("({centre} - x) / x"),
@@ -138,7 +144,10 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
             "Decodes readings of a tactile array in ohm into the coordinates of its nodes in mm",
             format!("the coordinates in mm (samples x {outputs}: x_1, y_1, z_1, x_2, ...)"),
         ),
-        Meaning::Own { .. } => ("Decodes readings into targets", format!("the targets (samples x {outputs})")),
+        Meaning::Own { .. } => (
+            "Decodes readings into targets",
+            format!("the targets (samples x {outputs})"),
+        ),
     };
     let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
     format!(

@@ -41,7 +41,9 @@ pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, m
                  NaN where a reading or the row is invalid."
             ),
             Meaning::Own { .. } => {
-                format!("Decodes readings into targets with {row}. Answers are NaN where a reading or the row is invalid.")
+                format!(
+                    "Decodes readings into targets with {row}. Answers are NaN where a reading or the row is invalid."
+                )
             }
         },
         graph: Some(graph(portable, weights)),
@@ -83,7 +85,13 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
     builder.node("Where", &[&is_valid, &answers, "not_a_number"], meaning.outputs());
     let names = |array: &str, own: &str, channels: Vec<Channel>| {
         let is_array = matches!(meaning, Meaning::Array(_));
-        let name = |channel: &Channel| if is_array { channel.name.clone() } else { channel.title() };
+        let name = |channel: &Channel| {
+            if is_array {
+                channel.name.clone()
+            } else {
+                channel.title()
+            }
+        };
         let names: Vec<String> = channels.iter().map(name).collect();
         format!("{}: {}", if is_array { array } else { own }, names.join(", "))
     };
@@ -158,7 +166,14 @@ fn add_hidden_sums(builder: &mut GraphBuilder, portable: &Portable, weights: &We
         builder.cast(portable.meaning.readings(), digits, "readings_in_double")
     };
     let centre = |network: &RoundedNetwork| network.centre.clone();
-    let centre = add_table(builder, portable.meaning.centre(), weights, digits, &[portable.channels], centre);
+    let centre = add_table(
+        builder,
+        portable.meaning.centre(),
+        weights,
+        digits,
+        &[portable.channels],
+        centre,
+    );
     let changes = match portable.quantity {
         Quantity::Resistance | Quantity::Raw => builder.node("Sub", &[&readings, &centre], "changes"),
         Quantity::Conductance => {
