@@ -255,3 +255,57 @@ impl Algorithm for BayesianRegularization {
 fn sum_of_squares(mlp: &Mlp) -> f64 {
     mlp.weights().iter().map(|weight| weight * weight).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::{
+        network::nguyen_widrow,
+        training::{Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    };
+
+    /// Weights that the data determine after 60 epochs on a curve with noise that follows an autoregression.
+    fn effective_parameters(memory: f64, correlation_epoch: f64) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let inputs = Array2::from_shape_fn((300, 1), |(sample, _)| (sample as f64 / 150.0) - 1.0);
+        let mut noise = 0.0;
+        let targets = inputs.mapv(|x: f64| {
+            noise = memory * noise + (1.0_f64 - memory * memory).sqrt() * rng.random_range(-0.5..0.5);
+            (3.0 * x).sin() + noise
+        });
+        let shape = Shape {
+            inputs: 1,
+            hidden: 10,
+            outputs: 1,
+        };
+        let problem = Problem {
+            training: Examples::new(inputs.view(), targets.view()),
+            validation: None,
+            test: None,
+        };
+        let settings = TrainingSettings {
+            method: Method::BayesianRegularization(RegularizationSettings {
+                correlation_epoch,
+                ..RegularizationSettings::default()
+            }),
+            stopping: StoppingRules {
+                epochs: 60,
+                ..StoppingRules::default()
+            },
+        };
+        let mut trainer = Trainer::new(nguyen_widrow(shape, &mut rng), problem, settings).unwrap();
+        while trainer.step().is_none() {}
+        trainer.latest().effective_parameters.unwrap()
+    }
+
+    #[test]
+    fn correlated_errors_determine_fewer_weights_once_that_is_measured() {
+        let (never, measured) = (effective_parameters(0.9, 0.0), effective_parameters(0.9, 20.0));
+        assert!(measured < 0.9 * never, "{measured} {never}");
+        let (never, measured) = (effective_parameters(0.0, 0.0), effective_parameters(0.0, 20.0));
+        assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
+    }
+}

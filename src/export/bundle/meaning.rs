@@ -119,7 +119,7 @@ fn named(name: String, unit: &str) -> Channel {
 }
 
 /// The text of a user without what would end a comment, or what compilers warn of in one.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     let is_bidirectional =
         |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
     let plain: String = text

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     export::bundle::{
         exported_network::Metadata,
-        meaning::Meaning,
+        meaning::{Meaning, comment},
         portable::Portable,
         weights::{Digits, RoundedNetwork, Weights},
     },
