@@ -5,13 +5,9 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler::{
-    dataset::{Division, Seed, SplitBy},
-    export::RecipeFile,
-    import::{
-        Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Plan, Progress, Recipe, Recording,
-        Separator, Table, read_table,
-    },
+use decoupler::import::{
+    Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator,
+    Table, read_table,
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
@@ -344,45 +340,6 @@ fn reading_is_cancelled_from_outside() {
     );
     assert_eq!(cancelled.unwrap_err().to_string(), "the import was cancelled");
     assert!((2..=4).contains(&reports), "{reports}");
-}
-
-#[test]
-fn a_recipe_repeats_the_import_from_another_folder() {
-    let folder = folder(&[("data.csv", "t,x,y\n0,1,2\n1,3,4\n2,5,6\n3,7,8\n")]);
-    let mut plan = Plan {
-        import: recipe("x", "y"),
-        division: Division {
-            by: SplitBy::Random,
-            ..Division::default()
-        },
-        ..Plan::default()
-    };
-    plan.import.conditions = vec!["t>0".parse().unwrap()];
-    plan.import.missing = vec!["x=-1".parse().unwrap()];
-    let path = folder.path().join("import.json");
-    RecipeFile::save(&plan.within(folder.path()), &path).unwrap();
-    let text = fs::read_to_string(&path).unwrap();
-    assert!(
-        text.contains("\"data\": \"data.csv\"") && text.contains("\"t>0\""),
-        "{text}"
-    );
-    let read = RecipeFile::load(&path).unwrap();
-    assert_eq!(read, plan.within(folder.path()));
-    let sets = read.sets(Path::new(""), Seed(0), &mut go_on).unwrap();
-    assert_eq!(sets.recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
-    for (from, to, cause) in [
-        ("\"inputs\"", "\"imputs\"", "unknown field `imputs`"),
-        ("\"version\": 1", "\"version\": 9", "version 9"),
-        (
-            "decoupler import",
-            "decoupler network",
-            "its format is \"decoupler network\"",
-        ),
-    ] {
-        fs::write(&path, text.replace(from, to)).unwrap();
-        let error = RecipeFile::load(&path).unwrap_err().to_string();
-        assert!(error.contains(cause), "{error}");
-    }
 }
 
 #[test]

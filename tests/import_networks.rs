@@ -1,14 +1,14 @@
-//! Networks and checkpoints of own data.
+//! Recipes, networks and checkpoints of own data.
 
 #![cfg(feature = "files")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{fs, ops::ControlFlow};
+use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler::{
-    dataset::Seed,
+    dataset::{Division, Seed, SplitBy},
     evaluation::{Measured, Run, RunSettings},
-    export::{MeasuredCheckpointFile, MeasuredNetworkFile},
+    export::{MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
     import::{Plan, Progress, Recipe},
     scene::RowModel,
 };
@@ -17,6 +17,15 @@ use tempfile::TempDir;
 
 fn go_on(_: Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
+}
+
+fn recipe(inputs: &[&str], target: &str) -> Recipe {
+    Recipe {
+        data: "data.csv".into(),
+        inputs: inputs.iter().map(|&name| name.to_owned()).collect(),
+        targets: vec![target.to_owned()],
+        ..Recipe::default()
+    }
 }
 
 /// A recording whose target is a curved function of its two readings, and its plan.
@@ -29,12 +38,7 @@ fn curved(folder: &TempDir) -> Plan {
     let text: String = (0..200).map(|_| line()).collect();
     fs::write(folder.path().join("data.csv"), format!("a,b,force (N)\n{text}")).unwrap();
     Plan {
-        import: Recipe {
-            data: "data.csv".into(),
-            inputs: vec!["a".to_owned(), "b".to_owned()],
-            targets: vec!["force".to_owned()],
-            ..Recipe::default()
-        },
+        import: recipe(&["a", "b"], "force"),
         ..Plan::default()
     }
 }
@@ -110,4 +114,44 @@ fn a_checkpoint_of_own_data_resumes_with_the_same_bits() {
     let data = folder.path().join("data.csv");
     fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
     assert_ne!(MeasuredCheckpointFile::checksum(&sets()), checksum);
+}
+
+#[test]
+fn a_recipe_repeats_the_import_from_another_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("data.csv"), "t,x,y\n0,1,2\n1,3,4\n2,5,6\n3,7,8\n").unwrap();
+    let mut plan = Plan {
+        import: recipe(&["x"], "y"),
+        division: Division {
+            by: SplitBy::Random,
+            ..Division::default()
+        },
+        ..Plan::default()
+    };
+    plan.import.conditions = vec!["t>0".parse().unwrap()];
+    plan.import.missing = vec!["x=-1".parse().unwrap()];
+    let path = folder.path().join("import.json");
+    RecipeFile::save(&plan.within(folder.path()), &path).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains("\"data\": \"data.csv\"") && text.contains("\"t>0\""),
+        "{text}"
+    );
+    let read = RecipeFile::load(&path).unwrap();
+    assert_eq!(read, plan.within(folder.path()));
+    let sets = read.sets(Path::new(""), Seed(0), &mut go_on).unwrap();
+    assert_eq!(sets.recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
+    for (from, to, cause) in [
+        ("\"inputs\"", "\"imputs\"", "unknown field `imputs`"),
+        ("\"version\": 1", "\"version\": 9", "version 9"),
+        (
+            "decoupler import",
+            "decoupler network",
+            "its format is \"decoupler network\"",
+        ),
+    ] {
+        fs::write(&path, text.replace(from, to)).unwrap();
+        let error = RecipeFile::load(&path).unwrap_err().to_string();
+        assert!(error.contains(cause), "{error}");
+    }
 }

@@ -252,7 +252,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use crate::export::report::train_command;
+    use crate::{export::report::train_command, scene::RowModel};
 
     fn parsed(line: &str) -> TrainingArguments {
         let command = TrainingArguments::augment_args(Command::new("train"));
@@ -268,6 +268,21 @@ mod tests {
                     --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
                     200 --seed 0";
         assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
+    }
+
+    #[test]
+    fn own_data_have_the_defaults_of_the_library() {
+        let measured = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(parsed("train").measured(false).unwrap(), measured);
+        // Naming the default method keeps what suits recordings.
+        assert_eq!(parsed("train --method br").measured(false).unwrap(), measured);
+        let told = "train --method br --set correlation-epoch=0 --epochs 7 --starts 2 --hidden 3 --seed 4";
+        let told = parsed(told).measured(false).unwrap();
+        assert_eq!(
+            (told.training.stopping.epochs, told.starts, told.hidden, told.seed),
+            (7, 2, 3, Seed(4))
+        );
+        assert_eq!(told.training.method, Method::bayesian_regularization());
     }
 
     #[test]

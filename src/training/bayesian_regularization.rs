@@ -30,7 +30,7 @@ settings! {
 
 impl RegularizationSettings {
     /// Before it, what is not yet learnt makes errors look more correlated than they are.
-    const EPOCH_OF_RECORDINGS: f64 = 150.0;
+    const EPOCH_OF_RECORDINGS: f64 = 200.0;
 
     /// Settings for samples in the order in which they were recorded.
     pub fn recorded() -> Self {

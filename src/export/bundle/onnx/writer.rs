@@ -89,7 +89,7 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
             if is_array {
                 channel.name.clone()
             } else {
-                channel.title()
+                comment(&channel.title())
             }
         };
         let names: Vec<String> = channels.iter().map(name).collect();
