@@ -17,12 +17,14 @@ mod live;
 mod looking;
 mod pictures;
 mod pressing;
+mod reading_errors;
 mod remembering;
 mod scenes;
 mod scrubbing;
 mod snapshots;
 mod trading;
 mod training;
+mod typing;
 
 #[path = "../support/folders.rs"]
 mod folders;

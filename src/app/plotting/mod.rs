@@ -15,5 +15,5 @@ pub use cells::cells_ui;
 pub use colours::hue_colour;
 pub use heat_map::{CellPointed, heat_map_ui};
 pub use legend::{legend_ui, legend_width};
-pub use plot_figure::{Pointer, legend_behind_ui, plots_ui, titled_plots_ui};
+pub use plot_figure::{DrawnPlot, Pointer, legend_behind_ui, plots_ui, titled_plots_ui};
 pub use strip::{StripChart, strip_ui};

@@ -3,7 +3,8 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    Align2, Color32, FontId, Id, Rangef, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role, pos2,
+    Align2, Color32, FontId, Id, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo,
+    accesskit::Role, pos2,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
@@ -27,7 +28,7 @@ const LEAST_GRID: f32 = 8.0;
 const COINCIDENT: f64 = 5e-4;
 
 /// Draws the plot over the space of `ui`; `id` tells it apart from others in the window.
-pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> PlotTransform {
+pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -80,8 +81,10 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> Plo
         let label = format!("{} against {}: {}", plot.y.name, plot.x.name, names.join(", "));
         WidgetInfo::labeled(Role::Image, true, label)
     });
+    ui.ctx()
+        .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
     labels_ui(ui, plot, &shown.transform, id);
-    shown.transform
+    (shown.transform, shown.response)
 }
 
 /// The ticks in view.

@@ -57,11 +57,12 @@ impl View for TrainView {
         ) {
             self.show_snapshot(self.snapshot - 1);
         }
+        self.offer_charts(offers, shared);
     }
 
     fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
         let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames, self.node);
+        self.press.take_pointer(ctx, shared.test(), &frames, self.lights.node);
         self.follow(shared);
     }
 
