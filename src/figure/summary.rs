@@ -8,7 +8,7 @@ use super::{
     plot_figure::PlotFigure,
     surface::{Quantity, Surface},
 };
-use crate::evaluation::format::format_number;
+use crate::{evaluation::format::format_number, sensor::counted};
 
 impl PlotFigure {
     /// Returns what the figure shows, in a sentence for each plot, and its notes.
@@ -58,7 +58,7 @@ impl Plot {
         let at = |point: &PlotPoint| format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x));
         let name = &series.name;
         Some(if series.bar_width.is_some() {
-            format!("{}, the highest {}", count(points.len(), "bar"), at(highest))
+            format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
         } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) && points.len() > 1 {
             let inner = |point: &PlotPoint| point.y != first.y && point.y != last.y;
             let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
@@ -74,7 +74,7 @@ impl Plot {
                 |axis: &PlotAxis, low: f64, high: f64| format!("{} to {}", axis.value_text(low), axis.value_text(high));
             format!(
                 "{} of {name}, {} {}, {} {}",
-                count(points.len(), "point"),
+                counted(points.len(), "point"),
                 self.y.name,
                 range(&self.y, lowest.y, highest.y),
                 self.x.name,
@@ -136,7 +136,7 @@ impl Surface {
             Quantity::Error | Quantity::Pattern if -low > high => ("furthest from zero", lowest),
             Quantity::Error | Quantity::Pattern => ("furthest from zero", highest),
         };
-        let nodes = count(self.nodes.len(), "node");
+        let nodes = counted(self.nodes.len(), "node");
         if low == high {
             return format!("{range}, the same at {nodes}");
         }
@@ -146,11 +146,6 @@ impl Surface {
             number(furthest.y)
         )
     }
-}
-
-fn count(number: usize, what: &str) -> String {
-    let plural = if number == 1 { "" } else { "s" };
-    format!("{number} {what}{plural}")
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ pub enum Effect {
     Continue,
     /// Look at all surfaces so.
     Look(Look),
+    /// Show this snapshot of the results to come.
+    Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
     /// Ask for the path in the window itself.

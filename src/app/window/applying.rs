@@ -59,6 +59,7 @@ impl DecouplerWindow {
                 }
             }
             Effect::Look(look) => self.look(look),
+            Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
                 if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
                     self.type_path(task);

@@ -25,6 +25,8 @@ use crate::{
 pub struct TrainView {
     /// Snapshot of the test set.
     pub snapshot: usize,
+    /// The snapshot that the worker was told of.
+    pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
     /// The chart below.
@@ -51,6 +53,7 @@ impl TrainView {
     pub fn new(wake: Wake) -> Self {
         Self {
             snapshot: 0,
+            watched: 0,
             right: RightCard::default(),
             tab: BottomTab::default(),
             lights: Lighting::default(),

@@ -100,6 +100,10 @@ impl View for TrainView {
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(shared);
+        if self.watched != self.snapshot {
+            self.watched = self.snapshot;
+            effects.push(Effect::Watch(self.snapshot));
+        }
         workbench_ui(ui, self, shared, effects);
     }
 }

@@ -8,9 +8,10 @@ use crate::{
         views::train::state::TrainView,
         widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, dim_ui, scrolled_table_ui},
     },
-    evaluation::{NodeAddress, format::counted},
+    evaluation::NodeAddress,
     export::format_number,
     figure::ErrorBins,
+    sensor::counted,
 };
 
 const COLUMNS: [TableColumn<'static>; 4] = [
