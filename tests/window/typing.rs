@@ -1,6 +1,6 @@
 //! Numbers as they are typed: with units, and refused in place where they cannot be taken.
 
-use eframe::egui::{Key, accesskit::Role};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, accesskit::Role};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::driver::Driver;
@@ -73,9 +73,20 @@ fn a_double_click_sets_the_usual_value() {
     driver.enter("Hidden nodes", "33");
     assert_eq!(driver.state().draft.hidden, 33);
     let at = driver.get("Hidden nodes").rect().center();
-    for _ in 0..2 {
-        driver.harness().drag_at(at);
-        driver.harness().drop_at(at);
+    let harness = driver.harness();
+    let now = harness.ctx.input(|input| input.time);
+    for click in 0..2 {
+        for pressed in [true, false] {
+            harness.input_mut().time = Some(now + 0.1 * f64::from(click) + if pressed { 0.02 } else { 0.05 });
+            harness.input_mut().events.push(Event::PointerMoved(at));
+            harness.input_mut().events.push(Event::PointerButton {
+                pos: at,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            });
+            harness.step();
+        }
     }
     driver.harness().run_steps(3);
     assert_eq!(driver.state().draft.hidden, 12);

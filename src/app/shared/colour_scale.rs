@@ -1,6 +1,6 @@
 use eframe::egui::{
-    Button, CursorIcon, Mesh, Popup, Rect, RichText, Sense, Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role, pos2,
-    vec2,
+    Align, Button, CursorIcon, Layout, Mesh, Popup, Rect, RichText, Sense, Ui, UiBuilder, Vec2, WidgetInfo,
+    accesskit::Role, pos2, vec2,
 };
 
 use super::{Effect, Look};
@@ -38,43 +38,11 @@ pub fn colour_scale_ui(
     let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
     let mut changed = look;
     Popup::menu(&bar).show(|ui| {
-        ui.set_width(space(66));
-        if scale.quantity.is_diverging() {
-            let text = "Errors have the colour of the card at zero, blue below and orange above.";
-            ui.label(RichText::new(text).size(type_size().note).color(theme.palette.dim));
-        } else {
-            section_heading_ui(ui, "Colours");
-            for map in SequentialMap::ALL {
-                if map_ui(ui, map, look.colours) {
-                    changed.colours = map;
-                }
-            }
-        }
-        match scale.quantity {
-            Quantity::Height => {
-                let is_locked = look.heights == HeightScale::Stroke;
-                let meanings = [
-                    "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
-                    "Spans the heights on show: small differences are seen, and colours change their meaning.",
-                ];
-                if let Some(locked) = lock_ui(ui, is_locked, meanings) {
-                    changed.heights = if locked {
-                        HeightScale::Stroke
-                    } else {
-                        HeightScale::Fitted
-                    };
-                }
-            }
-            Quantity::Error => {
-                let limit_mm = *scale.range.end();
-                let locked = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
-                let meanings = [&*locked, "Spans ± the largest error on show."];
-                if let Some(locked) = lock_ui(ui, look.error_limit_mm.is_some(), meanings) {
-                    changed.error_limit_mm = locked.then_some(limit_mm);
-                }
-            }
-            Quantity::Pattern | Quantity::Sensitivity => {}
-        }
+        // A menu justifies its lines.
+        ui.with_layout(Layout::top_down(Align::Min), |ui| {
+            ui.set_width(space(66));
+            choices_ui(ui, scale, look, &mut changed);
+        });
     });
     let state = match scale.quantity {
         Quantity::Height if look.heights == HeightScale::Fitted => " It fits the heights on show.",
@@ -85,6 +53,47 @@ pub fn colour_scale_ui(
     bar.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(hint);
     if changed != look {
         effects.push(Effect::Look(changed));
+    }
+}
+
+/// What can be chosen of a scale; changes `look`.
+fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) {
+    let theme = Theme::of(ui);
+    if scale.quantity.is_diverging() {
+        let text = "Errors have the colour of the card at zero, blue below and orange above.";
+        ui.label(RichText::new(text).size(type_size().note).color(theme.palette.dim));
+    } else {
+        section_heading_ui(ui, "Colours");
+        for map in SequentialMap::ALL {
+            if map_ui(ui, map, look.colours) {
+                changed.colours = map;
+            }
+        }
+    }
+    match scale.quantity {
+        Quantity::Height => {
+            let is_locked = look.heights == HeightScale::Stroke;
+            let meanings = [
+                "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
+                "Spans the heights on show: small differences are seen, and colours change their meaning.",
+            ];
+            if let Some(locked) = lock_ui(ui, is_locked, meanings) {
+                changed.heights = if locked {
+                    HeightScale::Stroke
+                } else {
+                    HeightScale::Fitted
+                };
+            }
+        }
+        Quantity::Error => {
+            let limit_mm = *scale.range.end();
+            let locked = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
+            let meanings = [&*locked, "Spans ± the largest error on show."];
+            if let Some(locked) = lock_ui(ui, look.error_limit_mm.is_some(), meanings) {
+                changed.error_limit_mm = locked.then_some(limit_mm);
+            }
+        }
+        Quantity::Pattern | Quantity::Sensitivity => {}
     }
 }
 

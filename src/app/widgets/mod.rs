@@ -16,7 +16,7 @@ pub use components::{
     scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
 };
 pub use fact::{coloured_fact_ui, fact_ui};
-pub use fold::fold_ui;
+pub use fold::{focus_ring_ui, fold_ui};
 pub use number_field::{number_ui, refusal_ui, usually};
 pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;

@@ -29,7 +29,22 @@ const TABS: [(BottomTab, &str); 7] = [
 ];
 
 /// Width of the list of nodes beside the histogram.
-const LIST_WIDTH: f32 = space(50);
+const LIST_WIDTH: f32 = space(57);
+
+/// Width of a card below which the longest name of a tab is cut.
+const NARROW: f32 = space(106);
+
+/// The tabs with their names.
+fn tabs(is_narrow: bool, has_readings: bool) -> Vec<(BottomTab, &'static str)> {
+    let tabs = TABS
+        .into_iter()
+        .filter(|(tab, _)| has_readings || *tab != BottomTab::Readings);
+    let short = |(tab, name)| match tab {
+        BottomTab::TrainingState if is_narrow => (tab, "State"),
+        _ => (tab, name),
+    };
+    tabs.map(short).collect()
+}
 
 /// The charts below the surfaces; the readings are one of them where they have no card of their own.
 pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
@@ -38,25 +53,21 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
     }
     let figure = chart_figure(view, shared);
     let before = (view.tab, view.has_error_bars);
-    let tabs = if has_readings {
-        &TABS[..]
-    } else {
-        &TABS[..TABS.len() - 1]
-    };
+    let has_choice = view.tab == BottomTab::Nodes && shared.result().is_some();
     let has_room = ui.horizontal(|ui| {
-        let has_choice = view.tab == BottomTab::Nodes && shared.result().is_some();
-        let picked = ui.scope(|ui| {
-            // The choice beside them keeps its place.
-            let kept = if has_choice { space(27) } else { 0.0 };
-            ui.set_max_width(ui.available_width() - kept);
-            tabs_ui(ui, "Charts", tabs, view.tab)
-        });
-        view.tab = picked.inner.unwrap_or(view.tab);
-        if has_choice {
-            error_bars_ui(ui, &mut view.has_error_bars);
-        }
-        figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
+        let tabs = tabs(ui.available_width() < NARROW, has_readings);
+        view.tab = tabs_ui(ui, "Charts", &tabs, view.tab).unwrap_or(view.tab);
+        // The choice takes the legend's place.
+        !has_choice && figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
     });
+    let has_room = if has_choice {
+        ui.horizontal(|ui| {
+            error_bars_ui(ui, &mut view.has_error_bars);
+            figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
+        })
+    } else {
+        has_room
+    };
     if let (BottomTab::Section, Some(test)) = (view.tab, shared.test()) {
         section_bar_ui(ui, &mut view.section, test);
     }
@@ -167,7 +178,6 @@ impl TrainView {
 
 /// Shows the choice of error bars on the nodes.
 fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
-    ui.add_space(space(3));
     let hint = "± the root mean square error of each node over all snapshots of the test set, in mm.";
     ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
 }

@@ -4,6 +4,7 @@ use crate::{
     app::{
         theme::{Theme, type_size},
         widgets::fields::{count_ui, in_percent, input_text, options_ui, percent_ui, quantity_ui, usually},
+        widgets::focus_ring_ui,
     },
     scene::{Noise, NoisySets},
 };
@@ -11,6 +12,7 @@ use crate::{
 /// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
 pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
     let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
+    focus_ring_ui(ui, &shown.header_response);
     if shown.body_response.is_none() && !noise.is_none() {
         let dim = Theme::of(ui).palette.dim;
         ui.label(RichText::new(in_words(noise)).size(type_size().note).color(dim));

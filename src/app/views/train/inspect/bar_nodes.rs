@@ -1,4 +1,4 @@
-use eframe::egui::{RichText, Ui};
+use eframe::egui::{Align, Layout, RichText, Ui};
 
 use super::{lighting::addresses_in_bar, section::step_ui};
 use crate::{
@@ -18,7 +18,7 @@ const COLUMNS: [TableColumn<'static>; 4] = [
     figure("Snapshot", "1000"),
     figure("Row", "100"),
     figure("Node", "100"),
-    figure("Error mm", "−0.00123"),
+    figure("Error mm", "−0.0123"),
 ];
 
 const fn figure(heading: &'static str, widest: &'static str) -> TableColumn<'static> {
@@ -39,18 +39,20 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         return;
     };
     let nodes = addresses_in_bar(view, test);
+    let [low, high] = bins.range_mm(bar).map(|end| format_number(end).replace('-', "−"));
+    let last = ErrorBins::COUNT - 1;
     ui.horizontal(|ui| {
-        let [low, high] = bins.range_mm(bar).map(|end| format_number(end).replace('-', "−"));
         ui.label(RichText::new(counted(nodes.len(), "node")).font(semibold(type_size().note)));
-        dim_ui(ui, &format!("{low} to {high} mm"));
-        let last = ErrorBins::COUNT - 1;
-        if step_ui(ui, "‹", "Previous bar", "Goes to the bar on the left ([).", bar > 0) {
-            view.lights.bar = Some(bar - 1);
-        }
-        if step_ui(ui, "›", "Next bar", "Goes to the bar on the right (]).", bar < last) {
-            view.lights.bar = Some(bar + 1);
-        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if step_ui(ui, "›", "Next bar", "Goes to the bar on the right (]).", bar < last) {
+                view.lights.bar = Some(bar + 1);
+            }
+            if step_ui(ui, "‹", "Previous bar", "Goes to the bar on the left ([).", bar > 0) {
+                view.lights.bar = Some(bar - 1);
+            }
+        });
     });
+    dim_ui(ui, &format!("{low} to {high} mm"));
     let palette = Theme::of(ui).palette;
     let row = |place: usize| {
         let (address, error_mm) = nodes[place];
