@@ -6,6 +6,8 @@
 
 mod axis;
 mod colour_map;
+mod decimation;
+mod epoch_outline;
 mod heat_map;
 mod look;
 mod of_epochs;
@@ -13,23 +15,27 @@ mod of_experiment;
 mod of_nodes;
 mod of_readings;
 mod of_rows;
+mod of_section;
 mod of_trade_off;
 mod plot;
 mod plot_figure;
+mod summary;
 pub mod surface;
 pub(crate) mod ticks;
 pub(crate) mod trade_words;
 
 pub(crate) use axis::share;
 pub use axis::{AxisScale, PlotAxis, TickRule, Ticks};
-pub use colour_map::{ColourMap, Rgb, is_light};
+pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
+pub use epoch_outline::EpochOutline;
 pub use heat_map::HeatMap;
 pub use look::{Hue, Key, LineStyle, Look, Marker};
 pub use of_epochs::{compared_losses_figure, loss_figure, training_state_figure};
 pub use of_experiment::experiment_figure;
-pub use of_nodes::{error_histogram_figure, node_figure, regression_figure, z_pairs_mm};
+pub use of_nodes::{ErrorBins, error_histogram_figure, node_figure, pair_address, regression_figure, z_pairs_mm};
 pub use of_readings::{readings_figure, zero_gains_figure};
 pub use of_rows::singular_values_figure;
+pub use of_section::{SectionNodes, section_figure};
 pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;
