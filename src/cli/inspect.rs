@@ -13,6 +13,7 @@ use super::{
     output::{print, print_object},
 };
 use crate::{
+    evaluation::format::counted,
     export::format_number,
     import::{ColumnKind, ColumnSummary, Dialect, Inspection, TimeSummary},
 };
@@ -61,10 +62,10 @@ impl Inspect {
         print(|out| {
             writeln!(
                 out,
-                "{}: {} rows × {} columns",
+                "{}: {} × {}",
                 self.data.display(),
-                inspection.rows,
-                inspection.columns.len()
+                counted(inspection.rows, "row"),
+                counted(inspection.columns.len(), "column")
             )?;
             writeln!(out, "{}\n", format_words(&table.format))?;
             write_columns(&inspection.columns, out)?;

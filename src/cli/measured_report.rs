@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::{RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow},
+    evaluation::{RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow, format::counted},
     export::{MeasuredNetworkFile, format_duration, format_number},
     import::{Channel, Dropped, FileReport, Format, JoinReport, Plan, PlannedSets, Recording},
     training::StopReason,
@@ -193,23 +193,26 @@ pub(super) fn print(
         write_files(&report.files, report.rows, &report.dropped, out)?;
         writeln!(
             out,
-            "{} samples for training, {} for validation, {} for the test (split by {})",
-            report.samples, report.validation_samples, report.test_samples, report.split
+            "{} for training, {} for validation, {} for the test (split by {})",
+            counted(report.samples, "sample"),
+            report.validation_samples,
+            report.test_samples,
+            report.split
         )?;
         writeln!(
             out,
-            "{} inputs, {} hidden nodes, {}, {} starts, seed {}",
-            file.inputs.len(),
-            settings.hidden,
+            "{}, {}, {}, {}, seed {}",
+            counted(file.inputs.len(), "input"),
+            counted(settings.hidden, "hidden node"),
             settings.training.method,
-            settings.starts,
+            counted(settings.starts, "start"),
             settings.seed
         )?;
         let reason = training
             .stop_reason
             .map_or("not ended".to_owned(), |reason| reason.to_string());
         let time = wall_time.map_or_else(String::new, |time| format!(", {}", format_duration(time)));
-        writeln!(out, "Ended after {epochs} epochs{time}: {reason}")?;
+        writeln!(out, "Ended after {}{time}: {reason}", counted(epochs, "epoch"))?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         let rows = [
             ("mean", &file.mean[..]),
@@ -283,10 +286,10 @@ fn write_files(files: &[FileFound], rows: usize, dropped: &[Dropped], out: &mut 
     for file in files {
         writeln!(
             out,
-            "{}: {} rows × {} columns, {}",
+            "{}: {} × {}, {}",
             file.path.display(),
-            file.rows,
-            file.columns,
+            counted(file.rows, "row"),
+            counted(file.columns, "column"),
             file.format
         )?;
         if let Some(join) = file.join {
@@ -295,9 +298,9 @@ fn write_files(files: &[FileFound], rows: usize, dropped: &[Dropped], out: &mut 
             });
             writeln!(
                 out,
-                "  joined by time within {}{offset}; {} rows without partner, {} of its rows unused",
+                "  joined by time within {}{offset}; {} without partner, {} of its rows unused",
                 format_number(join.limit),
-                join.without_partner,
+                counted(join.without_partner, "row"),
                 join.unused
             )?;
         }

@@ -1,11 +1,12 @@
-use std::time::Duration;
+use std::{fmt, time::Duration};
 
 /// Text in place of a missing number.
 const NO_NUMBER: &str = "–";
 
 /// `1 sample`, `2 samples`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+pub(crate) fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    let is_one = count == N::from(1);
+    format!("{count} {noun}{}", if is_one { "" } else { "s" })
 }
 
 /// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from

@@ -16,6 +16,7 @@ mod of_rows;
 mod of_trade_off;
 mod plot;
 mod plot_figure;
+mod point_labels;
 pub mod surface;
 pub(crate) mod ticks;
 pub(crate) mod trade_words;
@@ -33,6 +34,7 @@ pub use of_rows::singular_values_figure;
 pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;
+pub(crate) use point_labels::{PointLabel, place_labels};
 
 use surface::SurfaceFigure;
 

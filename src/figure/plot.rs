@@ -46,6 +46,8 @@ pub struct PlotPoint {
     pub bar: Option<[f64; 2]>,
     /// Words about the point in place of its coordinates.
     pub note: Option<String>,
+    /// Words beside it, where there is room.
+    pub label: Option<String>,
 }
 
 /// A marked stretch of the x axis.

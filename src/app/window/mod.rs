@@ -10,8 +10,8 @@ mod dialogs;
 mod export_menu;
 mod files;
 mod frames;
+mod help;
 mod interface_scale;
-mod keys_list;
 mod memory;
 mod news;
 mod notice;
@@ -23,6 +23,7 @@ mod save_form;
 #[cfg(test)]
 mod tests;
 mod top_bar;
+mod tour;
 mod undoing;
 
 pub use decoupler_window::DecouplerWindow;

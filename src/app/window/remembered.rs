@@ -25,6 +25,9 @@ pub(super) struct Remembered {
     /// The theme, if the user has chosen one.
     #[serde(deserialize_with = "if_readable")]
     pub(super) is_dark: Option<bool>,
+    /// True once the user has ended the tour.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) has_toured: Option<bool>,
     /// The name of the view on show.
     #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,

@@ -21,6 +21,8 @@ pub struct CompareView {
     pub card: RightCard,
     /// The run that the user is asked about before it is removed.
     pub removing: Option<u64>,
+    /// True from when the view comes on show until its places are looked at.
+    pub(super) is_opening: bool,
     wake: Wake,
 }
 
@@ -77,6 +79,7 @@ impl CompareView {
             snapshot: 0,
             card: RightCard::default(),
             removing: None,
+            is_opening: false,
             wake,
         }
     }
@@ -96,6 +99,29 @@ impl CompareView {
             .map(|compared| compared.test.snapshots.len())
             .max()
             .unwrap_or(0)
+    }
+
+    /// Fills empty places with the newest runs as the view opens, the older one first.
+    pub(super) fn fill_places(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
+        // Runs may still be on their way from the disk.
+        if !self.is_opening || runs.workspace.runs.is_empty() {
+            return;
+        }
+        self.is_opening = false;
+        let pinned = runs.workspace.pinned;
+        let empty: Vec<usize> = (0..pinned.len()).filter(|&place| pinned[place].is_none()).collect();
+        let others = runs.workspace.runs.iter().rev().map(|run| run.id);
+        let mut newest: Vec<u64> = others
+            .filter(|id| !pinned.contains(&Some(*id)))
+            .take(empty.len())
+            .collect();
+        newest.reverse();
+        effects.extend(
+            empty
+                .into_iter()
+                .zip(newest)
+                .map(|(place, id)| Effect::PinRun(place, Some(id))),
+        );
     }
 
     /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.

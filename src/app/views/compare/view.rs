@@ -20,6 +20,10 @@ impl View for CompareView {
         "Compare"
     }
 
+    fn enter(&mut self, _shared: &Shared) {
+        self.is_opening = true;
+    }
+
     fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(&shared.runs, effects);
     }
@@ -35,6 +39,7 @@ impl View for CompareView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.fill_places(&shared.runs, effects);
         run_list_ui(ui, shared, &mut self.removing, effects);
     }
 

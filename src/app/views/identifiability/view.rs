@@ -12,6 +12,7 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
+    evaluation::format::counted,
     export::format_number,
     figure::{
         Figure, PlotFigure, singular_values_figure,
@@ -252,7 +253,7 @@ fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
         state_ui(ui, colour, &text);
         if let Some(analysis) = &shown.analysis {
             let sensor = &analysis.question.sensor;
-            let text = format!("{}, {} rows read", sensor.scale, analysis.rows.len());
+            let text = format!("{}, {} read", sensor.scale, counted(analysis.rows.len(), "row"));
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         }
     });

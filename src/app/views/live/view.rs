@@ -1,3 +1,4 @@
+use crate::evaluation::format::counted;
 use eframe::egui::{RichText, Sense, Ui};
 
 use super::{
@@ -29,6 +30,7 @@ impl View for LiveView {
             self.start_again(shared);
         }
         self.source.take_news();
+        self.take_sample(shared, effects);
     }
 
     fn is_working(&self) -> bool {
@@ -94,7 +96,10 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
     let counts = &view.shown.counts;
     let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
     let (colour, text) = match (&view.running, watched) {
-        (None, _) if counts.decoded > 0 => (palette.dim, format!("Stopped after {} frames", counts.decoded)),
+        (None, _) if counts.decoded > 0 => (
+            palette.dim,
+            format!("Stopped after {}", counted(counts.decoded, "frame")),
+        ),
         (None, _) => (palette.dim, "Ready: press Start".to_owned()),
         (Some(_), None) => (palette.accent, "Waiting for the first frame".to_owned()),
         (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
@@ -121,7 +126,7 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
             }
         }
         if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
-            let text = format!("● Recording: {frames} frames, {seconds:.1} s");
+            let text = format!("● Recording: {}, {seconds:.1} s", counted(frames, "frame"));
             ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         }
     });

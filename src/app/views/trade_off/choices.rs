@@ -8,7 +8,7 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
     },
-    evaluation::{TradeOffLevel, TradeOffPoint},
+    evaluation::{TradeOffLevel, TradeOffPoint, format::counted},
     export::format_percent,
     figure::trade_words::{frame_time, point_facts, point_name},
 };
@@ -99,12 +99,8 @@ fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
         });
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
-    dim_ui(
-        ui,
-        &format!(
-            "{} training samples, at most {} epochs.",
-            point.settings.source.samples, point.settings.training.stopping.epochs
-        ),
-    );
+    let samples = counted(point.settings.source.samples, "training sample");
+    let epochs = counted(point.settings.training.stopping.epochs, "epoch");
+    dim_ui(ui, &format!("{samples}, at most {epochs}."));
     is_loaded
 }

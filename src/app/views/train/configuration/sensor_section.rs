@@ -2,6 +2,7 @@ use eframe::egui::{RichText, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, type_size},
         widgets::fields::quantity_ui,
     },
@@ -22,11 +23,7 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         column_node_pitch_mm,
     } = &mut draft.source.sensor.geometry;
     let lengths = [
-        (
-            "Height",
-            "Height of the row-wires above the column-wires, undeformed, in mm.",
-            height_mm,
-        ),
+        ("Height", glossary::HEIGHT.hint, height_mm),
         (
             "Row pitch",
             "Distance between row-wires, in mm (the paper's wire gap).",
@@ -71,7 +68,7 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     for (name, hint, value) in offsets {
         quantity_ui(ui, name, hint, value, -1e6..=1e6, "mm");
     }
-    let hint = "Resistance of the rubber per millimetre (g in the paper), in Ω/mm. It scales all resistances equally.";
+    let hint = glossary::RESISTIVITY.hint;
     quantity_ui(
         ui,
         "Resistivity",

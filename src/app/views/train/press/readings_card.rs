@@ -3,11 +3,13 @@ use ndarray::Array2;
 
 use crate::{
     app::{
+        glossary,
         plotting::cells_ui,
         test_view::TestView,
         theme::{semibold, space, type_size},
         widgets::{dim_ui, placeholder_ui},
     },
+    evaluation::format::counted,
     export::format_number,
     figure::{HeatMap, readings_figure},
 };
@@ -16,10 +18,13 @@ use crate::{
 pub fn readings_card_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Option<&TestView>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(6));
-        ui.label(RichText::new("Readings").font(semibold(type_size().title)));
+        ui.label(RichText::new("Readings").font(semibold(type_size().title)))
+            .on_hover_text(glossary::READING.hint);
         if let Some(drops_percent) = drops_percent {
             let (rows, columns) = drops_percent.dim();
-            dim_ui(ui, &format!("{rows} row-wires × {columns} column-wires"));
+            let [rows, columns] =
+                [(rows, "row-wire"), (columns, "column-wire")].map(|(count, noun)| counted(count, noun));
+            dim_ui(ui, &format!("{rows} × {columns}"));
         }
     });
     readings_ui(ui, drops_percent, test);
@@ -39,8 +44,9 @@ pub fn readings_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Optio
     let value = format_number(map.values[[row, column]]);
     let row = test.rows.get(row).map_or(0, |row| row + 1);
     cell.on_hover_text_at_pointer(format!(
-        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
-        column + 1
+        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %\n{}",
+        column + 1,
+        glossary::DROP.equation
     ));
 }
 

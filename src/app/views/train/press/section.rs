@@ -16,7 +16,7 @@ use crate::{
         widgets::{Column, Row, dim_ui, explained_options_ui, note_ui, section_heading_ui, slider_style, table_ui},
     },
     decoupling::{DecoderKind, Precision},
-    evaluation::PressedAnswer,
+    evaluation::{PressedAnswer, format::counted},
     export::format_number,
 };
 
@@ -166,6 +166,7 @@ fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {
         cells,
         colour,
         is_strong: mean_mm == Some(best_mm),
+        mark: "",
     };
     let of_network = shown.answer.as_ref().map(|answer| {
         let (cells, mean_mm) = cells_of(Some(answer));
@@ -226,8 +227,9 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
         note_ui(
             ui,
             &format!(
-                "{outside} of {readings} readings are outside the range of the network's training set: there it \
-                 extrapolates."
+                "{outside} of {} {} outside the range of the network's training set: there it extrapolates.",
+                counted(readings, "reading"),
+                if outside == 1 { "is" } else { "are" }
             ),
         );
     }
