@@ -13,9 +13,9 @@ use super::{
     output::{print, print_object},
 };
 use crate::{
-    evaluation::format::counted,
     export::format_number,
     import::{ColumnKind, ColumnSummary, Dialect, Inspection, TimeSummary},
+    sensor::counted,
 };
 
 /// Show what is in a file of own data: layout, columns, and how times follow each other

@@ -9,9 +9,10 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::{RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow, format::counted},
+    evaluation::{RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow},
     export::{MeasuredNetworkFile, format_duration, format_number},
     import::{Channel, Dropped, FileReport, Format, JoinReport, Plan, PlannedSets, Recording},
+    sensor::counted,
     training::StopReason,
 };
 

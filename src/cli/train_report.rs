@@ -10,12 +10,12 @@ use super::{failure::Failure, output::print, spread_plot::write_starts};
 use crate::{
     evaluation::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
-        StartRecord, best_start, error_remarks, error_rows, format::counted,
+        StartRecord, best_start, error_remarks, error_rows,
     },
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
-    sensor::{ArrayScale, Geometry},
+    sensor::{ArrayScale, Geometry, counted},
     training::{Stage, StopReason},
 };
 

@@ -1,13 +1,7 @@
-use std::{fmt, time::Duration};
+use std::time::Duration;
 
 /// Text in place of a missing number.
 const NO_NUMBER: &str = "–";
-
-/// `1 sample`, `2 samples`.
-pub(crate) fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
-    let is_one = count == N::from(1);
-    format!("{count} {noun}{}", if is_one { "" } else { "s" })
-}
 
 /// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from
 /// 100000; a dash for none, NaN and infinity.

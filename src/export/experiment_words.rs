@@ -4,9 +4,9 @@ use crate::{
     evaluation::{
         CrossValidation,
         experiments::{Axis, CellResults, Experiment, ExperimentResults, Trial},
-        format::counted,
     },
     network::HiddenSuggestions,
+    sensor::counted,
 };
 
 /// Describes the conditions of an experiment in one or two sentences.

@@ -1,6 +1,7 @@
 use super::format_duration;
 use crate::{
-    evaluation::{Workload, WorkloadTime, format::counted},
+    evaluation::{Workload, WorkloadTime},
+    sensor::counted,
     training::MachineMemory,
 };
 

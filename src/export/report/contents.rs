@@ -6,13 +6,12 @@ use super::{command::train_command, html::Html, pictures::pictures, settings::se
 use crate::{
     evaluation::{
         DecoderReport, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings, error_remarks, error_rows,
-        format::counted,
     },
     export::{
         Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, document::PROGRAM, error_table,
         figures::dark_style, format_duration, format_percent,
     },
-    sensor::Geometry,
+    sensor::{Geometry, counted},
     training::StopReason,
 };
 

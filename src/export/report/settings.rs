@@ -1,9 +1,10 @@
 //! The settings of a run in words.
 
 use crate::{
-    evaluation::{SimulatedSettings, format::counted},
+    evaluation::SimulatedSettings,
     export::{NetworkFile, format_number},
     scene::{Loading, Movement, Noise, NoisySets},
+    sensor::counted,
 };
 
 /// Names and values of all settings.

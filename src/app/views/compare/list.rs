@@ -9,8 +9,9 @@ use crate::{
         theme::{space, type_size},
         widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
     },
-    evaluation::{SimulatedSettings, format::counted},
+    evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
+    sensor::counted,
 };
 
 /// The finished trainings, the newest first.

@@ -12,8 +12,9 @@ use crate::{
         },
     },
     dataset::FoldUnit,
-    evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable, format::counted},
+    evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable},
     export::format_duration,
+    sensor::counted,
     training::StoppingRules,
 };
 

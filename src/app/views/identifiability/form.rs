@@ -14,9 +14,8 @@ use crate::{
             primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style,
         },
     },
-    evaluation::format::counted,
     scene::{Movement, RowModel, Rows},
-    sensor::{ArrayScale, LARGEST_COUNT},
+    sensor::{ArrayScale, LARGEST_COUNT, counted},
 };
 
 /// Array, geometry and scene to be tried, and the way back to the Train view.

@@ -12,12 +12,12 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
-    evaluation::format::counted,
     export::format_number,
     figure::{
         Figure, PlotFigure, singular_values_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
     },
+    sensor::counted,
 };
 
 impl View for IdentifiabilityView {

@@ -1,4 +1,3 @@
-use crate::evaluation::format::counted;
 use eframe::egui::{RichText, Sense, Ui};
 
 use super::{
@@ -13,10 +12,13 @@ use super::{
     replay_bar::{REPLAY_BAR_HEIGHT, replay_bar_ui},
     tools,
 };
-use crate::app::{
-    shared::{Effect, Export, Offers, Shared, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+use crate::{
+    app::{
+        shared::{Effect, Export, Offers, Shared, View},
+        theme::{Theme, space, type_size},
+        widgets::{card_ui, scrolled_ui, state_ui},
+    },
+    sensor::counted,
 };
 
 impl View for LiveView {

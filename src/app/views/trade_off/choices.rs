@@ -8,9 +8,10 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
     },
-    evaluation::{TradeOffLevel, TradeOffPoint, format::counted},
+    evaluation::{TradeOffLevel, TradeOffPoint},
     export::format_percent,
     figure::trade_words::{frame_time, point_facts, point_name},
+    sensor::counted,
 };
 
 /// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said

@@ -6,9 +6,10 @@ use crate::{
         theme::{Theme, type_size},
         widgets::fields::{capitalised, list_ui, options_ui},
     },
-    evaluation::{SimulatedSettings, format::counted},
+    evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice, Shape},
     scene::{Movement, Rows},
+    sensor::counted,
 };
 
 /// What the network reads, and how large it becomes; changes `draft`.

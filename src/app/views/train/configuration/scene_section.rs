@@ -12,9 +12,10 @@ use crate::{
         },
     },
     dataset::LARGEST_SAMPLES,
-    evaluation::{Outlook, SimulatedSettings, format::counted},
+    evaluation::{Outlook, SimulatedSettings},
     export::format_number,
     scene::{Indenter, IndenterShape, Loading, Movement, Rows},
+    sensor::counted,
 };
 
 /// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once

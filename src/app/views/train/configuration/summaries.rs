@@ -2,10 +2,10 @@
 
 use crate::{
     app::widgets::fields::input_text,
-    evaluation::{SimulatedSettings, format::counted},
+    evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Rows},
-    sensor::Geometry,
+    sensor::{Geometry, counted},
 };
 
 /// Loading, rows, axes and noise.

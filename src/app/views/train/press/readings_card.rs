@@ -9,9 +9,9 @@ use crate::{
         theme::{semibold, space, type_size},
         widgets::{dim_ui, placeholder_ui},
     },
-    evaluation::format::counted,
     export::format_number,
     figure::{HeatMap, readings_figure},
+    sensor::counted,
 };
 
 /// The card of the readings: [`readings_ui`] under a title.

@@ -16,8 +16,9 @@ use crate::{
         widgets::{Column, Row, dim_ui, explained_options_ui, note_ui, section_heading_ui, slider_style, table_ui},
     },
     decoupling::{DecoderKind, Precision},
-    evaluation::{PressedAnswer, format::counted},
+    evaluation::PressedAnswer,
     export::format_number,
+    sensor::counted,
 };
 
 const TOOLS: [(Tool, &str, &str); 5] = [
