@@ -241,7 +241,23 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         microseconds: 0.0,
     };
     let level = TradeOffLevel { noise: 0.0, points };
-    let picture = Figure::from(trade_off_figure(&level, &limits)).draw();
+    let figure = trade_off_figure(&level, &limits);
+    for plot in &figure.plots {
+        let marked = plot.series.iter().filter(|series| series.look.marker.is_some());
+        let points: Vec<_> = marked.flat_map(|series| &series.points).collect();
+        for point in &points {
+            let is_beaten = points.iter().any(|other| {
+                let is_as_good = other.x <= point.x && other.y <= point.y;
+                is_as_good && (other.x < point.x || other.y < point.y)
+            });
+            assert_eq!(
+                point.label.is_some(),
+                !is_beaten,
+                "points of the front are named: {point:?}"
+            );
+        }
+    }
+    let picture = Figure::from(figure).draw();
     let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
     let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();
     let is_closed = |line: Node<'_, '_>| {

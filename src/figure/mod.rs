@@ -34,7 +34,7 @@ pub use of_rows::singular_values_figure;
 pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;
-pub(crate) use point_labels::{PointLabel, place_labels};
+pub(crate) use point_labels::{PointLabel, along, place_labels};
 
 use surface::SurfaceFigure;
 

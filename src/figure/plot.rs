@@ -138,6 +138,12 @@ impl Plot {
         Some([self.x.place(x)?, self.y.place(y)?])
     }
 
+    /// Returns true if words stand beside any point.
+    pub(crate) fn has_point_labels(&self) -> bool {
+        let mut points = self.series.iter().flat_map(|series| &series.points);
+        points.any(|point| point.label.is_some())
+    }
+
     /// Returns the points of a series that have a place, with their places.
     pub(crate) fn placed<'a>(&self, series: &'a Series) -> impl Iterator<Item = (&'a PlotPoint, [f64; 2])> {
         let points = series.points.iter();

@@ -10,8 +10,18 @@ pub(crate) struct PointLabel {
     pub(crate) size: DVec2,
 }
 
-/// Returns the upper left corner of each label beside its point, clear of the other labels and, where that is possible, of
-/// the marks of all points; `None` where there is no room between `low` and `high`, the corners of the plot.
+/// Returns places along a line, for labels to keep clear of.
+pub(crate) fn along(line: &[DVec2]) -> impl Iterator<Item = DVec2> {
+    const STEP: f64 = 4.0;
+    line.windows(2).flat_map(|ends| {
+        let (from, to) = (ends[0], ends[1]);
+        let steps = (from.distance(to) / STEP).ceil().clamp(1.0, 1000.0);
+        (0..=steps as usize).map(move |step| from.lerp(to, step as f64 / steps))
+    })
+}
+
+/// Returns the upper left corner of each label beside its point, clear of the other labels and, as far as that is possible,
+/// of `marks`, the places that anything else is drawn at; `None` where there is no room between `low` and `high`, the corners of the plot.
 ///
 /// The labels take the best of their places in turn, so that earlier ones are seen where points crowd.
 pub(crate) fn place_labels(labels: &[PointLabel], marks: &[DVec2], (low, high): (DVec2, DVec2)) -> Vec<Option<DVec2>> {
@@ -90,6 +100,15 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_label_keeps_clear_of_a_line_through_its_point() {
+        let (at, line) = (DVec2::new(100.0, 6.0), [DVec2::new(20.0, 6.0), DVec2::new(180.0, 6.0)]);
+        let marks: Vec<DVec2> = along(&line).collect();
+        assert_eq!((marks[0], *marks.last().unwrap()), (line[0], line[1]));
+        let corner = place_labels(&[PointLabel { at, size: SIZE }], &marks, FRAME)[0].unwrap();
+        assert!(corner.y > 6.0, "below, for above is no room: {corner}");
     }
 
     #[test]

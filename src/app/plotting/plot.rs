@@ -14,7 +14,7 @@ use glam::DVec2;
 use super::{colours::hue_colour, plot_figure::Pointer};
 use crate::{
     app::theme::{Palette, Theme, space, type_size},
-    figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, place_labels},
+    figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels},
 };
 
 /// Opacity of the tint of a span of an axis.
@@ -235,11 +235,22 @@ fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
     let palette = Theme::of(ui).palette;
     let frame = *transform.frame();
     let painter = ui.painter().with_clip_rect(frame);
+    // Most plots have none.
+    if !plot.has_point_labels() {
+        return;
+    }
     let (mut labels, mut galleys, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-    for series in plot.series.iter().filter(|series| series.look.marker.is_some()) {
-        for (point, [x, y]) in plot.placed(series) {
-            let at = transform.position_from_point(&Place::new(x, y));
-            let at = DVec2::new(f64::from(at.x), f64::from(at.y));
+    let position = |[x, y]: [f64; 2]| {
+        let at = transform.position_from_point(&Place::new(x, y));
+        DVec2::new(f64::from(at.x), f64::from(at.y))
+    };
+    for series in &plot.series {
+        if series.look.line.is_some() {
+            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| position(place)).collect();
+            marks.extend(along(&line));
+        }
+        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
+            let at = position(place);
             marks.push(at);
             let Some(label) = &point.label else { continue };
             let font = FontId::proportional(type_size().small);

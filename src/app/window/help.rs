@@ -75,7 +75,10 @@ pub(super) fn help_ui(ui: &Ui, help: &mut Help, actions: &[Action]) -> Option<Re
 }
 
 fn keys_ui(ui: &mut Ui, actions: &[Action]) {
-    ScrollArea::vertical().max_height(space(120)).show(ui, |ui| {
+    let scroll = ScrollArea::vertical()
+        .max_height(space(120))
+        .min_scrolled_height(space(120));
+    scroll.auto_shrink([false, true]).show(ui, |ui| {
         let columns = Grid::new("keys").num_columns(2).min_col_width(space(40));
         columns.spacing([space(4), space(2)]).show(ui, |ui| {
             for action in actions {

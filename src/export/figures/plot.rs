@@ -7,7 +7,9 @@ use super::{
     colours::{DIM, pale, rgb},
     frame::Frame,
 };
-use crate::figure::{Hue, LineAt, LineStyle, Look, Marker, Plot, PointLabel, ReferenceLine, Series, place_labels};
+use crate::figure::{
+    Hue, LineAt, LineStyle, Look, Marker, Plot, PointLabel, ReferenceLine, Series, along, place_labels,
+};
 
 /// Tint of a span on the ground, 1 being the ground itself.
 const SPAN_PALENESS: f64 = 0.88;
@@ -73,9 +75,17 @@ pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
 
 /// The words beside points.
 fn draw_point_labels(plot: &Plot, frame: &Frame<'_>, canvas: &mut Canvas) {
+    // Most plots have none.
+    if !plot.has_point_labels() {
+        return;
+    }
     let (mut labels, mut texts, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-    for series in plot.series.iter().filter(|series| series.look.marker.is_some()) {
-        for (point, place) in plot.placed(series) {
+    for series in &plot.series {
+        if series.look.line.is_some() {
+            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| frame.at(place).into()).collect();
+            marks.extend(along(&line));
+        }
+        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
             let at = DVec2::from(frame.at(place));
             marks.push(at);
             let Some(text) = &point.label else { continue };

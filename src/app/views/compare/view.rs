@@ -149,7 +149,11 @@ impl CompareView {
             Some(surface) => surface_ui(ui, place, surface, look, effects),
             None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
             None => {
-                let text = format!("Press {} next to a run in the list to show it here.", PLACES[place]);
+                let text = match runs.workspace.runs.len() {
+                    0 => "Two finished trainings stand here side by side.".to_owned(),
+                    1 => "Train a second network to compare it with the first.".to_owned(),
+                    _ => format!("Press {} next to a run in the list to show it here.", PLACES[place]),
+                };
                 placeholder_ui(ui, &text);
             }
         }
