@@ -21,7 +21,7 @@ impl View for CompareView {
     }
 
     fn enter(&mut self, _shared: &Shared) {
-        self.is_opening = true;
+        self.opened_with = Some(0);
     }
 
     fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
