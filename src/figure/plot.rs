@@ -48,6 +48,8 @@ pub struct PlotPoint {
     pub note: Option<String>,
     /// Words beside it, where there is room.
     pub label: Option<String>,
+    /// Number of what it stands for, by which other figures know it too: a node, a bar.
+    pub item: Option<usize>,
 }
 
 /// A marked stretch of the x axis.

@@ -5,7 +5,7 @@ use eframe::egui::{
     accesskit::Role, pos2, vec2,
 };
 
-use super::fields::capitalised;
+use super::{fields::capitalised, value_under::value_under};
 use crate::app::theme::{Theme, semibold, space, type_size};
 
 /// A heading and what it means.
@@ -82,6 +82,7 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
                     let response = cell_ui(ui, rect, Align::Max, text(cell));
                     let label = format!("{}, {heading}: {cell}", row.name);
                     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+                    value_under(ui, rect, cell);
                 }
             },
             index + 1 == rows.len(),

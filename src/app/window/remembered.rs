@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 use crate::{
     evaluation::{SimulatedSettings, Workload},
     export::{WriteError, atomic_write},
+    figure::SequentialMap,
 };
 
 /// The size of a window that remembers none, in points.
@@ -28,6 +29,9 @@ pub(super) struct Remembered {
     /// True once the user has ended the tour.
     #[serde(deserialize_with = "if_readable")]
     pub(super) has_toured: Option<bool>,
+    /// Colours of values, if the user has chosen them.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) colours: Option<SequentialMap>,
     /// The name of the view on show.
     #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,

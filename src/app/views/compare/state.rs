@@ -23,6 +23,8 @@ pub struct CompareView {
     pub removing: Option<u64>,
     /// Number of runs with which its places were last filled, until both are.
     pub(super) opened_with: Option<usize>,
+    /// The node under the pointer, lit on both surfaces.
+    pub node: Option<usize>,
     wake: Wake,
 }
 
@@ -80,6 +82,7 @@ impl CompareView {
             card: RightCard::default(),
             removing: None,
             opened_with: None,
+            node: None,
             wake,
         }
     }

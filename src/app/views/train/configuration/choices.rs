@@ -5,7 +5,7 @@ use crate::{
         glossary,
         theme::{Theme, space, type_size},
         widgets::{
-            fields::{capitalised, count_ui},
+            fields::{capitalised, count_ui, usually},
             note_ui, segmented_ui, slider_style,
         },
     },
@@ -71,12 +71,13 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 
 /// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
 pub fn hidden_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let usual = SimulatedSettings::default().hidden;
     count_ui(
         ui,
         "Hidden nodes",
         glossary::HIDDEN_NODES.hint,
         &mut draft.hidden,
-        1..=LARGEST_HIDDEN,
+        usually(usual, 1..=LARGEST_HIDDEN),
     );
     let scale = draft.source.sensor.scale;
     let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());

@@ -4,7 +4,7 @@ use crate::{
     app::{
         glossary,
         theme::{Theme, space, type_size},
-        widgets::fields::{capitalised, count_ui, input_text, quantity_ui},
+        widgets::fields::{capitalised, count_ui, input_text, quantity_ui, usually},
     },
     evaluation::{MOST_STARTS, SimulatedSettings},
     training::{Method, StoppingRules},
@@ -40,17 +40,18 @@ pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
 pub fn method_settings_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
     for setting in draft.training.method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
-        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
+        let limits = usually(setting.default, setting.range);
+        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", &hint, &mut draft.starts, 1..=MOST_STARTS)
+        count_ui(ui, "Starts", &hint, &mut draft.starts, usually(1, 1..=MOST_STARTS))
     });
 }
 
 /// The rules that end a training; changes `draft`.
 pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let stopping = &mut draft.training.stopping;
+    let (stopping, usual) = (&mut draft.training.stopping, StoppingRules::default());
     let hint = format!(
         "Largest number of epochs. {} Train counts from the first epoch, Continue from the present one.",
         glossary::EPOCH.hint
@@ -60,7 +61,7 @@ pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Epochs",
         &hint,
         &mut stopping.epochs,
-        1..=StoppingRules::MOST_EPOCHS,
+        usually(usual.epochs, 1..=StoppingRules::MOST_EPOCHS),
     );
     let hint = format!("{} Default 6.", glossary::VALIDATION_FAILURES.hint);
     count_ui(
@@ -68,13 +69,20 @@ pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Validation failures",
         &hint,
         &mut stopping.max_fail,
-        1..=StoppingRules::MOST_EPOCHS,
+        usually(usual.max_fail, 1..=StoppingRules::MOST_EPOCHS),
     );
     let hint = format!(
         "Training error at which training ends. Default 0.\n\n{}",
         glossary::MSE.hint
     );
-    quantity_ui(ui, "Goal (mse)", &hint, &mut stopping.goal_mse, 0.0..=1e300, "");
+    quantity_ui(
+        ui,
+        "Goal (mse)",
+        &hint,
+        &mut stopping.goal_mse,
+        usually(usual.goal_mse, 0.0..=1e300),
+        "",
+    );
     let hint = format!(
         "Norm of the gradient below which training ends. Default 1e-7.\n\n{}",
         glossary::GRADIENT.hint
@@ -84,7 +92,7 @@ pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Smallest gradient",
         &hint,
         &mut stopping.min_gradient,
-        0.0..=1e300,
+        usually(usual.min_gradient, 0.0..=1e300),
         "",
     );
 }

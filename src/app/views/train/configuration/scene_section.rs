@@ -1,20 +1,19 @@
-use eframe::egui::{DragValue, Ui};
+use eframe::egui::Ui;
 
 use super::noise_section::noise_ui;
 use crate::{
     app::{
         glossary,
-        theme::space,
         widgets::{
             dim_ui,
-            fields::{capitalised, count_ui, field_ui, list_ui, options_ui, percent_ui, quantity_ui},
+            fields::{capitalised, count_ui, list_ui, options_ui, percent_ui, quantity_ui, seed_ui, usually},
             note_ui,
         },
     },
     dataset::LARGEST_SAMPLES,
     evaluation::{Outlook, SimulatedSettings},
     export::format_number,
-    scene::{Indenter, IndenterShape, Loading, Movement, Rows},
+    scene::{Indenter, IndenterShape, Loading, Movement, Rows, Scene},
     sensor::counted,
 };
 
@@ -30,6 +29,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
         "Largest compression",
         hint,
         &mut draft.source.scene.largest_compression,
+        Scene::default().largest_compression,
         0.001..=99.0,
     );
     noise_ui(ui, &mut draft.source.scene.noise);
@@ -39,6 +39,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
 
 /// Shows the numbers of samples and the seed; changes `draft`.
 pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let usual = SimulatedSettings::default();
     let rows = draft.source.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
         1 => "Number of samples to which the network is fitted.".to_owned(),
@@ -52,7 +53,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Training samples",
         &hint,
         &mut draft.source.samples,
-        1..=LARGEST_SAMPLES,
+        usually(usual.source.samples, 1..=LARGEST_SAMPLES),
     );
     let hint = glossary::VALIDATION_SET.hint;
     count_ui(
@@ -60,7 +61,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Validation samples",
         hint,
         &mut draft.source.validation_samples,
-        0..=LARGEST_SAMPLES,
+        usually(usual.source.validation_samples, 0..=LARGEST_SAMPLES),
     );
     let hint = glossary::TEST_SET.hint;
     count_ui(
@@ -68,11 +69,9 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Test samples",
         hint,
         &mut draft.source.test_samples,
-        1..=LARGEST_SAMPLES,
+        usually(usual.source.test_samples, 1..=LARGEST_SAMPLES),
     );
-    field_ui(ui, "Seed", glossary::SEED.hint, |ui| {
-        ui.add_sized([space(16), space(6)], DragValue::new(&mut draft.seed.0).speed(0.1))
-    });
+    seed_ui(ui, "Seed", glossary::SEED.hint, &mut draft.seed.0, usual.seed.0);
 }
 
 fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
