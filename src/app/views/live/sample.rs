@@ -61,7 +61,7 @@ fn lay_out(folder: &Path) -> Result<Laid, String> {
     fs::create_dir_all(folder).map_err(|error| refused(&error))?;
     let write = |(name, text): (&str, &str)| {
         let path = folder.join(name);
-        let written = atomic_write(&path, |file| Ok(file.write_all(text.as_bytes())?));
+        let written = atomic_write(&path, |file| file.write_all(text.as_bytes()));
         written.map(|()| path).map_err(|error| refused(&error))
     };
     let (network, recording) = (write(NETWORK)?, write(RECORDING)?);

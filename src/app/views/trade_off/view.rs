@@ -87,7 +87,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
                     on this machine.";
         let mut is_wanted = false;
         card_ui(ui, whole, |ui| {
-            is_wanted = invitation_ui(ui, text, "Measure now", trade.can_measure(shared))
+            is_wanted = invitation_ui(ui, text, "Measure now", trade.can_measure(shared));
         });
         if is_wanted {
             trade.measure(shared, effects);

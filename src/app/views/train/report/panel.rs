@@ -60,7 +60,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
 fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     let known = shared.preview.as_ref();
     if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
-        let published = shared.draft.published();
+        // The settings may have moved on to a scene whose figures are still to come.
+        let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
+        let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
+        let published = shared.draft.published().filter(|_| is_of_draft);
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
             *row = ErrorRow {
