@@ -15,6 +15,7 @@ mod habits;
 mod identifying;
 mod live;
 mod looking;
+mod own_data;
 mod pictures;
 mod pressing;
 mod remembering;

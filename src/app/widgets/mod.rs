@@ -16,4 +16,4 @@ pub use fact::{coloured_fact_ui, fact_ui};
 pub use fold::fold_ui;
 pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;
-pub use table::{Column, Row, table_ui};
+pub use table::{Column, Row, captioned_table_ui, table_ui};

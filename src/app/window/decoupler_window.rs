@@ -149,6 +149,7 @@ impl DecouplerWindow {
         }
         let mut effects = Vec::new();
         let actions = self.offer_actions(ui.ctx(), &mut effects);
+        self.take_dropped(ui.ctx(), &mut effects);
         let is_asked = self.is_asked();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
         if !is_asked {
@@ -237,6 +238,7 @@ impl DecouplerWindow {
         }
         self.undoing.follow(ui.input(|input| input.time), &self.shared.draft);
         self.overlay_ui(ui, &actions);
+        self.dropping_ui(ui);
         self.ask_for_path(ui);
         self.remember();
         // What was begun in this frame must be finished too.

@@ -7,6 +7,7 @@ mod closing;
 mod columns;
 mod decoupler_window;
 mod dialogs;
+mod dropping;
 mod export_menu;
 mod files;
 mod frames;

@@ -9,7 +9,6 @@ mod exports;
 mod paper_figure;
 mod press;
 mod report;
-mod run_buttons;
 mod scrub;
 mod state;
 mod surfaces;

@@ -5,13 +5,12 @@ use crate::{
         theme::{Theme, space, type_size},
         widgets::fields::{capitalised, count_ui, input_text, quantity_ui},
     },
-    evaluation::{MOST_STARTS, SimulatedSettings},
+    evaluation::MOST_STARTS,
     training::{Method, StoppingRules},
 };
 
-/// The choice of the method; changes `draft`.
-pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let method = &mut draft.training.method;
+/// The choice of the method; changes `method`.
+pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
     // The longest names fill a line.
     let label = ui.label("Method").on_hover_text("Algorithm that adjusts the weights.");
     let combo = ComboBox::from_id_salt("method")
@@ -34,23 +33,20 @@ pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
 }
 
-/// The settings of the chosen method and the number of starts; changes `draft`. A training that is held
-/// (`is_new` is false) keeps its starts.
-pub fn method_settings_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
-    for setting in draft.training.method.settings() {
+/// The settings of the chosen method and the number of starts; changes both. A training that is held (`is_new` is false)
+/// keeps its starts.
+pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, is_new: bool) {
+    for setting in method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
     }
     let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
-                error is kept. Several starts show how much the results vary. Default 1.";
-    ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", hint, &mut draft.starts, 1..=MOST_STARTS)
-    });
+                error (training error if nothing is held out) is kept. Several starts show how much the results vary. Default 1.";
+    ui.add_enabled_ui(is_new, |ui| count_ui(ui, "Starts", hint, starts, 1..=MOST_STARTS));
 }
 
-/// The rules that end a training; changes `draft`.
-pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let stopping = &mut draft.training.stopping;
+/// The rules that end a training; changes `stopping`.
+pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
     let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
                 from the present one.";
     count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
@@ -62,7 +58,7 @@ pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut stopping.max_fail,
         1..=StoppingRules::MOST_EPOCHS,
     );
-    let hint = "Training error (mse of the scaled coordinates) at which training ends. Default 0.";
+    let hint = "Training error (mse of the scaled targets) at which training ends. Default 0.";
     quantity_ui(ui, "Goal (mse)", hint, &mut stopping.goal_mse, 0.0..=1e300, "");
     let hint = "Norm of the gradient below which training ends. Default 1e-7.";
     quantity_ui(

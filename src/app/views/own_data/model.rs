@@ -1,0 +1,110 @@
+use std::{sync::Arc, time::Duration};
+
+use ndarray::Array2;
+
+use crate::{
+    app::shared::Phase,
+    dataset::Dataset,
+    evaluation::{TargetErrors, TargetRow},
+    export::{MeasuredCheckpointFile, MeasuredNetworkFile},
+    import::Channel,
+};
+
+/// A network trained on recordings, as far as the window knows it.
+#[derive(Clone, Debug)]
+pub(super) struct Trained {
+    /// Name in the list of runs.
+    pub(super) name: String,
+    /// Settings, plan, network, record and errors.
+    pub(super) file: Arc<MeasuredNetworkFile>,
+    /// Test samples and the network's answers, if they are at hand.
+    pub(super) tested: Option<Arc<Tested>>,
+    /// State of its training.
+    pub(super) phase: Phase,
+    /// Epochs run by the start that is furthest.
+    pub(super) epochs_run: usize,
+    /// Time of the training by the clock, if it is known.
+    pub(super) wall_time: Option<Duration>,
+    /// Defect of the training, once that has ended.
+    pub(super) flaw: Option<String>,
+    /// What the user should know beside the errors.
+    pub(super) remarks: Vec<String>,
+    /// The training as it stands, while it is paused or has ended.
+    pub(super) checkpoint: Option<Arc<MeasuredCheckpointFile>>,
+}
+
+/// Test samples and the answers to them.
+#[derive(Debug)]
+pub(super) struct Tested {
+    set: Arc<Dataset>,
+    /// Samples × targets.
+    pub(super) answers: Array2<f64>,
+}
+
+impl Tested {
+    pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>) -> Self {
+        Self {
+            set: set.into(),
+            answers,
+        }
+    }
+
+    /// The test samples.
+    pub(super) fn set(&self) -> &Dataset {
+        &self.set
+    }
+
+    /// Errors of the answers, target by target.
+    pub(super) fn errors(&self) -> Vec<TargetErrors> {
+        TargetErrors::measure(self.set.targets(), self.answers.view())
+    }
+
+    /// Actual and decoded values of a target.
+    pub(super) fn pairs(&self, target: usize) -> Vec<(f64, f64)> {
+        let (targets, answers) = (self.set.targets(), self.answers.column(target));
+        targets
+            .column(target)
+            .iter()
+            .copied()
+            .zip(answers.iter().copied())
+            .collect()
+    }
+}
+
+impl Trained {
+    /// Errors of the mean, of ridge and of the network, in this order.
+    pub(super) fn rows(&self) -> [(&'static str, &[TargetErrors]); 3] {
+        [
+            ("training mean", &self.file.mean),
+            ("ridge", &self.file.ridge),
+            ("network", &self.file.errors),
+        ]
+    }
+}
+
+/// Result of a cross-validation.
+#[derive(Clone, Debug)]
+pub(super) struct Validated {
+    /// Number of folds, and the rule by which they were made.
+    pub(super) folds: String,
+    /// Number of samples, each tested once.
+    pub(super) samples: usize,
+    /// Names and units of the targets.
+    pub(super) targets: Vec<Channel>,
+    /// Errors of the mean, of ridge and of the networks.
+    pub(super) table: Vec<TargetRow>,
+    /// What the readings tell, target by target, and where a network is no better than ridge.
+    pub(super) remarks: Vec<String>,
+}
+
+/// Two targets that are positions in one unit, for a map: lengths, or without units.
+pub(super) fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
+    const LENGTHS: [&str; 6] = ["m", "cm", "mm", "µm", "um", "nm"];
+    let may_be = |channel: &Channel| match &channel.unit {
+        None => true,
+        Some(unit) => LENGTHS.contains(&unit.trim()),
+    };
+    let pairs = (0..targets.len()).flat_map(|one| (one + 1..targets.len()).map(move |other| [one, other]));
+    let mut pairs = pairs.filter(|[one, other]| may_be(&targets[*one]) && targets[*one].unit == targets[*other].unit);
+    pairs.next()
+}
