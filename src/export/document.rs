@@ -138,7 +138,12 @@ impl DocumentKind {
             NoHeading::Other => other(format!("it has no field \"format\": \"{}\"", self.format())),
         })?;
         if heading.format != self.format() {
-            return Err(other(format!("its format is {}", heading.format)));
+            let measured = [Self::MeasuredNetwork, Self::MeasuredCheckpoint];
+            let found = measured.into_iter().find(|kind| heading.format == kind.format());
+            return Err(other(match found {
+                Some(kind) => format!("it is a {kind}, which has no sensor's geometry"),
+                None => format!("its format is {}", heading.format),
+            }));
         }
         match heading.newer_than(*self.versions().end()) {
             Some(version) => Err(DocumentError::Version {

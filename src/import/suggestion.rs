@@ -130,8 +130,13 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
         });
         add(&mut plan.import, file, &Vec::from_iter(meanings), Some(stem));
     }
-    if plan.import.targets.is_empty() && plan.import.inputs.len() > 1 {
-        plan.import.targets.extend(plan.import.inputs.pop());
+    let Recipe { inputs, targets, .. } = &mut plan.import;
+    // Where the names do not tell them apart, the last column is the target, as in most tables of samples.
+    if inputs.is_empty() {
+        std::mem::swap(inputs, targets);
+    }
+    if targets.is_empty() && inputs.len() > 1 {
+        targets.extend(inputs.pop());
     }
     if plan.import.group.is_some() {
         plan.division = Division {

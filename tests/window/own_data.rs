@@ -15,6 +15,7 @@ use decoupler::{
     scene::RowModel,
 };
 use eframe::egui::{self, vec2};
+use egui_kittest::kittest::NodeT as _;
 use tempfile::TempDir;
 
 use crate::driver::Driver;

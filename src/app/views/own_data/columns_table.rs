@@ -1,12 +1,10 @@
 //! The columns of all files: what they look like, and what they mean.
 
-use eframe::egui::{
-    Align, Align2, Color32, ComboBox, FontId, Label, Layout, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo,
-    accesskit::Role, vec2,
-};
+use eframe::egui::{ComboBox, Label, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::{
+    column_cells::{figure_ui, meaning_ui, number, remark, unit_ui},
     draft::{Draft, file_name},
     histogram::paint_histogram,
     import_form::invitation_ui,
@@ -17,8 +15,7 @@ use crate::{
         shared::Effect,
         theme::{Palette, Theme, semibold, space, type_size},
     },
-    export::format_number,
-    import::{ColumnKind, ColumnSummary, Meaning},
+    import::{InspectedFile, Meaning},
 };
 
 const ROW_HEIGHT: f32 = space(7);
@@ -71,7 +68,7 @@ pub(super) fn columns_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<
 }
 
 fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
-    let of_file = |(file, inspected): (usize, &crate::import::InspectedFile)| {
+    let of_file = |(file, inspected): (usize, &InspectedFile)| {
         let columns = (0..inspected.meanings.len()).map(move |column| Line::Column(file, column));
         std::iter::once(Line::File(file)).chain(columns)
     };
@@ -167,11 +164,12 @@ fn column_ui(
         ui.add(Label::new(RichText::new(&name).color(colour)).truncate());
     });
     row.col(|ui| {
-        change = meaning_ui(ui, &name, meaning).map(|meaning| Change::Meaning(file, column, meaning));
+        change = meaning_ui(ui, &name, meaning, HEADINGS[1].1 - space(3))
+            .map(|meaning| Change::Meaning(file, column, meaning));
     });
     row.col(|ui| {
         if matches!(meaning, Meaning::Input | Meaning::Target) {
-            let unit = unit_ui(ui, &name, &draft.unit(file, column));
+            let unit = unit_ui(ui, &name, &draft.unit(file, column), HEADINGS[2].1 - space(4));
             change = change.take().or(unit.map(|unit| Change::Unit(file, column, unit)));
         }
     });
@@ -222,115 +220,4 @@ fn column_ui(
         }
     });
     change
-}
-
-/// The choice of a meaning. Returns the one newly picked.
-fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning) -> Option<Meaning> {
-    let mut picked = None;
-    let palette = Theme::of(ui).palette;
-    let text = RichText::new(meaning.to_string()).color(if meaning == Meaning::Unused {
-        palette.dim
-    } else {
-        palette.text
-    });
-    let combo = ComboBox::from_id_salt(name)
-        .selected_text(text)
-        .width(HEADINGS[1].1 - space(3));
-    let shown = combo.show_ui(ui, |ui| {
-        for option in Meaning::ALL {
-            let choice = ui.selectable_label(option == meaning, option.to_string());
-            if choice.on_hover_text(explanation(option)).clicked() && option != meaning {
-                picked = Some(option);
-            }
-        }
-    });
-    let label = format!("Meaning of {name}");
-    let value = meaning.to_string();
-    shown
-        .response
-        .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-    ui.ctx()
-        .accesskit_node_builder(shown.response.id, |node| node.set_value(value));
-    picked
-}
-
-fn explanation(meaning: Meaning) -> &'static str {
-    match meaning {
-        Meaning::Input => "The sensor gives it: the network reads it.",
-        Meaning::Target => "The network learns to tell it from the inputs.",
-        Meaning::Time => "Time of the row, by which files are joined and samples are put in order.",
-        Meaning::Group => "Equal values belong together, such as one press or one session, and are never divided.",
-        Meaning::RowWire => "Number of the row-wire that was read, from 1.",
-        Meaning::Unused => "It is left out.",
-    }
-}
-
-/// The unit, to be changed in place; what is typed counts when the field is left.
-fn unit_ui(ui: &mut Ui, name: &str, unit: &str) -> Option<String> {
-    let id = ui.scope_id().with(("unit", name));
-    let mut typed: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| unit.to_owned());
-    let edit = ui.add(
-        TextEdit::singleline(&mut typed)
-            .id(id)
-            .desired_width(HEADINGS[2].1 - space(4)),
-    );
-    let label = format!("Unit of {name}");
-    ui.ctx().accesskit_node_builder(edit.id, |node| node.set_label(label));
-    if edit.changed() {
-        ui.data_mut(|data| data.insert_temp(id, typed.clone()));
-    }
-    if edit.lost_focus() {
-        ui.data_mut(|data| data.remove::<String>(id));
-        return (typed.trim() != unit).then_some(typed);
-    }
-    None
-}
-
-/// A figure at the right of its cell.
-fn figure_ui(ui: &mut Ui, text: &str, label: &str, colour: Color32) -> eframe::egui::Response {
-    let rect: Rect = ui.max_rect();
-    let response = ui.interact(rect, ui.scope_id().with("figure"), Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, label));
-    let font = FontId::proportional(type_size().note);
-    ui.painter().text(
-        rect.right_center() - vec2(space(1), 0.0),
-        Align2::RIGHT_CENTER,
-        text,
-        font,
-        colour,
-    );
-    ui.with_layout(Layout::right_to_left(Align::Center), |_| {});
-    response
-}
-
-/// A number of a range; whole ones, as times are, with up to ten digits.
-fn number(value: f64) -> String {
-    if value.abs() >= 1e3 && value.abs() < 1e10 {
-        return format!("{value:.0}");
-    }
-    format_number(value)
-}
-
-/// What is unusual about a column, and whether it hinders its use.
-fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, bool)> {
-    if let Some((line, text)) = &summary.first_text {
-        let others = match summary.texts {
-            1 => String::new(),
-            texts => format!(", and {} other cells", texts - 1),
-        };
-        return Some((
-            format!("line {line}, column {}: '{text}' is no number{others}", column + 1),
-            true,
-        ));
-    }
-    if summary.kind == ColumnKind::Empty {
-        return Some(("empty".to_owned(), true));
-    }
-    if summary.is_constant {
-        return Some(("constant: it tells nothing".to_owned(), true));
-    }
-    summary
-        .duplicate_of
-        .as_ref()
-        .map(|other| (format!("same as {other}"), true))
 }

@@ -5,6 +5,7 @@
 
 mod charts;
 mod checking;
+mod column_cells;
 mod columns_table;
 mod draft;
 mod error_table;
@@ -12,7 +13,10 @@ mod exports;
 mod form;
 mod histogram;
 mod import_form;
+mod keeping;
+mod layout_form;
 mod model;
+mod news;
 mod opening;
 mod remarks;
 mod report;

@@ -72,6 +72,21 @@ impl Tested {
 }
 
 impl Trained {
+    /// The network of a file, without test samples.
+    pub(super) fn of_file(file: Arc<MeasuredNetworkFile>) -> Self {
+        Self {
+            name: String::new(),
+            epochs_run: file.training.history.last().map_or(0, |record| record.epoch),
+            phase: file.training.stop_reason.map_or(Phase::Idle, Phase::Ended),
+            tested: None,
+            wall_time: None,
+            flaw: None,
+            remarks: Vec::new(),
+            checkpoint: None,
+            file,
+        }
+    }
+
     /// Errors of the mean, of ridge and of the network, in this order.
     pub(super) fn rows(&self) -> [(&'static str, &[TargetErrors]); 3] {
         [

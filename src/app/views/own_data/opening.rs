@@ -10,10 +10,7 @@ use super::{
     model::{Tested, Trained},
 };
 use crate::{
-    app::{
-        job::{Job, JobError, Report, Wake},
-        shared::Phase,
-    },
+    app::job::{Job, JobError, Report, Wake},
     export::{DocumentKind, MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
     import::{DialectChoice, Joined, Plan, Progress, Recipe, suggested_plan},
 };
@@ -162,7 +159,7 @@ fn open_document(
         DocumentKind::MeasuredNetwork => {
             let file = MeasuredNetworkFile::load(path).map_err(|error| error.to_string())?;
             let draft = inspected(file.plan.clone(), watch).ok();
-            let trained = opened_network(file, file_name(path), watch);
+            let trained = opened_network(file, watch);
             Ok(Opened::Network(Box::new(trained), draft))
         }
         DocumentKind::MeasuredCheckpoint => {
@@ -186,11 +183,7 @@ fn open_document(
 }
 
 /// The network of a file, with its answers to the test samples if the recording can be read again.
-fn opened_network(
-    file: MeasuredNetworkFile,
-    name: String,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Trained {
+fn opened_network(file: MeasuredNetworkFile, watch: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Trained {
     let sets = file.plan.sets(Path::new(""), file.settings.seed, watch);
     let tested = sets.map_err(|error| error.to_string()).and_then(|sets| {
         if (sets.test.channels(), sets.test.outputs()) != (file.inputs.len(), file.targets.len()) {
@@ -215,14 +208,8 @@ fn opened_network(
         ),
     };
     Trained {
-        name,
-        epochs_run: file.training.history.last().map_or(0, |record| record.epoch),
-        phase: file.training.stop_reason.map_or(Phase::Idle, Phase::Ended),
-        wall_time: None,
-        flaw: None,
         remarks: Vec::from_iter(remark),
-        checkpoint: None,
         tested: tested.map(Into::into),
-        file: file.into(),
+        ..Trained::of_file(file.into())
     }
 }

@@ -1,6 +1,8 @@
-//! The networks of this session: a list, and two of them side by side.
+//! The networks trained and opened: a list, and two of them side by side.
 
-use eframe::egui::{RichText, ScrollArea, Ui};
+use std::{path::PathBuf, sync::Arc};
+
+use eframe::egui::{Button, RichText, ScrollArea, Ui};
 
 use super::{error_table::error_tables_ui, model::Trained, state::OwnDataView};
 use crate::{
@@ -16,61 +18,91 @@ use crate::{
     import::Plan,
 };
 
-/// Networks trained or opened in this session, in this order.
+/// Networks trained or opened, in this order.
 #[derive(Debug, Default)]
-pub(super) struct RunsOfSession {
-    runs: Vec<Trained>,
+pub(super) struct Runs {
+    runs: Vec<Kept>,
     /// The one that is compared with the network on show.
     marked: Option<usize>,
+    /// True while the user is asked about removing it.
+    is_removing: bool,
 }
 
-impl RunsOfSession {
-    /// Adds a network, unless it is there.
-    pub(super) fn keep(&mut self, trained: &Trained) {
-        if !self.runs.iter().any(|run| run.file == trained.file) {
-            self.runs.push(trained.clone());
+#[derive(Debug)]
+struct Kept {
+    trained: Trained,
+    /// Its file among the networks that are kept.
+    path: Option<PathBuf>,
+}
+
+impl Runs {
+    /// Adds a network; false if it is there already.
+    pub(super) fn add(&mut self, trained: &Trained) -> bool {
+        let is_new = self.place(&trained.file).is_none();
+        if is_new {
+            self.runs.push(Kept {
+                trained: trained.clone(),
+                path: None,
+            });
         }
+        is_new
     }
 
-    /// The network in this place.
-    pub(super) fn get(&self, place: usize) -> Option<&Trained> {
-        self.runs.get(place)
+    /// Notes that a network is kept in the file `path`.
+    pub(super) fn note_kept(&mut self, path: PathBuf, file: Arc<MeasuredNetworkFile>) {
+        let place = self.place(&file).unwrap_or_else(|| {
+            let mut trained = Trained::of_file(file);
+            trained.name = self.name_of(&trained);
+            self.runs.push(Kept { trained, path: None });
+            self.runs.len() - 1
+        });
+        self.runs[place].path = Some(path);
     }
 
-    /// A name that no other network has: "states h24 br".
+    fn place(&self, file: &MeasuredNetworkFile) -> Option<usize> {
+        self.runs.iter().position(|run| *run.trained.file == *file)
+    }
+
+    /// The network in this place, and the file in which it is kept.
+    pub(super) fn get(&self, place: usize) -> Option<(&Trained, Option<&PathBuf>)> {
+        self.runs.get(place).map(|run| (&run.trained, run.path.as_ref()))
+    }
+
+    /// Name of a network: that in the list, or one that no other has.
     pub(super) fn name_of(&self, trained: &Trained) -> String {
+        if let Some(place) = self.place(&trained.file) {
+            return self.runs[place].trained.name.clone();
+        }
         let MeasuredNetworkFile { settings, plan, .. } = &*trained.file;
         let stem = plan.import.data.file_stem().unwrap_or_default().to_string_lossy();
         let name = format!("{stem} h{} {}", settings.hidden, settings.training.method.short_name());
-        let same = self
-            .runs
-            .iter()
-            .filter(|run| run.name == name || run.name.starts_with(&format!("{name} #")));
-        match same.count() {
-            0 => name,
-            count => format!("{name} #{}", count + 1),
-        }
+        let numbered = (2..).map(|number| format!("{name} ({number})"));
+        let mut names = std::iter::once(name.clone()).chain(numbered);
+        let is_taken = |name: &String| self.runs.iter().any(|run| run.trained.name == *name);
+        names.find(|name| !is_taken(name)).unwrap_or(name)
     }
 
-    #[cfg(test)]
-    pub(super) fn len(&self) -> usize {
-        self.runs.len()
+    /// Removes the marked network from the list; returns the file in which it is kept.
+    fn remove_marked(&mut self) -> Option<PathBuf> {
+        self.is_removing = false;
+        let place = self.marked.take().filter(|place| *place < self.runs.len())?;
+        self.runs.remove(place).path
     }
 }
 
 /// The list above, the comparison below.
 pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     if view.runs.runs.is_empty() {
-        placeholder_ui(
-            ui,
-            "Every network trained or opened in this session appears here, to be compared.",
-        );
+        placeholder_ui(ui, "Every network trained or opened appears here, to be compared.");
         return;
     }
+    let kept = match &view.keeping.folder {
+        Some(_) => "They are kept from session to session.",
+        None => "They are not kept after this session.",
+    };
     dim_ui(
         ui,
-        "Click a network to compare it with the one on show; double-click to show it. They are kept for this session: save \
-         those that you want to keep by Export.",
+        &format!("Click a network to compare it with the one on show; double-click to show it. {kept}"),
     );
     ui.add_space(space(1));
     let whole = ui.available_height();
@@ -83,6 +115,7 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     match click {
         Some(TableClick::Mark(place)) => {
             view.runs.marked = (view.runs.marked != Some(place)).then_some(place);
+            view.runs.is_removing = false;
             ui.request_repaint();
         }
         Some(TableClick::Open(place)) => {
@@ -91,8 +124,9 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
         }
         _ => {}
     }
+    marked_ui(ui, view);
     let marked = view.runs.marked.and_then(|place| view.runs.get(place));
-    match (marked, &view.shown) {
+    match (marked.map(|(marked, _)| marked), &view.shown) {
         (Some(marked), Some(shown)) if marked.file != shown.file => {
             ScrollArea::vertical()
                 .id_salt("compared")
@@ -108,14 +142,37 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     }
 }
 
-fn list_ui(ui: &mut Ui, runs: &RunsOfSession, is_shown: impl Fn(&Trained) -> bool) -> Option<TableClick> {
+/// What can be done with the marked network.
+fn marked_ui(ui: &mut Ui, view: &mut OwnDataView) {
+    let Some(place) = view.runs.marked else { return };
+    let is_busy = view.phase.is_busy();
+    ui.horizontal(|ui| {
+        if view.runs.is_removing {
+            ui.label("Remove this network?");
+            if ui.button("Remove").clicked() {
+                if let Some(path) = view.runs.remove_marked() {
+                    view.keeping.remove(path);
+                }
+            } else if ui.button("Keep").clicked() {
+                view.runs.is_removing = false;
+            }
+            return;
+        }
+        if ui.add_enabled(!is_busy, Button::new("Show")).clicked() {
+            view.show_run(place);
+        }
+        view.runs.is_removing = ui.button("Remove…").clicked();
+    });
+}
+
+fn list_ui(ui: &mut Ui, runs: &Runs, is_shown: impl Fn(&Trained) -> bool) -> Option<TableClick> {
     let palette = Theme::of(ui).palette;
     // As many targets as there is room for; all are in the report.
     const MOST_TARGETS: usize = 3;
     let targets: Vec<String> = runs
         .runs
         .iter()
-        .flat_map(|run| run.file.targets.iter().map(|target| target.title()))
+        .flat_map(|run| run.trained.file.targets.iter().map(|target| target.title()))
         .fold(Vec::new(), |mut names, name| {
             if !names.contains(&name) {
                 names.push(name);
@@ -140,7 +197,7 @@ fn list_ui(ui: &mut Ui, runs: &RunsOfSession, is_shown: impl Fn(&Trained) -> boo
     let mut columns = vec![name, figure("split", "random"), figure("epochs", "10000")];
     columns.extend(headings.iter().map(|heading| figure(heading.as_str(), "0.00012")));
     let row = |place: usize| {
-        let run = &runs.runs[place];
+        let run = &runs.runs[place].trained;
         let cell = |text: String| TableCell {
             text,
             colour: palette.text,

@@ -10,17 +10,14 @@ use super::{
     charts::ChartChoice,
     checking::Checking,
     draft::{Draft, file_name},
+    keeping::Keeping,
     model::{Trained, Validated},
-    opening::{Opened, Opening, ToOpen},
-    remarks::in_window,
-    runs::RunsOfSession,
-    training::{Command, Task, Trainer, TrainingEvent},
+    opening::{Opening, ToOpen},
+    runs::Runs,
+    training::{Command, Task, Trainer, ValidationChoice},
 };
 use crate::{
-    app::{
-        job::Wake,
-        shared::{Effect, Matter, Notice, Phase},
-    },
+    app::{job::Wake, shared::Phase},
     evaluation::{Measured, RunSettings},
     import::{DialectChoice, Meaning, Progress},
     scene::RowModel,
@@ -35,9 +32,9 @@ pub struct OwnDataView {
     pub(super) checking: Checking,
     /// Settings of the next training.
     pub(super) settings: RunSettings,
-    /// Number of folds of a cross-validation.
-    pub(super) folds: usize,
-    trainer: Trainer,
+    /// Extent of the next cross-validation.
+    pub(super) validation: ValidationChoice,
+    pub(super) trainer: Trainer,
     /// State of the trainer.
     pub(super) phase: Phase,
     /// How far a file is read before a training.
@@ -50,16 +47,18 @@ pub struct OwnDataView {
     pub(super) validated: Option<Validated>,
     /// True while a cross-validation is under way.
     pub(super) is_validating: bool,
-    pub(super) runs: RunsOfSession,
+    /// Networks trained and opened.
+    pub(super) runs: Runs,
+    pub(super) keeping: Keeping,
     /// Card in the middle.
     pub(super) tab: Tab,
     pub(super) chart: ChartChoice,
     /// Paths that the user chooses, in dialogs or by typing.
     pub(super) choices: Sender<PathBuf>,
-    chosen: Receiver<PathBuf>,
+    pub(super) chosen: Receiver<PathBuf>,
     /// As [`Self::choices`], for files of test samples.
     pub(super) test_choices: Sender<PathBuf>,
-    chosen_for_test: Receiver<PathBuf>,
+    pub(super) chosen_for_test: Receiver<PathBuf>,
 }
 
 /// Cards in the middle.
@@ -94,33 +93,25 @@ impl OwnDataView {
             opening: Opening::new(Arc::clone(&wake)),
             checking: Checking::new(Arc::clone(&wake)),
             settings: settings(),
-            folds: 5,
-            trainer: Trainer::new(wake),
+            validation: ValidationChoice {
+                folds: 5,
+                compares_random: false,
+            },
+            trainer: Trainer::new(Arc::clone(&wake)),
             phase: Phase::Idle,
             reading: None,
             shown: None,
             asked: None,
             validated: None,
             is_validating: false,
-            runs: RunsOfSession::default(),
+            runs: Runs::default(),
+            keeping: Keeping::new(wake),
             tab: Tab::default(),
             chart: ChartChoice::default(),
             choices,
             chosen,
             test_choices,
             chosen_for_test,
-        }
-    }
-
-    /// Opens the files that the user has chosen.
-    pub(super) fn take_chosen(&mut self) {
-        let paths: Vec<PathBuf> = self.chosen.try_iter().collect();
-        if !paths.is_empty() {
-            self.open(paths);
-        }
-        let paths: Vec<PathBuf> = self.chosen_for_test.try_iter().collect();
-        if let (Some(draft), false) = (&mut self.draft, self.phase.is_busy()) {
-            paths.into_iter().for_each(|path| draft.add_test_file(path));
         }
     }
 
@@ -199,11 +190,11 @@ impl OwnDataView {
             self.is_validating = true;
             // The thread that could go on is gone.
             self.asked = None;
-            self.begin(Task::Validate(Box::new(plan), self.settings, self.folds));
+            self.begin(Task::Validate(Box::new(plan), self.settings, self.validation));
         }
     }
 
-    fn begin(&mut self, task: Task) {
+    pub(super) fn begin(&mut self, task: Task) {
         self.reading = None;
         self.phase = Phase::Preparing;
         self.trainer.start(task);
@@ -260,128 +251,39 @@ impl OwnDataView {
         }
     }
 
-    fn phase_at_rest(&self) -> Phase {
+    pub(super) fn phase_at_rest(&self) -> Phase {
         self.shown.as_ref().map_or(Phase::Idle, |shown| match shown.phase {
             ended @ Phase::Ended(_) => ended,
             _ => Phase::Idle,
         })
     }
 
-    /// Shows a run of the list; its settings and plan become those of the form.
+    /// Shows a network of the list; its settings and plan become those of the form.
     pub(super) fn show_run(&mut self, place: usize) {
-        if self.phase.is_busy() {
+        let Some((trained, path)) = self.runs.get(place).filter(|_| !self.phase.is_busy()) else {
             return;
-        }
-        if let Some(run) = self.runs.get(place) {
-            self.settings = run.file.settings.into();
-            self.opening.start(ToOpen::Plan(Box::new(run.file.plan.clone())));
-            self.show(run.clone(), None);
-            self.tab = Tab::Results;
+        };
+        match (&trained.tested, path) {
+            // Its test samples are read again.
+            (None, Some(path)) => self
+                .opening
+                .start(ToOpen::Files(vec![path.clone()], DialectChoice::default())),
+            _ => {
+                let trained = trained.clone();
+                self.settings = trained.file.settings.into();
+                self.opening.start(ToOpen::Plan(Box::new(trained.file.plan.clone())));
+                self.show(trained, None);
+                self.tab = Tab::Results;
+            }
         }
     }
 
-    fn show(&mut self, trained: Trained, asked: Option<RunSettings>) {
+    pub(super) fn show(&mut self, trained: Trained, asked: Option<RunSettings>) {
         self.trainer.cancel();
         self.phase = trained.phase;
         self.asked = asked;
         self.chart.fit(&trained.file.targets);
         self.shown = Some(trained);
-    }
-
-    /// Takes what the threads have to tell.
-    pub(super) fn follow(&mut self, effects: &mut Vec<Effect>) {
-        if let Some(opened) = self.opening.next_opened() {
-            match opened {
-                Ok(opened) => {
-                    effects.push(Effect::Settle(Matter::OwnData));
-                    self.take(opened);
-                }
-                Err(reason) => effects.push(failed(&reason)),
-            }
-        }
-        while let Some(event) = self.trainer.next_event() {
-            self.take_training(event, effects);
-        }
-        let draft = self.draft.as_ref().filter(|draft| draft.obstacle().is_none());
-        let plan = draft.and_then(|draft| draft.plan().ok());
-        // The machine is for the training then.
-        if !self.phase.is_busy() {
-            self.checking.follow(plan, self.settings.seed);
-        }
-    }
-
-    fn take(&mut self, opened: Opened) {
-        match opened {
-            Opened::Recordings(draft) => {
-                let draft = match &self.draft {
-                    Some(older) => draft.keeping(older),
-                    None => *draft,
-                };
-                self.tab = Tab::Columns;
-                self.draft = Some(draft);
-                self.set_held_out();
-            }
-            Opened::Import(draft) => {
-                self.draft = Some(*draft);
-            }
-            Opened::Network(trained, draft) => {
-                self.draft = draft.map(|draft| *draft).or(self.draft.take());
-                self.settings = trained.file.settings.into();
-                self.runs.keep(&trained);
-                self.show(*trained, None);
-                self.tab = Tab::Results;
-            }
-            Opened::Checkpoint(path, file, draft) => {
-                self.draft = draft.map(|draft| *draft).or(self.draft.take());
-                self.settings = file.settings.into();
-                self.shown = None;
-                self.asked = Some(self.settings);
-                self.tab = Tab::Results;
-                self.begin(Task::Resume(path, file));
-            }
-        }
-    }
-
-    /// Holds out for validation what the method needs.
-    pub(super) fn set_held_out(&mut self) {
-        let fraction = self.settings.validation_fraction();
-        if let Some(draft) = &mut self.draft {
-            draft.plan.division.validation_fraction = fraction;
-        }
-    }
-
-    fn take_training(&mut self, event: TrainingEvent, effects: &mut Vec<Effect>) {
-        match event {
-            TrainingEvent::Reading(progress) => self.reading = Some(progress),
-            TrainingEvent::Progressed(mut trained) => {
-                let is_first = self.shown.is_none();
-                trained.name = self.runs.name_of(&trained);
-                self.phase = trained.phase;
-                if is_first {
-                    effects.push(Effect::Settle(Matter::OwnData));
-                    self.tab = Tab::Results;
-                    self.chart.fit(&trained.file.targets);
-                }
-                if let Phase::Ended(_) = trained.phase {
-                    self.runs.keep(&trained);
-                }
-                self.shown = Some(*trained);
-            }
-            TrainingEvent::Validated(validated) => {
-                self.validated = Some(*validated);
-                self.tab = Tab::Results;
-            }
-            TrainingEvent::Refused(reason) => effects.push(failed(&reason)),
-            TrainingEvent::Ended(ended) => {
-                if let Err(reason) = ended {
-                    effects.push(failed(&reason));
-                }
-                self.is_validating = false;
-                if self.phase.is_busy() {
-                    self.phase = self.phase_at_rest();
-                }
-            }
-        }
     }
 
     /// Name of the recording, for names of files.
@@ -400,8 +302,4 @@ impl OwnDataView {
     pub(super) fn has_row_wires(&self) -> bool {
         self.draft.as_ref().is_some_and(|draft| draft.has(Meaning::RowWire))
     }
-}
-
-fn failed(reason: &str) -> Effect {
-    Effect::Tell(Matter::OwnData, Notice::Failed(in_window(reason)))
 }

@@ -27,8 +27,9 @@ impl View for OwnDataView {
         "Own data"
     }
 
-    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen();
+        self.follow_keeping(shared, effects);
         self.follow(effects);
     }
 

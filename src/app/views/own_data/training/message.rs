@@ -15,8 +15,17 @@ pub enum Task {
     Train(Box<Plan>, RunSettings),
     /// Go on from this checkpoint, of the file at this path, once that is asked for.
     Resume(PathBuf, Box<MeasuredCheckpointFile>),
-    /// Test on every sample by cross-validation with this many folds.
-    Validate(Box<Plan>, RunSettings, usize),
+    /// Test on every sample by cross-validation.
+    Validate(Box<Plan>, RunSettings, ValidationChoice),
+}
+
+/// Extent of a cross-validation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ValidationChoice {
+    /// Number of folds.
+    pub folds: usize,
+    /// True if random folds are tried too, which shows how much they flatter.
+    pub compares_random: bool,
 }
 
 /// Wishes while it trains.

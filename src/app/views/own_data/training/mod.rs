@@ -4,5 +4,5 @@ mod message;
 mod trainer;
 mod training_loop;
 
-pub(super) use message::{Command, Task, TrainingEvent};
+pub(super) use message::{Command, Task, TrainingEvent, ValidationChoice};
 pub(super) use trainer::Trainer;

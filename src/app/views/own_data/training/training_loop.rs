@@ -8,7 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Command, Task, TrainingEvent};
+use ndarray::Array2;
+
+use super::{Command, Task, TrainingEvent, ValidationChoice};
 use crate::{
     app::{
         job::Report,
@@ -19,10 +21,10 @@ use crate::{
             remarks::judgements,
         },
     },
-    dataset::{Folds, Seed, Stream},
+    dataset::{Folds, Seed, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Run, RunSettings,
-        recorded::{Determination, NonlinearGain},
+        CrossValidated, Run, RunSettings, TargetErrors,
+        recorded::{Determination, NonlinearGain, SplitComparison},
     },
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
     import::{Channel, Plan, PlannedSets, Progress},
@@ -56,8 +58,8 @@ pub(super) fn run(task: Task, commands: &Receiver<Command>, report: &Report<Trai
             let run = file.resume(sets).map_err(|error| refused(error.to_string()))?;
             Training::new(run, about, true, report).train(commands);
         }
-        Task::Validate(plan, settings, folds) => {
-            if let Some(validated) = validate(&plan, &settings, folds, report)? {
+        Task::Validate(plan, settings, choice) => {
+            if let Some(validated) = validate(&plan, &settings, choice, report)? {
                 report.send(TrainingEvent::Validated(Box::new(validated)));
             }
         }
@@ -204,24 +206,43 @@ impl<'a> Training<'a> {
 fn validate(
     plan: &Plan,
     settings: &RunSettings,
-    folds: usize,
+    ValidationChoice { folds, compares_random }: ValidationChoice,
     report: &Report<TrainingEvent>,
 ) -> Result<Option<Validated>, String> {
     let recording = plan.recording(Path::new(""), &mut |progress| watch(progress, report));
     let recording = recording.map_err(|error| error.to_string())?;
     let (set, by) = (&recording.set, plan.division.by);
-    let dealt = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
-    let validated = CrossValidated::on_folds(settings, set, dealt, || report.is_cancelled());
-    let Some(validated) = validated.map_err(|error| error.to_string())? else {
+    let cross_validated = |by| -> Result<Option<CrossValidated>, String> {
+        let dealt =
+            Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
+        let validated = CrossValidated::on_folds(settings, set, dealt, || report.is_cancelled());
+        validated.map_err(|error| error.to_string())
+    };
+    let Some(validated) = cross_validated(by)? else {
         return Ok(None);
+    };
+    let errors = |answers: &Array2<f64>| TargetErrors::measure(set.targets(), answers.view());
+    let comparison = if compares_random && by != SplitBy::Random {
+        let random = cross_validated(SplitBy::Random)?;
+        random.map(|random| SplitComparison {
+            by,
+            network: errors(&validated.network),
+            ridge: errors(&validated.linear),
+            random_network: errors(&random.network),
+            random_ridge: errors(&random.linear),
+        })
+    } else {
+        None
     };
     let mut rng = settings.seed.rng(Stream::Resampling);
     let told = Determination::measure(set, validated.network.view(), by, &mut rng);
     let gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
     let mut remarks = Vec::new();
-    for (channel, (told, gain)) in recording.targets.iter().zip(told.into_iter().zip(gains)) {
-        remarks.extend(told.map(|told| told.sentence(&channel.name)));
-        remarks.extend(gain.and_then(|gain| gain.remark(&channel.name)));
+    for (target, channel) in recording.targets.iter().enumerate() {
+        let name = &channel.name;
+        remarks.extend(told[target].map(|told| told.sentence(name)));
+        remarks.extend(gains[target].and_then(|gain| gain.remark(name)));
+        remarks.extend(comparison.as_ref().map(|comparison| comparison.sentence(target, name)));
     }
     Ok(Some(Validated {
         folds: format!("{folds} folds by {by}"),
