@@ -125,6 +125,21 @@ fn what_tells_nothing_is_not_used_and_time_group_and_row_wire_are_found() {
 }
 
 #[test]
+fn a_column_that_always_grows_is_a_time_only_if_its_name_does_not_speak_against_it() {
+    let columns: &[fn(usize) -> f64] = &[CLOCK, VARYING, OTHER];
+    for (header, time, inputs) in [
+        (Some("u,v,force"), None, &["u", "v"][..]),
+        (Some("u (ms),v,force"), Some("u"), &["v"]),
+        (Some("Time stamp,v,force"), Some("Time stamp"), &["v"]),
+        (None, Some("c1"), &["c2"]),
+    ] {
+        let import = guessed(&[("press.csv", &table(header, 30, columns))]).import;
+        assert_eq!(import.time.as_deref(), time, "{header:?}");
+        assert_eq!(import.inputs, inputs, "{header:?}");
+    }
+}
+
+#[test]
 fn files_that_share_a_time_are_joined_to_the_readings() {
     let states = table(None, 30, &[|row| CLOCK(row) + 0.01, VARYING, OTHER]);
     let sensor = table(None, 30, &[CLOCK, OTHER, THIRD]);

@@ -14,7 +14,7 @@ use super::{
 use crate::evaluation::format::{counted, format_number};
 
 /// Largest number of cells along an axis of a map, but for those that round limits add.
-const CELLS: usize = 12;
+const CELLS: usize = 16;
 
 /// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and the
 /// line fitted to them. `pairs` are actual and decoded values.
@@ -82,7 +82,7 @@ pub fn position_error_map(
         rows: (0..up.count).rev().map(|cell| up.centre_text(cell)).collect(),
         values,
         notes,
-        value_axis: PlotAxis::linear(title("error of the position")).including([0.0]),
+        value_axis: PlotAxis::linear(title("error in both targets")).including([0.0]),
     })
 }
 
@@ -118,7 +118,7 @@ impl Cells {
     }
 
     fn centre_text(&self, cell: usize) -> String {
-        tick_text(self.first + self.width * (cell as f64 + 0.5), 0.5 * self.width)
+        tick_text(self.first + self.width * (cell as f64 + 0.5), 0.1 * self.width)
     }
 }
 

@@ -95,10 +95,7 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
         return Plan::default();
     };
     let by_time = joined.iter().all(|file| share_time(first, file));
-    let time_of = |file: &InspectedFile| {
-        let time = file.inspection.time.as_ref();
-        time.filter(|_| by_time).map(|time| time.column.clone())
-    };
+    let time_of = |file: &InspectedFile| time(file).filter(|_| by_time).map(|time| time.name.clone());
     let recipe = Recipe {
         data: first.path.clone(),
         join: joined
@@ -188,15 +185,27 @@ fn is_numeric(column: &ColumnSummary) -> bool {
     matches!(column.kind, ColumnKind::Number | ColumnKind::Integer) && column.texts == 0
 }
 
+/// Column of times, if its name or unit speaks for it or it has no name: any input may always grow.
+fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
+    let time = file.inspection.time.as_ref()?;
+    let column = file
+        .inspection
+        .columns
+        .iter()
+        .find(|column| column.name == time.column)?;
+    let name = column.name.to_lowercase();
+    let is_named = ["time", "stamp", "clock", "date", "index", "frame", "sample", "second"];
+    let has_unit = |unit: &String| ["s", "ms", "µs", "us", "min", "h"].contains(&unit.trim());
+    let is_time = is_named.iter().any(|word| name.contains(word))
+        || ["t", "c1"].contains(&name.as_str())
+        || column.unit.as_ref().is_some_and(has_unit);
+    is_time.then_some(column)
+}
+
 /// Tells whether both files have times, and these overlap.
 fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
     let range = |file: &InspectedFile| {
-        let time = file.inspection.time.as_ref()?;
-        let column = file
-            .inspection
-            .columns
-            .iter()
-            .find(|column| column.name == time.column)?;
+        let column = time(file)?;
         Some((column.min?, column.max?))
     };
     match (range(one), range(other)) {
@@ -218,7 +227,7 @@ fn score_of_file(path: &Path) -> i32 {
 /// Guesses of the meaning of each column.
 fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
     let inspection = &file.inspection;
-    let time = inspection.time.as_ref().map(|time| time.column.as_str());
+    let time = time(file).map(|time| time.name.as_str());
     let mut has_group = false;
     let guess = |column: &ColumnSummary| {
         if time == Some(column.name.as_str()) {

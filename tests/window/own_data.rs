@@ -60,6 +60,16 @@ impl Driver {
         self.settle();
     }
 
+    /// Limits the training to so many epochs.
+    #[track_caller]
+    fn limit_epochs(&mut self, epochs: &str) {
+        // What is unfolded in one view is in the others too.
+        if !self.has("Epochs") {
+            self.click("When to stop");
+        }
+        self.enter("Epochs", epochs);
+    }
+
     /// Presses Train and waits for the end.
     #[track_caller]
     fn train_own_data(&mut self) {
@@ -142,8 +152,7 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
         assert_eq!(value.as_deref(), Some(meaning), "{column}");
     }
     assert!(driver.has("Training: 96") && driver.has("Test: 24"));
-    driver.click("When to stop");
-    driver.enter("Epochs", "5");
+    driver.limit_epochs("5");
     // From here on one click is enough.
     driver.train_own_data();
     let run = trained(&plan(&path));
@@ -173,8 +182,7 @@ fn a_network_is_saved_and_opened_again_with_its_charts() {
     let path = written(&folder, "press.csv", &recording(60));
     let mut driver = Driver::open();
     driver.open_recordings(&[&path]);
-    driver.click("When to stop");
-    driver.enter("Epochs", "3");
+    driver.limit_epochs("3");
     driver.train_own_data();
     let shown = cells(&driver);
     let saved = folder.path().join("network.json");
@@ -318,8 +326,7 @@ fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
     let path = written(&folder, "press.csv", &recording(60));
     let mut driver = Driver::open();
     driver.open_recordings(&[&path]);
-    driver.click("When to stop");
-    driver.enter("Epochs", "3");
+    driver.limit_epochs("3");
     driver.train_own_data();
     let saved = folder.path().join("half.checkpoint");
     driver.save("Checkpoint, resumable", &saved);
@@ -327,8 +334,7 @@ fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
     other.drop_files(&[&saved]);
     other.wait("the training", |driver| driver.says("Epoch 3 of 3"));
     other.settle();
-    other.click("When to stop");
-    other.enter("Epochs", "2");
+    other.limit_epochs("2");
     other.click_button("Continue");
     other.wait("the end", |driver| driver.says("Epoch 5 of 5"));
     other.settle();

@@ -7,6 +7,7 @@ use eframe::egui::{
 use crate::{
     app::theme::{Theme, space, type_size},
     export::format_number,
+    figure::ticks::tick_text,
     import::{ColumnKind, ColumnSummary, Meaning},
 };
 
@@ -82,12 +83,20 @@ pub(super) fn figure_ui(ui: &mut Ui, text: &str, label: &str, colour: Color32) -
     response
 }
 
-/// A number of a range; whole ones, as times are, with up to ten digits.
-pub(super) fn number(value: f64) -> String {
-    if value.abs() >= 1e3 && value.abs() < 1e10 {
-        return format!("{value:.0}");
+/// The ends of a range, with as many decimals as tell them apart.
+pub(super) fn range_text(min: f64, max: f64) -> String {
+    let span = max - min;
+    let largest = min.abs().max(max.abs());
+    let has_decimals = (1e-6..1e12).contains(&span) && largest < 1e12;
+    let text = |value: f64| match has_decimals {
+        true => tick_text(value, span / 100.0),
+        false => format_number(value),
+    };
+    if min == max {
+        text(min)
+    } else {
+        format!("{} – {}", text(min), text(max))
     }
-    format_number(value)
 }
 
 /// What is unusual about a column, and whether it hinders its use.
@@ -112,4 +121,24 @@ pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, 
         .duplicate_of
         .as_ref()
         .map(|other| (format!("same as {other}"), true))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ends_of_a_range_differ_where_its_numbers_do() {
+        for (min, max, text) in [
+            (-108.0, 288.4, "−108 – 288"),
+            (142.95, 143.0, "142.9500 – 143.0000"),
+            (1_742_233_313.2, 1_742_253_720.9, "1742233313 – 1742253721"),
+            (-1.0, 1.0, "−1.00 – 1.00"),
+            (4.0, 4.0, "4.00"),
+            (0.0, 1e-9, "0 – 1.00e-9"),
+            (-1e300, 1e300, "-1.00e300 – 1.00e300"),
+        ] {
+            assert_eq!(range_text(min, max), text);
+        }
+    }
 }

@@ -1,10 +1,10 @@
 //! The columns of all files: what they look like, and what they mean.
 
-use eframe::egui::{ComboBox, Label, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
+use eframe::egui::{Align, ComboBox, Label, Layout, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::{
-    column_cells::{figure_ui, meaning_ui, number, remark, unit_ui},
+    column_cells::{figure_ui, meaning_ui, range_text, remark, unit_ui},
     draft::{Draft, file_name},
     histogram::paint_histogram,
     import_form::invitation_ui,
@@ -24,7 +24,7 @@ const HEADINGS: [(&str, f32); 6] = [
     ("meaning", space(26)),
     ("unit", space(15)),
     ("values", space(24)),
-    ("from – to", space(36)),
+    ("from – to", space(40)),
     ("missing", space(15)),
 ];
 /// Least widths of the name and of the remarks, which share what the others leave.
@@ -85,6 +85,7 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
         .striped(false)
         .auto_shrink(false)
         .min_scrolled_height(0.0)
+        .cell_layout(Layout::left_to_right(Align::Center))
         .column(Column::exact(name).clip(true));
     for (_, width) in &HEADINGS[1..] {
         table = table.column(Column::exact(*width).clip(true));
@@ -188,8 +189,7 @@ fn column_ui(
     });
     row.col(|ui| {
         let range = match (summary.min, summary.max) {
-            (Some(min), Some(max)) if min < max => format!("{} – {}", number(min), number(max)),
-            (Some(min), _) => number(min),
+            (Some(min), Some(max)) => range_text(min, max),
             _ => "–".to_owned(),
         };
         let exact = summary.min.zip(summary.max).map(|(min, max)| format!("{min} to {max}"));

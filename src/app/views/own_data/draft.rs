@@ -19,8 +19,10 @@ pub(super) struct Draft {
     pub(super) conditions: String,
     /// Cells that mean missing, as typed, with commas between them.
     pub(super) missing: String,
-    /// Meanings that the user has chosen, by file and column.
+    /// Meanings that the user or a recipe has chosen, by file and column.
     chosen: BTreeMap<(PathBuf, String), Meaning>,
+    /// The plan of the recipe in its own words, and the same plan as this import writes it.
+    of_recipe: Option<Box<[Plan; 2]>>,
 }
 
 impl Draft {
@@ -33,7 +35,20 @@ impl Draft {
             files,
             plan,
             chosen: BTreeMap::new(),
+            of_recipe: None,
         }
+    }
+
+    /// The import of a recipe, whose files were looked at: nothing in it is a guess.
+    pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
+        let mut draft = Self::new(plan.clone(), files);
+        for file in &draft.files {
+            for (column, meaning) in file.inspection.columns.iter().zip(&file.meanings) {
+                draft.chosen.insert((file.path.clone(), column.name.clone()), *meaning);
+            }
+        }
+        draft.of_recipe = draft.plan().ok().map(|own| Box::new([plan, own]));
+        draft
     }
 
     /// This import with what the user has chosen in an older one, as far as it fits the files.
@@ -41,7 +56,15 @@ impl Draft {
         self.conditions.clone_from(&older.conditions);
         self.missing.clone_from(&older.missing);
         self.plan.import.units.clone_from(&older.plan.import.units);
-        self.plan.import.dialect = older.plan.import.dialect;
+        let (division, before) = (&mut self.plan.division, &older.plan.division);
+        division.test_fraction = before.test_fraction;
+        division.validation_fraction = before.validation_fraction;
+        if before.by == SplitBy::Random {
+            division.by = before.by;
+        }
+        if older.plan.test.is_some() {
+            self.plan.test.clone_from(&older.plan.test);
+        }
         for ((path, name), meaning) in &older.chosen {
             for file in 0..self.files.len() {
                 let columns = &self.files[file].inspection.columns;
@@ -126,14 +149,17 @@ impl Draft {
         }
     }
 
-    /// Paths of all files, those of the test too.
+    /// Paths of the files, but for those of the test.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
-        let test = self
-            .plan
-            .test
-            .iter()
-            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
-        self.files.iter().map(|file| &file.path).chain(test).cloned().collect()
+        self.files.iter().map(|file| file.path.clone()).collect()
+    }
+
+    /// Paths of the files for the test.
+    pub(super) fn test_paths(&self) -> Vec<PathBuf> {
+        let test = self.plan.test.iter();
+        test.flat_map(|test| std::iter::once(&test.data).chain(&test.join))
+            .cloned()
+            .collect()
     }
 
     /// Adds a file of test samples: in the place of the first file, then in those of the joined ones.
@@ -181,7 +207,11 @@ impl Draft {
         for (number, joined) in import.join.iter_mut().enumerate() {
             joined.time = times.as_ref().map(|times| times[number + 1].clone());
         }
-        Ok(plan)
+        // What has not changed keeps its words, such as ranges of columns.
+        match self.of_recipe.as_deref() {
+            Some([recipe, own]) if *own == plan => Ok(recipe.clone()),
+            _ => Ok(plan),
+        }
     }
 
     /// Reason for which there is nothing to train on yet, with what to do.

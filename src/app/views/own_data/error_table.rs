@@ -59,7 +59,11 @@ pub(super) fn error_tables_ui(ui: &mut Ui, targets: &[Channel], rows: &[(&'stati
 }
 
 fn cells(errors: &TargetErrors) -> Vec<String> {
-    let decimals = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"));
+    let decimals = |value: Option<f64>| match value {
+        Some(r2) if r2.abs() < 5e-5 => "0.0000".to_owned(),
+        Some(r2) if r2 > -1e4 => format!("{r2:.4}").replace('-', "−"),
+        other => format_number(other),
+    };
     vec![
         format_number(errors.rmse),
         format_number(errors.mae),

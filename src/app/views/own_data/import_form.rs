@@ -74,11 +74,12 @@ pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Ef
     section_heading_ui(ui, "Files");
     let mut closed = None;
     if let Some(draft) = &view.draft {
-        for (number, path) in draft.paths().iter().enumerate() {
+        let (paths, test) = (draft.paths(), draft.test_paths());
+        for (number, path) in paths.iter().chain(&test).enumerate() {
             let name = file_name(path);
             let what = match number {
                 0 => "",
-                _ if number < draft.files.len() => ", joined",
+                _ if number < paths.len() => ", joined",
                 _ => ", for the test",
             };
             ui.horizontal(|ui| {

@@ -112,14 +112,61 @@ pub(super) struct Validated {
     pub(super) remarks: Vec<String>,
 }
 
-/// Two targets that are positions in one unit, for a map: lengths, or without units.
+/// Two targets that are positions in one unit, for a map: lengths, or without units coordinates by their names. Columns
+/// without names may be anything, and so coordinates too.
 pub(super) fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
     const LENGTHS: [&str; 6] = ["m", "cm", "mm", "µm", "um", "nm"];
     let may_be = |channel: &Channel| match &channel.unit {
-        None => true,
+        None => is_coordinate(&channel.name),
         Some(unit) => LENGTHS.contains(&unit.trim()),
     };
     let pairs = (0..targets.len()).flat_map(|one| (one + 1..targets.len()).map(move |other| [one, other]));
-    let mut pairs = pairs.filter(|[one, other]| may_be(&targets[*one]) && targets[*one].unit == targets[*other].unit);
+    let mut pairs = pairs.filter(|[one, other]| {
+        may_be(&targets[*one]) && targets[*one].unit == targets[*other].unit && may_be(&targets[*other])
+    });
     pairs.next()
+}
+
+/// Tells whether a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.
+fn is_coordinate(name: &str) -> bool {
+    let own = name.rsplit('.').next().unwrap_or(name).to_lowercase();
+    let has_no_header = own
+        .strip_prefix('c')
+        .is_some_and(|number| number.parse::<usize>().is_ok());
+    let last = own
+        .rsplit(|letter: char| !letter.is_alphanumeric())
+        .next()
+        .unwrap_or_default();
+    has_no_header || ["x", "y", "z", "px", "py", "pz"].contains(&last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_needs_two_coordinates_in_one_unit() {
+        let targets = |texts: &[(&str, Option<&str>)]| -> Vec<Channel> {
+            let channel = |(name, unit): &(&str, Option<&str>)| Channel {
+                name: (*name).to_owned(),
+                unit: unit.map(str::to_owned),
+            };
+            texts.iter().map(channel).collect()
+        };
+        let cases: [(&[(&str, Option<&str>)], Option<[usize; 2]>); 7] = [
+            (&[("x", Some("mm")), ("y", Some("mm"))], Some([0, 1])),
+            (
+                &[("force", Some("N")), ("a", Some("mm")), ("b", Some("mm"))],
+                Some([1, 2]),
+            ),
+            (&[("x", Some("mm")), ("y", Some("cm"))], None),
+            (&[("fx", Some("N")), ("fy", Some("N"))], None),
+            (&[("states.c2", None), ("states.c3", None)], Some([0, 1])),
+            (&[("probe_x", None), ("probe.y", None)], Some([0, 1])),
+            (&[("weight", None), ("waist", None)], None),
+        ];
+        for (texts, expected) in cases {
+            assert_eq!(position_pair(&targets(texts)), expected, "{texts:?}");
+        }
+    }
 }

@@ -87,7 +87,6 @@ impl OwnDataView {
             Opened::Checkpoint(path, file, draft) => {
                 self.draft = draft.map(|draft| *draft).or(self.draft.take());
                 self.settings = file.settings.into();
-                self.shown = None;
                 self.asked = Some(self.settings);
                 self.tab = Tab::Results;
                 self.begin(Task::Resume(path, file));
@@ -107,7 +106,7 @@ impl OwnDataView {
         match event {
             TrainingEvent::Reading(progress) => self.reading = Some(progress),
             TrainingEvent::Progressed(mut trained) => {
-                let is_first = self.shown.is_none();
+                let is_first = std::mem::take(&mut self.is_beginning);
                 trained.name = self.runs.name_of(&trained);
                 self.phase = trained.phase;
                 if is_first {
@@ -127,6 +126,8 @@ impl OwnDataView {
             TrainingEvent::Refused(reason) => effects.push(failed(&reason)),
             TrainingEvent::Ended(ended) => {
                 if let Err(reason) = ended {
+                    // The training on show, if there is one, is of an older thread.
+                    self.asked = None;
                     effects.push(failed(&reason));
                 }
                 self.is_validating = false;

@@ -12,16 +12,29 @@ use super::{
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     export::{DocumentKind, MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
-    import::{DialectChoice, Joined, Plan, Progress, Recipe, suggested_plan},
+    import::{DialectChoice, InspectedFile, Joined, Missing, Plan, Progress, Recipe, suggested_plan},
 };
 
 /// Files to be opened.
 #[derive(Clone, Debug)]
 pub(super) enum ToOpen {
-    /// Recordings to begin with or to be added to others, or a file of this program.
-    Files(Vec<PathBuf>, DialectChoice),
-    /// Files of a plan, looked at anew.
+    /// Recordings, or a file of this program.
+    Files(Files),
+    /// Files of a plan.
     Plan(Box<Plan>),
+}
+
+/// Recordings to be opened.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Files {
+    /// Files to be opened: one may be a recipe, a network or a checkpoint.
+    pub(super) new: Vec<PathBuf>,
+    /// Files that are open, to which recordings are added.
+    pub(super) open: Vec<PathBuf>,
+    /// Layout of files of text, as far as the user has told it.
+    pub(super) dialect: DialectChoice,
+    /// Cells that mean missing.
+    pub(super) missing: Vec<Missing>,
 }
 
 /// What was opened.
@@ -65,7 +78,8 @@ impl Opening {
     /// Opens files; those still being opened are let go.
     pub(super) fn start(&mut self, to_open: ToOpen) {
         let paths = match &to_open {
-            ToOpen::Files(paths, _) => paths.clone(),
+            ToOpen::Files(files) if files.new.is_empty() => files.open.clone(),
+            ToOpen::Files(files) => files.new.clone(),
             ToOpen::Plan(plan) => vec![plan.import.data.clone()],
         };
         let names: Vec<String> = paths.iter().map(|path| file_name(path)).collect();
@@ -110,40 +124,53 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             ControlFlow::Continue(())
         }
     };
-    let (paths, dialect) = match to_open {
-        ToOpen::Plan(plan) => return Ok(Opened::Import(inspected(*plan, &mut watch)?)),
-        ToOpen::Files(paths, dialect) => (paths, dialect),
+    let files = match to_open {
+        ToOpen::Plan(plan) => return Ok(Opened::Import(inspected(*plan, Draft::of_recipe, &mut watch)?)),
+        ToOpen::Files(files) => files,
     };
-    if let [path] = &paths[..]
-        && let Some(kind) = DocumentKind::of_file(path)
-    {
-        return open_document(kind, path, &mut watch);
+    for path in &files.new {
+        match (DocumentKind::of_file(path), files.new.len()) {
+            (None, _) => {}
+            (Some(kind), 1) => return open_document(kind, path, &mut watch),
+            (Some(kind), _) => {
+                return Err(format!("'{}' is a {kind}: open it without other files", path.display()));
+            }
+        }
+    }
+    let mut paths = files.open;
+    for path in files.new {
+        if !paths.contains(&path) {
+            paths.push(path);
+        }
     }
     let mut paths = paths.into_iter();
-    let first = paths.next().unwrap_or_default();
     let recipe = Recipe {
-        data: first,
+        data: paths.next().unwrap_or_default(),
         join: paths
             .map(|file| Joined {
                 file,
                 ..Joined::default()
             })
             .collect(),
-        dialect,
+        dialect: files.dialect,
+        missing: files.missing,
         ..Recipe::default()
     };
-    let files = recipe
-        .inspect(Path::new(""), &mut watch)
-        .map_err(|error| error.to_string())?;
-    let mut plan = suggested_plan(&files);
-    plan.import.dialect = dialect;
-    Ok(Opened::Recordings(inspected(plan, &mut watch)?))
+    let inspected_files = recipe.inspect(Path::new(""), &mut watch);
+    let mut plan = suggested_plan(&inspected_files.map_err(|error| error.to_string())?);
+    plan.import.dialect = recipe.dialect;
+    plan.import.missing = recipe.missing;
+    Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
 }
 
 /// The import of a plan.
-fn inspected(plan: Plan, watch: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Result<Box<Draft>, String> {
+fn inspected(
+    plan: Plan,
+    draft: fn(Plan, Vec<InspectedFile>) -> Draft,
+    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Box<Draft>, String> {
     let files = plan.import.inspect(Path::new(""), watch);
-    Ok(Box::new(Draft::new(plan, files.map_err(|error| error.to_string())?)))
+    Ok(Box::new(draft(plan, files.map_err(|error| error.to_string())?)))
 }
 
 fn open_document(
@@ -154,17 +181,17 @@ fn open_document(
     match kind {
         DocumentKind::Recipe => {
             let plan = RecipeFile::load(path).map_err(|error| error.to_string())?;
-            Ok(Opened::Import(inspected(plan, watch)?))
+            Ok(Opened::Import(inspected(plan, Draft::of_recipe, watch)?))
         }
         DocumentKind::MeasuredNetwork => {
             let file = MeasuredNetworkFile::load(path).map_err(|error| error.to_string())?;
-            let draft = inspected(file.plan.clone(), watch).ok();
+            let draft = inspected(file.plan.clone(), Draft::of_recipe, watch).ok();
             let trained = opened_network(file, watch);
             Ok(Opened::Network(Box::new(trained), draft))
         }
         DocumentKind::MeasuredCheckpoint => {
             let file = MeasuredCheckpointFile::load(path).map_err(|error| error.to_string())?;
-            let draft = inspected(file.plan.clone(), watch).ok();
+            let draft = inspected(file.plan.clone(), Draft::of_recipe, watch).ok();
             Ok(Opened::Checkpoint(path.to_owned(), Box::new(file), draft))
         }
         DocumentKind::Network => Err(format!(

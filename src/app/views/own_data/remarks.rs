@@ -1,6 +1,9 @@
 //! Sentences about errors, splits and imports, in the words of the terminal.
 
-use crate::{dataset::SplitBy, evaluation::TargetErrors, export::format_number, import::Channel};
+use crate::{
+    app::widgets::fields::capitalised, dataset::SplitBy, evaluation::TargetErrors, export::format_number,
+    import::Channel,
+};
 
 /// R² on the test samples below which readings hardly tell a target.
 const HARDLY: f64 = 0.4;
@@ -11,7 +14,9 @@ pub(super) fn judgements(channels: &[Channel], network: &[TargetErrors], ridge: 
     for ((channel, network), ridge) in channels.iter().zip(network).zip(ridge) {
         let name = &channel.name;
         match network.r2 {
-            None => remarks.push(format!("{name} is constant in the test samples: nothing can be judged")),
+            None => remarks.push(format!(
+                "the target {name} is constant in the test samples: nothing can be judged"
+            )),
             Some(r2) if r2 < HARDLY => remarks.push(format!(
                 "the readings hardly tell {name}: R² {r2:.2} on the test samples, where always answering their mean has 0"
             )),
@@ -69,11 +74,14 @@ pub(super) fn in_window(error: &str) -> String {
     text
 }
 
-/// The text with a capital and a full stop.
+/// The text with a full stop, and with a capital unless it begins with the name of a column or file.
 pub(super) fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    let mut sentence: String = first.chain(letters).collect();
+    const WORDS: [&str; 9] = ["the", "for", "no", "none", "there", "a", "all", "always", "column"];
+    let first = text.split_whitespace().next().unwrap_or_default();
+    let mut sentence = text.to_owned();
+    if WORDS.contains(&first) {
+        sentence = capitalised(&sentence);
+    }
     if !sentence.ends_with(['.', '!', '?']) {
         sentence.push('.');
     }

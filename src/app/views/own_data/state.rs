@@ -12,14 +12,14 @@ use super::{
     draft::{Draft, file_name},
     keeping::Keeping,
     model::{Trained, Validated},
-    opening::{Opening, ToOpen},
+    opening::{Files, Opening, ToOpen},
     runs::Runs,
     training::{Command, Task, Trainer, ValidationChoice},
 };
 use crate::{
     app::{job::Wake, shared::Phase},
     evaluation::{Measured, RunSettings},
-    import::{DialectChoice, Meaning, Progress},
+    import::{Meaning, Progress},
     scene::RowModel,
 };
 
@@ -37,6 +37,8 @@ pub struct OwnDataView {
     pub(super) trainer: Trainer,
     /// State of the trainer.
     pub(super) phase: Phase,
+    /// True until the first news of a training.
+    pub(super) is_beginning: bool,
     /// How far a file is read before a training.
     pub(super) reading: Option<Progress>,
     /// The network on show: in training, ended, or opened.
@@ -99,6 +101,7 @@ impl OwnDataView {
             },
             trainer: Trainer::new(Arc::clone(&wake)),
             phase: Phase::Idle,
+            is_beginning: false,
             reading: None,
             shown: None,
             asked: None,
@@ -116,47 +119,45 @@ impl OwnDataView {
     }
 
     /// Opens files: recordings are added to those that are open already.
-    pub(super) fn open(&mut self, mut paths: Vec<PathBuf>) {
-        if self.phase.is_busy() {
-            return;
-        }
-        let mut dialect = DialectChoice::default();
-        if let Some(draft) = &self.draft {
-            let is_document = |path: &PathBuf| crate::export::DocumentKind::of_file(path).is_some();
-            if !paths.iter().any(is_document) {
-                let mut all = draft.paths();
-                paths.retain(|path| !all.contains(path));
-                all.append(&mut paths);
-                paths = all;
-                dialect = draft.plan.import.dialect;
-            }
-        }
-        if !paths.is_empty() {
-            self.opening.start(ToOpen::Files(paths, dialect));
+    pub(super) fn open(&mut self, paths: Vec<PathBuf>) {
+        if !self.phase.is_busy() {
+            let open = self.draft.as_ref().map(Draft::paths).unwrap_or_default();
+            self.open_with(paths, open);
         }
     }
 
     /// Closes a file; without the last one there is no import.
     pub(super) fn close(&mut self, file: usize) {
-        let Some(draft) = &self.draft else { return };
+        let Some(draft) = &mut self.draft else { return };
         let mut paths = draft.paths();
-        if file < paths.len() {
-            paths.remove(file);
+        if file >= paths.len() {
+            draft.plan.test = None;
+            return;
         }
+        paths.remove(file);
         if paths.is_empty() {
             self.draft = None;
             self.opening.cancel();
         } else {
-            let dialect = draft.plan.import.dialect;
-            self.opening.start(ToOpen::Files(paths, dialect));
+            self.open_with(Vec::new(), paths);
         }
     }
 
     /// Looks at the files anew, with the layout and the missing cells of the draft.
     pub(super) fn look_again(&mut self) {
-        if let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) {
-            self.opening.start(ToOpen::Plan(Box::new(plan)));
+        if let Some(draft) = &self.draft {
+            self.open_with(Vec::new(), draft.paths());
         }
+    }
+
+    fn open_with(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
+        let import = self.draft.as_ref().map(|draft| &draft.plan.import);
+        self.opening.start(ToOpen::Files(Files {
+            new,
+            open,
+            dialect: import.map(|import| import.dialect).unwrap_or_default(),
+            missing: import.map(|import| import.missing.clone()).unwrap_or_default(),
+        }));
     }
 
     /// Reason for which no training can begin, with what to do.
@@ -176,7 +177,6 @@ impl OwnDataView {
         let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) else {
             return;
         };
-        self.shown = None;
         self.asked = Some(self.settings);
         self.begin(Task::Train(Box::new(plan), self.settings));
     }
@@ -196,6 +196,7 @@ impl OwnDataView {
 
     pub(super) fn begin(&mut self, task: Task) {
         self.reading = None;
+        self.is_beginning = true;
         self.phase = Phase::Preparing;
         self.trainer.start(task);
     }
@@ -265,9 +266,13 @@ impl OwnDataView {
         };
         match (&trained.tested, path) {
             // Its test samples are read again.
-            (None, Some(path)) => self
-                .opening
-                .start(ToOpen::Files(vec![path.clone()], DialectChoice::default())),
+            (None, Some(path)) => {
+                let new = vec![path.clone()];
+                self.opening.start(ToOpen::Files(Files {
+                    new,
+                    ..Files::default()
+                }));
+            }
             _ => {
                 let trained = trained.clone();
                 self.settings = trained.file.settings.into();
