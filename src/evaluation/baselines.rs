@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, RunError, RunSettings, Source};
+use super::{Errors, NoReference, RunError, RunSettings, Source};
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::{AffineMap, TrainingMean},
@@ -20,6 +20,9 @@ pub struct Baselines {
     /// [`reference_errors`](super::reference_errors). Absent from older files.
     #[serde(default)]
     pub reference: Option<Errors>,
+    /// Reason for which there is no reference, if one was sought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_reference: Option<NoReference>,
 }
 
 /// Name of the linear baseline in tables.
@@ -30,12 +33,15 @@ pub(super) fn linear_name(source: &Source) -> &'static str {
     }
 }
 
-/// Fits the baselines: the training mean, and an affine map on the readings. For simulated samples that is the one of
-/// least squares; measured ones can be too few or too alike for it, so theirs is ridge regression.
+/// Fits the baselines: the training mean, of each row-wire where networks are told theirs, and an affine map on the readings.
+/// For simulated samples that is the one of least squares, over all row-wires, for those of one can be fewer than its
+/// readings; measured ones can be too few or too alike for it, so theirs is ridge regression.
 pub(super) fn fit_baselines(
     training: &Dataset,
     settings: &RunSettings,
-) -> Result<(TrainingMean, PerRow<AffineMap>), RunError> {
+) -> Result<(PerRow<TrainingMean>, PerRow<AffineMap>), RunError> {
+    let mean = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
+    let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
     let linear = match settings.source {
         Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
         Source::Measured(measured) => {
@@ -43,5 +49,5 @@ pub(super) fn fit_baselines(
             PerRow::fit(training, measured.rows, ridge)?
         }
     };
-    Ok((TrainingMean::fit(training), linear))
+    Ok((mean, linear))
 }

@@ -3,11 +3,6 @@ use std::time::Duration;
 /// Text in place of a missing number.
 const NO_NUMBER: &str = "–";
 
-/// `1 sample`, `2 samples`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
 /// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from
 /// 100000; a dash for none, NaN and infinity.
 pub fn format_number(value: impl Into<Option<f64>>) -> String {

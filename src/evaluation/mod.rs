@@ -61,7 +61,7 @@ pub use preset::{Preset, PresetError};
 pub use pressed::{Pressed, PressedAnswer};
 pub use published::{PublishedErrors, published_errors};
 pub use ready::ready_settings;
-pub use reference::reference_errors;
+pub use reference::{NoReference, reference_errors};
 pub use reference_note::ReferenceNote;
 pub use remark::{Cause, Remark, error_remarks};
 pub use run::{NodeScores, Run};

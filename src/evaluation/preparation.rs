@@ -3,7 +3,8 @@ use std::{sync::Arc, time::Instant};
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, Run, RunError, RunSettings, SimulatedSettings, StartTrainer, TargetErrors, TargetRow,
+    Baselines, Errors, NoReference, Run, RunError, RunSettings, SimulatedSettings, StartTrainer, TargetErrors,
+    TargetRow,
     baselines::{fit_baselines, linear_name},
     reference_errors,
     sets::check_sets,
@@ -118,10 +119,12 @@ impl Run {
         let baselines = match settings.simulated() {
             Some(simulated) => {
                 let errors = |answers| Errors::measure(&test, answers, simulated.source.stroke_mm());
+                let reference = reference(&simulated, &test)?;
                 Some(Baselines {
                     mean: errors(&mean),
                     linear: errors(&linear),
-                    reference: reference(&simulated, &test)?,
+                    reference: reference.ok(),
+                    no_reference: reference.err(),
                 })
             }
             None => None,
@@ -208,8 +211,8 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     }
 }
 
-/// The errors of the Bayesian reference on `test`; `None` where a posterior did not converge.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Option<Errors>, RunError> {
+/// The errors of the Bayesian reference on `test`, or the reason for which there are none.
+pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Result<Errors, NoReference>, RunError> {
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);
     Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)

@@ -1,13 +1,13 @@
 use std::fmt;
 
-use super::Baselines;
+use super::{Baselines, NoReference};
 
 /// Reasons for which the Bayesian reference of an error table is no bound for decoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReferenceNote {
-    /// There is none: a posterior did not converge.
-    Missing,
+    /// There is none.
+    Missing(NoReference),
     /// Its error is above that of the training mean.
     AboveMean,
 }
@@ -16,7 +16,7 @@ impl ReferenceNote {
     /// The note on the reference of these baselines; `None` if it is a bound.
     pub fn of(baselines: &Baselines) -> Option<Self> {
         match baselines.reference {
-            None => Some(Self::Missing),
+            None => baselines.no_reference.map(Self::Missing),
             Some(reference) if reference.z_mm > baselines.mean.z_mm => Some(Self::AboveMean),
             Some(_) => None,
         }
@@ -26,9 +26,14 @@ impl ReferenceNote {
 impl fmt::Display for ReferenceNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Missing => {
+            Self::Missing(NoReference::NotConverged) => {
                 "There is no Bayesian reference: the posterior of some row did not converge. Lower the compression, or let \
                  nodes move along z only."
+            }
+            Self::Missing(NoReference::Rounding) => {
+                "There is no Bayesian reference: the deformation shows in the last digits of the readings only, so that their \
+                 rounding decides what can be known. Raise the compression or the height, or let nodes move along z only; \
+                 with noise of 1e-12 or more there is one."
             }
             Self::AboveMean => {
                 "The Bayesian reference is no bound here, for it is above the training mean: the readings tell next to \
@@ -58,6 +63,7 @@ mod tests {
             mean: off(0.25),
             linear: off(0.1),
             reference,
+            no_reference: reference.is_none().then_some(NoReference::NotConverged),
         };
         assert_eq!(ReferenceNote::of(&baselines(Some(off(0.2)))), None);
         assert_eq!(

@@ -1,9 +1,10 @@
 use std::fmt;
 
-use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors, format::counted};
+use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors};
 use crate::{
     decoupling::{DecoderKind, Precision, SolvedRows},
     scene::{Noise, NoisySets},
+    sensor::counted,
     training::{Method, StopReason},
 };
 

@@ -59,7 +59,7 @@ pub fn measure_trade_off(
 ) -> Result<bool, RunError> {
     let mut set = DecoderSet::new(settings, None)?;
     let test = settings.draw_test()?;
-    let reference = reference(settings, &test)?;
+    let reference = reference(settings, &test)?.ok();
     let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) =
         decoders.iter().partition(|kind| kind.needs_network());
     for kind in without {

@@ -29,12 +29,10 @@ impl Heading {
                 column: error.column(),
             };
             // To the parser a number that ends with the file, as "1e", is invalid; to us the file was cut off.
-            let in_last_number =
-                error.to_string().starts_with("invalid number") && !bytes.trim_ascii_end().ends_with(b"}");
             match error.classify() {
                 _ if bytes.trim_ascii().is_empty() => NoHeading::NotJson("it is empty".to_owned()),
                 Category::Eof => cut_off,
-                Category::Syntax if in_last_number => cut_off,
+                Category::Syntax if in_last_number(bytes, &error) => cut_off,
                 Category::Data => NoHeading::Other,
                 Category::Syntax | Category::Io => NoHeading::NotJson(error.to_string()),
             }
@@ -51,4 +49,15 @@ impl Heading {
     pub(super) fn program(&self) -> String {
         self.program.as_str().unwrap_or("another program").to_owned()
     }
+}
+
+/// Returns whether the parser stopped in a number with which the file ends, as `1e`: to the parser it is invalid, to us
+/// the file was cut off.
+fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
+    let text = bytes.trim_ascii_end();
+    let last_line = text.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+    let lines = 1 + text.iter().filter(|byte| **byte == b'\n').count();
+    error.to_string().starts_with("invalid number")
+        && (error.line(), error.column()) >= (lines, last_line.len())
+        && !text.ends_with(b"}")
 }

@@ -13,7 +13,7 @@ pub(super) const LARGEST_BYTES: u64 = 1 << 30;
 /// Length of the beginning that shows whether the rest is worth reading.
 const BEGINNING: u64 = 1 << 16;
 
-/// Reads the file of JSON at `path`. Where the beginning shows that it is none, only the beginning is returned.
+/// Reads the file of JSON at `path`. Where the beginning shows that it is none of ours, only the beginning is returned.
 ///
 /// # Errors
 /// The operating system refuses, or the file does not end within [`LARGEST_BYTES`].
@@ -25,7 +25,7 @@ pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
     }
     let mut bytes = Vec::new();
     (&file).take(BEGINNING).read_to_end(&mut bytes)?;
-    if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_))) {
+    if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
         return Ok(bytes);
     }
     // A pipe or device tells no length.
@@ -47,6 +47,8 @@ pub(super) fn too_large() -> io::Error {
 mod tests {
     use std::fs;
 
+    use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
+
     use super::*;
 
     #[test]
@@ -62,6 +64,19 @@ mod tests {
         let cut = &json.as_bytes()[..150_000];
         assert_eq!(read(cut), cut);
         assert_eq!(read(&[b'x'; 100_000]).len(), 1 << 16);
+    }
+
+    #[test]
+    fn only_the_beginning_is_read_of_random_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let mut bytes = vec![0; 100_000];
+        ChaCha8Rng::seed_from_u64(0).fill_bytes(&mut bytes);
+        for first in 0..=u8::MAX {
+            bytes[0] = first;
+            fs::write(&path, &bytes).unwrap();
+            assert_eq!(read_limited(&path).unwrap().len(), 1 << 16, "first byte {first}");
+        }
     }
 
     #[test]

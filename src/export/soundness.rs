@@ -19,11 +19,13 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         network,
         training,
         errors,
-        baselines: Baselines {
-            mean,
-            linear,
-            reference,
-        },
+        baselines:
+            Baselines {
+                mean,
+                linear,
+                reference,
+                no_reference: _,
+            },
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();

@@ -23,6 +23,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(super) struct Likelihood {
     noise: NoiseSource,
+    rounding: f64,
 }
 
 /// Rounding of a reading that comes from a few operations in double precision, as a standard deviation.
@@ -30,7 +31,18 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Likelihood {
     pub(super) fn new(noise: NoiseSource) -> Self {
-        Self { noise }
+        Self {
+            noise,
+            rounding: ROUNDING,
+        }
+    }
+
+    /// The same with readings rounded to a part of `parts` of what they are taken to be rounded to.
+    pub(super) fn rounded_finer(&self, parts: f64) -> Self {
+        Self {
+            rounding: self.rounding / parts,
+            ..self.clone()
+        }
     }
 
     /// True if readings share an error, which is then the last unknown.
@@ -61,7 +73,7 @@ impl Likelihood {
     }
 
     fn deviation_ohm(&self, predicted_ohm: f64) -> f64 {
-        let relative = libm::hypot(self.noise.relative(), ROUNDING);
+        let relative = libm::hypot(self.noise.relative(), self.rounding);
         libm::hypot(relative * predicted_ohm, self.noise.additive_ohm())
     }
 

@@ -64,6 +64,15 @@ impl Posterior {
         })
     }
 
+    /// The same posterior of readings rounded to a part of `parts` of what they are taken to be rounded to: how finely they
+    /// are is known to its order of magnitude only.
+    pub(crate) fn rounded_finer(&self, parts: f64) -> Self {
+        Self {
+            likelihood: self.likelihood.rounded_finer(parts),
+            ..self.clone()
+        }
+    }
+
     /// Decodes one row-wire of those given, from its readings in ohm (M4); writes absolute coordinates (3·M2).
     ///
     /// # Errors

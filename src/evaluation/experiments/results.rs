@@ -138,6 +138,7 @@ pub(super) mod tests {
                 mean: errors(5.5),
                 linear: errors(1.6),
                 reference: None,
+                no_reference: None,
             },
             bottleneck: errors(0.0),
             networks: 1,

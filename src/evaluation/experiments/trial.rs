@@ -104,6 +104,7 @@ impl Trial {
                 mean: errors(&validated.mean),
                 linear: errors(&validated.linear),
                 reference: None,
+                no_reference: None,
             },
             bottleneck: errors(&bottleneck),
             networks: validated.folds.count(),

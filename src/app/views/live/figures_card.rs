@@ -11,9 +11,9 @@ use crate::{
         theme::{Theme, space, type_size},
         widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
     },
-    evaluation::format::counted,
     export::{format_duration, format_number, format_percent},
     live::{FaultyWire, ZeroGains},
+    sensor::counted,
 };
 
 /// Confidence, faults, the stream, the unloaded state and the recording.

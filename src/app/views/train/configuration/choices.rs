@@ -8,10 +8,10 @@ use crate::{
             note_ui, segmented_ui, slider_style,
         },
     },
-    evaluation::{SimulatedSettings, Workload, format::counted},
+    evaluation::{SimulatedSettings, Workload},
     export::describe_workload,
     network::{HiddenSuggestions, LARGEST_HIDDEN},
-    sensor::ArrayScale,
+    sensor::{ArrayScale, counted},
 };
 
 /// The scale of the array: one of the paper's, or any other typed; changes `scale`.
