@@ -11,7 +11,7 @@ use super::{
     plot_figure::PlotFigure,
     ticks::{step_for, tick_text},
 };
-use crate::evaluation::format::{counted, format_number};
+use crate::{evaluation::format::format_number, sensor::counted};
 
 /// Largest number of cells along an axis of a map, but for those that round limits add.
 const CELLS: usize = 16;

@@ -14,9 +14,9 @@ use crate::{
         widgets::{dim_ui, fact_ui, note_ui, scrolled_ui, section_heading_ui},
     },
     dataset::SplitBy,
-    evaluation::format::counted,
     export::{format_duration, format_number},
     import::Plan,
+    sensor::counted,
 };
 
 /// What the import gives, and the errors of the network.
