@@ -8,17 +8,17 @@ use std::{
 
 use decoupler::{
     app::Notice,
-    dataset::{Division, Seed},
-    evaluation::{Measured, Run, RunSettings},
+    dataset::{Division, Folds, Seed, SplitBy, Stream},
+    evaluation::{CrossValidated, Measured, Run, RunSettings},
     export::{MeasuredNetworkFile, RecipeFile, format_number},
     import::{Plan, Recipe},
     scene::RowModel,
 };
-use eframe::egui::{self, vec2};
-use egui_kittest::kittest::NodeT as _;
+use eframe::egui::{self, accesskit::Role, vec2};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 use tempfile::TempDir;
 
-use crate::driver::Driver;
+use crate::{closing::close, driver::Driver};
 
 /// A file dropped on the window.
 #[derive(Debug)]
@@ -115,15 +115,20 @@ fn plan(path: &Path) -> Plan {
     }
 }
 
-/// What the library makes of the plan with the settings of the window.
-fn trained(plan: &Plan) -> Run {
+/// The settings of the window, with five epochs.
+fn settings() -> RunSettings {
     let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
     settings.starts = 3;
     settings.training.stopping.epochs = 5;
     settings.training.stopping.max_fail = 30;
+    settings
+}
+
+/// What the library makes of the plan with these settings.
+fn trained(plan: &Plan) -> Run {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
     let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
-    let mut run = Run::on_sets(settings, sets.split, sets.test).unwrap();
+    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
     while run.step().is_none() {}
     run
 }
@@ -257,7 +262,12 @@ fn two_files_are_joined_by_time_and_filtered() {
     );
     driver.mean("states.c3", "unused");
     driver.click("Rows");
-    driver.enter("Only rows with", "states.c3 < 3");
+    // The field is not left when what is typed so far cannot be understood.
+    driver.type_into("Only rows with", "s");
+    driver.settle();
+    driver.harness().event(egui::Event::Text("tates.c3 < 3".to_owned()));
+    driver.settle();
+    driver.press(egui::Key::Enter);
     driver.wait("the filtered samples", |driver| driver.says("states.c3<3 is not met"));
     driver.wait("the samples", |driver| driver.has("Test: 11"));
     assert!(driver.has("Training: 42"), "53 of 70 rows are left");
@@ -367,4 +377,131 @@ fn everything_lies_within_narrow_windows_too() {
             assert!(!one.intersects(*other), "at {size}: {one:?} and {other:?}");
         }
     }
+}
+
+/// Clicks the row of this name in the list of networks.
+#[track_caller]
+fn click_row(driver: &mut Driver, name: &str) {
+    let row = By::new().role(Role::Row).label(name);
+    driver.harness().get(row).click();
+    driver.settle();
+}
+
+#[test]
+fn networks_are_listed_compared_and_kept_from_session_to_session() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let runs = folder.path().join("runs");
+    let mut driver = Driver::open_keeping(&runs);
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("2");
+    driver.train_own_data();
+    let first = cells(&driver);
+    driver.enter("Hidden nodes", "3");
+    driver.train_own_data();
+    driver.click("Runs");
+    driver.settle();
+    click_row(&mut driver, "press h12 br");
+    let of_first = |name: &str| {
+        let all = first
+            .iter()
+            .find(|cell| cell.starts_with("x (mm), network, RMSE"))
+            .unwrap();
+        all.replace("network", name)
+    };
+    assert!(driver.has(&of_first("A")), "{:#?}", cells(&driver));
+    assert!(driver.says("x (mm), B, RMSE") && !driver.says("do not compare directly"));
+    driver.wait("both files", |_| {
+        fs::read_dir(folder.path().join("own-data")).is_ok_and(|files| files.count() == 2)
+    });
+    drop(driver);
+
+    let mut other = Driver::open_keeping(&runs);
+    other.click_button("Own data");
+    other.click("Runs");
+    let row = || By::new().role(Role::Row).label("press h12 br");
+    let latest = std::time::Instant::now() + crate::driver::PATIENCE;
+    while other.harness().query(row()).is_none() {
+        other.wait_for_frame("the list", latest);
+    }
+    click_row(&mut other, "press h12 br");
+    other.click_button("Show");
+    other.wait("the network", |driver| !cells(driver).is_empty());
+    other.settle();
+    assert_eq!(cells(&other), first);
+    assert!(other.has("Error over the position"), "its recording is read again");
+}
+
+#[test]
+fn a_cross_validation_has_the_errors_of_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("5");
+    driver.click("Cross-validation");
+    driver.enter("Folds", "3");
+    driver.click_button("Cross-validate");
+    driver.wait("the folds", |driver| driver.says("3 folds by time"));
+    driver.settle();
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let recording = plan(&path).recording(Path::new(""), watch).unwrap();
+    let mut rng = Seed::default().rng(Stream::Split);
+    let folds = Folds::by(&recording.set, 3, SplitBy::Time, &mut rng).unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &recording.set, folds, || false)
+        .unwrap()
+        .unwrap();
+    let errors = validated.target_table(&recording.set)[2].targets[1];
+    let cell = format!("y (mm), network, RMSE: {}", format_number(errors.rmse));
+    assert!(driver.has(&cell), "{cell} is not among {:#?}", cells(&driver));
+    assert!(
+        driver.says("the readings") || driver.says("The readings"),
+        "what they tell is said"
+    );
+}
+
+#[test]
+fn a_column_of_groups_divides_the_samples_by_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "session,u,v,force (N)\n".to_owned();
+    for row in 0..50 {
+        let (u, v) = (f64::from(row % 7), f64::from(row % 5));
+        writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
+    }
+    let path = written(&folder, "sessions.csv", &text);
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
+    // Another group takes its place, and without one the samples are divided in time.
+    driver.mean("u", "group");
+    assert_eq!(
+        driver.get("Meaning of session").accesskit_node().value().as_deref(),
+        Some("unused")
+    );
+    driver.mean("u", "input");
+    assert!(driver.says("time, 20 % test"));
+}
+
+#[test]
+fn closing_asks_about_a_training_on_own_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("100000");
+    driver.click("▶ Train");
+    driver.wait("an epoch", |driver| !cells(driver).is_empty());
+    driver.click("⏸ Pause");
+    driver.wait("the hold", |driver| driver.has("Paused"));
+    assert!(!close(&mut driver), "the training is not lost unasked");
+    driver.harness().run_steps(2);
+    assert!(
+        driver.says("The training of the Own data view has not ended"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button("Stay");
+    driver.click("■ Stop");
+    driver.wait("the end", |driver| driver.says("Ended: "));
 }

@@ -22,11 +22,13 @@ const ROW_HEIGHT: f32 = space(7);
 const HEADINGS: [(&str, f32); 6] = [
     ("column", 0.0),
     ("meaning", space(26)),
-    ("unit", space(15)),
-    ("values", space(24)),
-    ("from – to", space(40)),
+    ("unit", space(13)),
+    ("values", space(22)),
+    ("from – to", space(44)),
     ("missing", space(15)),
 ];
+/// Headings of figures, which stand at the right.
+const FIGURES: [&str; 2] = ["from – to", "missing"];
 /// Least widths of the name and of the remarks, which share what the others leave.
 const LEAST_NAME: f32 = space(28);
 const LEAST_NOTE: f32 = space(26);
@@ -94,7 +96,17 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
     let table = table.header(ROW_HEIGHT, |mut heading| {
         for text in HEADINGS.iter().map(|(text, _)| *text).chain(["remarks"]) {
             heading.col(|ui| {
-                ui.label(RichText::new(text).size(type_size().small).color(palette.dim));
+                let text = RichText::new(text).size(type_size().small).color(palette.dim);
+                if FIGURES.contains(&text.text()) {
+                    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                        ui.add_space(space(1));
+                        ui.label(text);
+                    });
+                    return;
+                }
+                // Remarks keep clear of the figures before them.
+                ui.add_space(if text.text() == "remarks" { space(2) } else { 0.0 });
+                ui.label(text);
             });
         }
     });
@@ -139,6 +151,7 @@ fn file_ui(row: &mut TableRow<'_, '_>, draft: &Draft, file: usize, palette: &Pal
     }
     row.col(|ui| {
         let text = format!("{} rows", inspected.inspection.rows);
+        ui.add_space(space(2));
         ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
     });
     change

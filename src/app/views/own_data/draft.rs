@@ -216,12 +216,14 @@ impl Draft {
 
     /// Reason for which there is nothing to train on yet, with what to do.
     pub(super) fn obstacle(&self) -> Option<String> {
-        if self.plan().is_err() {
-            return self.plan().err();
-        }
-        let missing = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
-        let missing = missing.into_iter().find(|(meaning, _)| !self.has(*meaning));
-        missing.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
+        self.plan().err().or_else(|| self.lack())
+    }
+
+    /// Says which meaning no column has yet.
+    pub(super) fn lack(&self) -> Option<String> {
+        let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
+        let lacking = needed.into_iter().find(|(meaning, _)| !self.has(*meaning));
+        lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
     }
 
     /// The files joined, with their number in the list of files.

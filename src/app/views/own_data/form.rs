@@ -40,7 +40,7 @@ pub(super) fn form_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Eff
         }
         ui.add_space(space(2));
         ui.separator();
-        if let Some(reason) = view.draft.as_ref().and_then(|draft| draft.obstacle()) {
+        if let Some(reason) = view.draft.as_ref().and_then(|draft| draft.lack()) {
             note_ui(ui, &reason);
         }
         ui.add_enabled_ui(!is_busy, |ui| {

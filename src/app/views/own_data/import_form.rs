@@ -1,7 +1,7 @@
 //! What the user says of the files: which they are, how they are laid out and joined, which rows count, and how the
 //! samples are divided.
 
-use eframe::egui::{Align, Label, Layout, Response, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Id, Label, Layout, Response, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
     draft::{Draft, file_name, missing},
@@ -256,8 +256,8 @@ fn rows_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
 /// A text with its name above.
 fn text_ui(ui: &mut Ui, name: &str, hint: &str, example: &str, text: &mut String) -> Response {
     let label = ui.label(name).on_hover_text(hint);
-    let edit = TextEdit::singleline(text)
-        .desired_width(f32::INFINITY)
-        .hint_text(example);
+    // Notes come and go above while it is being typed.
+    let edit = TextEdit::singleline(text).id(Id::unique(("own data", name)));
+    let edit = edit.desired_width(f32::INFINITY).hint_text(example);
     ui.add(edit).labelled_by(label.id).on_hover_text(hint)
 }

@@ -22,6 +22,7 @@ mod remarks;
 mod report;
 mod results;
 mod runs;
+mod runs_table;
 mod state;
 mod status;
 mod tools;

@@ -76,7 +76,9 @@ pub(super) fn in_window(error: &str) -> String {
 
 /// The text with a full stop, and with a capital unless it begins with the name of a column or file.
 pub(super) fn sentence(text: &str) -> String {
-    const WORDS: [&str; 9] = ["the", "for", "no", "none", "there", "a", "all", "always", "column"];
+    const WORDS: [&str; 10] = [
+        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too",
+    ];
     let first = text.split_whitespace().next().unwrap_or_default();
     let mut sentence = text.to_owned();
     if WORDS.contains(&first) {

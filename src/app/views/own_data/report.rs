@@ -56,7 +56,7 @@ fn samples_ui(ui: &mut Ui, view: &OwnDataView) {
         }
         None => {
             let reason = view.draft.as_ref().and_then(|draft| draft.obstacle());
-            dim_ui(ui, &reason.unwrap_or_default());
+            dim_ui(ui, &sentence(&reason.unwrap_or_default()));
         }
     }
 }
@@ -158,24 +158,12 @@ fn cost_ui(ui: &mut Ui, shown: &Trained) {
     ui.label(RichText::new(&shown.name).font(semibold(type_size().body)));
     let file = &shown.file;
     let settings = &file.settings;
-    fact_ui(
-        ui,
-        "Hidden nodes",
-        "Number of nodes in the tanh layer.",
-        &settings.hidden.to_string(),
-    );
-    fact_ui(
-        ui,
-        "Method",
-        "Algorithm that adjusted the weights.",
-        settings.training.method.name(),
-    );
-    fact_ui(
-        ui,
-        "Weights",
-        "Weights and biases of the network.",
-        &file.network.weights().to_string(),
-    );
+    let layers = format!("{}–{}–{}", file.inputs.len(), settings.hidden, file.targets.len());
+    fact_ui(ui, "Network", "Number of inputs, hidden nodes and targets.", &layers);
+    let weights = file.network.weights().to_string();
+    fact_ui(ui, "Weights", "Weights and biases of the network.", &weights);
+    let method = settings.training.method.name();
+    fact_ui(ui, "Trained by", "Algorithm that adjusted the weights.", method);
     let best = file.training.best_epoch.to_string();
     fact_ui(ui, "Best epoch", "Epoch of the weights that were kept.", &best);
     if let Phase::Ended(reason) = shown.phase {

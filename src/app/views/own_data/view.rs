@@ -8,7 +8,7 @@ use super::{
     form::form_ui,
     report::report_ui,
     results::results_ui,
-    runs::runs_ui,
+    runs_table::runs_ui,
     state::{OwnDataView, Tab},
     status::status_ui,
     tools,
