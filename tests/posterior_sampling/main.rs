@@ -111,11 +111,15 @@ fn medians_err_as_much_as_those_of_sampling() {
     }
 }
 
+/// The table, or of it the ARRAYS and the NOISE given in the environment, from SAMPLES rows of PARTICLES particles each.
 #[test]
 #[ignore = "prints the whole table in minutes"]
 fn table() {
-    let arrays = std::env::var("ARRAYS").unwrap_or("1x2_2x6 2x6_3x18 2x6_3x4".to_owned());
-    let (samples, particles) = (25, 500);
+    let given = |name, usual: &str| std::env::var(name).unwrap_or_else(|_| usual.to_owned());
+    let arrays = given("ARRAYS", "1x2_2x6 2x6_3x18 2x6_3x4");
+    let only = given("NOISE", "");
+    let [samples, particles] =
+        [("SAMPLES", "25"), ("PARTICLES", "500")].map(|(name, usual)| given(name, usual).parse().unwrap());
     for array in arrays.split(' ') {
         let decades = (0..=10).rev().map(|decade| 10.0_f64.powi(-decade));
         let mut cases: Vec<(String, Truth)> = Vec::new();
@@ -151,7 +155,7 @@ fn table() {
             let relative = 1e-3;
             cases.push((format!("{bits} bits with 1e-3"), Truth { relative, ..truth }));
         }
-        for (name, truth) in cases {
+        for (name, truth) in cases.into_iter().filter(|(name, _)| only.is_empty() || *name == only) {
             let e = errors(array, truth, Movement::Z, samples, particles);
             println!(
                 "{array:10} {name:22} sampled {:9.3e} reference {:6.3} decoder {:6.3} middle {:6.3}",

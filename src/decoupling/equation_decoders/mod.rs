@@ -1,6 +1,7 @@
 //! Decoders that solve the equations of the sensor.
 
 mod newton;
+mod plain_first;
 mod polished;
 mod posterior;
 mod row_search;

@@ -1,5 +1,6 @@
 use super::{
     PosteriorDecoder,
+    plain_first::PlainFirst,
     row_search::{EXPLAINED, RowSearch},
 };
 use crate::{
@@ -80,8 +81,21 @@ impl NewtonDecoder {
                 Ok((misfit, report))
             })
     }
+}
 
-    /// Solves one row; returns the standing of the answer.
+impl PlainFirst for NewtonDecoder {
+    fn answer_plainly(&mut self, first: usize, readings: &[f64], targets: &mut [f64]) -> [Option<Solution>; LANES] {
+        let count = readings.len() / self.search.channels();
+        let Some(known) = self.search.known_rows() else {
+            return [None; LANES];
+        };
+        self.newton.set_rules(self.rules);
+        let reports = self
+            .newton
+            .solve_plainly(&known[first..first + count], readings, targets);
+        reports.map(|report| Some(report?.solution))
+    }
+
     fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
         let mut report = None;
         if self.search.is_needed() {
@@ -101,6 +115,10 @@ impl NewtonDecoder {
         }
         Ok(solution)
     }
+
+    fn solved(&mut self) -> &mut SolvedRows {
+        &mut self.solved
+    }
 }
 
 impl Decoder for NewtonDecoder {
@@ -118,42 +136,8 @@ impl Decoder for NewtonDecoder {
         Ok(())
     }
 
-    /// Solves the rows side by side by plain steps, and those that want more care one by one.
     fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let (channels, outputs) = (self.channels(), self.outputs());
-        assert_eq!(readings.len() / channels, targets.len() / outputs);
-        let chunks = readings
-            .chunks(LANES * channels)
-            .zip(targets.chunks_mut(LANES * outputs));
-        for (chunk, (readings, targets)) in chunks.enumerate() {
-            let first = chunk * LANES;
-            let at_row = |error, place| DecodeError {
-                row_index: first + place,
-                ..error
-            };
-            let rows = readings.chunks_exact(channels);
-            for (place, readings) in rows.clone().enumerate() {
-                DecodeError::check(readings).map_err(|error| at_row(error, place))?;
-            }
-            let reports = match self.search.known_rows() {
-                Some(known) => {
-                    let known = &known[first..first + rows.len()];
-                    self.newton.set_rules(self.rules);
-                    self.newton.solve_plainly(known, readings, targets)
-                }
-                None => [None; LANES],
-            };
-            let rows = rows.zip(targets.chunks_exact_mut(outputs)).zip(reports);
-            for (place, ((readings, targets), report)) in rows.enumerate() {
-                match report {
-                    Some(report) => self.solved.count(report.solution),
-                    None => self
-                        .decode_row(first + place, readings, targets)
-                        .map_err(|error| at_row(error, place))?,
-                }
-            }
-        }
-        Ok(())
+        self.answer_all(readings, targets)
     }
 
     fn take_solved_rows(&mut self) -> SolvedRows {

@@ -1,5 +1,6 @@
 use rand::Rng;
 
+use super::plain_first::PlainFirst;
 use crate::{
     decoupling::{DecodeError, Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows, side_by_side::LANES},
     scene::{NoiseSource, RowModel, Scene},
@@ -64,24 +65,6 @@ impl PolishedDecoder {
         })
     }
 
-    /// Improves the answer in `targets`; returns its standing.
-    fn improve(&mut self, row_wire: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
-        match &mut self.improvement {
-            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
-            Improvement::Posterior(posterior, noise) => {
-                let report = posterior.polish(row_wire, readings, targets, self.steps)?;
-                let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
-                let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
-                // Readings that noise explains are all that a posterior can ask for.
-                Ok(if report.residual <= NOISES * variance.sqrt() {
-                    Solution::Unique
-                } else {
-                    Solution::None
-                })
-            }
-        }
-    }
-
     /// Returns the row-wire of a row with this first answer.
     fn row_wire(&self, row_index: usize, coordinates_mm: &[f64]) -> usize {
         match self.row_model {
@@ -103,6 +86,47 @@ impl PolishedDecoder {
     }
 }
 
+impl PlainFirst for PolishedDecoder {
+    /// Improves the first answers.
+    fn answer_plainly(&mut self, first: usize, readings: &[f64], targets: &mut [f64]) -> [Option<Solution>; LANES] {
+        let mut row_wires = [0; LANES];
+        let first_answers = targets.chunks_exact(self.first.outputs()).enumerate();
+        let count = first_answers.len();
+        for (place, coordinates_mm) in first_answers {
+            row_wires[place] = self.row_wire(first + place, coordinates_mm);
+        }
+        match &mut self.improvement {
+            Improvement::Newton(newton) => {
+                let reports = newton.polish_plainly(&row_wires[..count], readings, targets);
+                reports.map(|report| Some(report?.solution))
+            }
+            Improvement::Posterior(..) => [None; LANES],
+        }
+    }
+
+    fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
+        let row_wire = self.row_wire(row_index, targets);
+        match &mut self.improvement {
+            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
+            Improvement::Posterior(posterior, noise) => {
+                let report = posterior.polish(row_wire, readings, targets, self.steps)?;
+                let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
+                let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
+                // Readings that noise explains are all that a posterior can ask for.
+                Ok(if report.residual <= NOISES * variance.sqrt() {
+                    Solution::Unique
+                } else {
+                    Solution::None
+                })
+            }
+        }
+    }
+
+    fn solved(&mut self) -> &mut SolvedRows {
+        &mut self.solved
+    }
+}
+
 impl Decoder for PolishedDecoder {
     fn channels(&self) -> usize {
         self.first.channels()
@@ -114,47 +138,14 @@ impl Decoder for PolishedDecoder {
 
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         self.first.decode_row(row_index, readings, targets)?;
-        let row_wire = self.row_wire(row_index, targets);
-        let solution = self.improve(row_wire, readings, targets)?;
+        let solution = self.answer(row_index, readings, targets)?;
         self.solved.count(solution);
         Ok(())
     }
 
-    /// Improves the rows side by side where plain steps do, and others one by one.
     fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let (channels, outputs) = (self.channels(), self.outputs());
         self.first.decode(readings, targets)?;
-        let chunks = readings
-            .chunks(LANES * channels)
-            .zip(targets.chunks_mut(LANES * outputs));
-        for (chunk, (readings, targets)) in chunks.enumerate() {
-            let first = chunk * LANES;
-            let at_row = |error, place| DecodeError {
-                row_index: first + place,
-                ..error
-            };
-            let mut row_wires = [0; LANES];
-            let rows = readings.chunks_exact(channels);
-            for (place, (readings, coordinates_mm)) in rows.clone().zip(targets.chunks_exact(outputs)).enumerate() {
-                DecodeError::check(readings).map_err(|error| at_row(error, place))?;
-                row_wires[place] = self.row_wire(first + place, coordinates_mm);
-            }
-            let reports = match &mut self.improvement {
-                Improvement::Newton(newton) => newton.polish_plainly(&row_wires[..rows.len()], readings, targets),
-                Improvement::Posterior(..) => [None; LANES],
-            };
-            let rows = rows.zip(targets.chunks_exact_mut(outputs)).zip(reports).zip(row_wires);
-            for (place, (((readings, targets), report), row_wire)) in rows.enumerate() {
-                let solution = match report {
-                    Some(report) => report.solution,
-                    None => self
-                        .improve(row_wire, readings, targets)
-                        .map_err(|error| at_row(error, place))?,
-                };
-                self.solved.count(solution);
-            }
-        }
-        Ok(())
+        self.answer_all(readings, targets)
     }
 
     fn take_solved_rows(&mut self) -> SolvedRows {
