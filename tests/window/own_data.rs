@@ -115,12 +115,10 @@ fn plan(path: &Path) -> Plan {
     }
 }
 
-/// The settings of the window, with five epochs.
+/// The library's settings for measured samples, with five epochs.
 fn settings() -> RunSettings {
     let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
-    settings.starts = 3;
     settings.training.stopping.epochs = 5;
-    settings.training.stopping.max_fail = 30;
     settings
 }
 

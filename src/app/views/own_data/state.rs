@@ -75,16 +75,6 @@ pub(super) enum Tab {
     Runs,
 }
 
-/// Settings of a new training: those of the library for measured samples with the starts and the stopping rules of the
-/// terminal's.
-fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
-    settings.starts = 3;
-    settings.training.stopping.epochs = 150;
-    settings.training.stopping.max_fail = 30;
-    settings
-}
-
 impl OwnDataView {
     /// Nothing open yet. `wake` is called when there is news.
     pub fn new(wake: Wake) -> Self {
@@ -94,7 +84,7 @@ impl OwnDataView {
             draft: None,
             opening: Opening::new(Arc::clone(&wake)),
             checking: Checking::new(Arc::clone(&wake)),
-            settings: settings(),
+            settings: RunSettings::from(Measured { rows: RowModel::Shared }),
             validation: ValidationChoice {
                 folds: 5,
                 compares_random: false,
