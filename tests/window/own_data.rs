@@ -74,9 +74,7 @@ impl Driver {
     #[track_caller]
     fn train_own_data(&mut self) {
         self.click("▶ Train");
-        self.wait("the end of the training", |driver| {
-            driver.says("Ended: ") || driver.says("Finished: ")
-        });
+        self.wait("the end of the training", |driver| driver.says("Finished: "));
         self.settle();
     }
 }

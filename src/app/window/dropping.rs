@@ -38,7 +38,7 @@ impl DecouplerWindow {
         let painter = ui
             .ctx()
             .layer_painter(LayerId::new(Order::Foreground, Id::unique("dropping")));
-        let whole = ui.ctx().content_rect().shrink(space(2).into());
+        let whole = ui.ctx().content_rect().shrink(space(2));
         painter.rect_filled(whole, f32::from(radius()), palette.background.gamma_multiply(0.85));
         painter.rect_stroke(
             whole,

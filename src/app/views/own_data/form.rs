@@ -33,7 +33,7 @@ pub(super) fn form_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Eff
         ui.add_enabled_ui(!is_busy, |ui| hidden_ui(ui, view));
         let before = view.settings.training.method;
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
-            method_choice_ui(ui, &mut view.settings.training.method)
+            method_choice_ui(ui, &mut view.settings.training.method);
         });
         if view.settings.training.method.short_name() != before.short_name() && !is_held {
             view.set_held_out();
@@ -50,7 +50,7 @@ pub(super) fn form_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Eff
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
             let summary = format!("{} epochs", view.settings.training.stopping.epochs);
             fold_ui(ui, "When to stop", &summary, |ui| {
-                stopping_ui(ui, &mut view.settings.training.stopping)
+                stopping_ui(ui, &mut view.settings.training.stopping);
             });
             fold_ui(ui, "Method settings", &method_summary(&view.settings), |ui| {
                 let RunSettings { training, starts, .. } = &mut view.settings;

@@ -149,7 +149,7 @@ pub(super) fn import_folds_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut
     }
     if draft.files.iter().any(|file| matches!(file.format, Format::Text(_))) {
         fold_ui(ui, "Layout of text", &layout_summary(draft), |ui| {
-            looks_again |= layout_ui(ui, draft)
+            looks_again |= layout_ui(ui, draft);
         });
     }
     if looks_again {

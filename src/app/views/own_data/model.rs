@@ -146,27 +146,26 @@ mod tests {
 
     #[test]
     fn a_map_needs_two_coordinates_in_one_unit() {
-        let targets = |texts: &[(&str, Option<&str>)]| -> Vec<Channel> {
-            let channel = |(name, unit): &(&str, Option<&str>)| Channel {
-                name: (*name).to_owned(),
-                unit: unit.map(str::to_owned),
+        let pair = |titles: &str| {
+            let channel = |title: &str| {
+                let (name, unit) = title.split_once('/').unwrap_or((title, ""));
+                Channel {
+                    name: name.to_owned(),
+                    unit: (!unit.is_empty()).then(|| unit.to_owned()),
+                }
             };
-            texts.iter().map(channel).collect()
+            position_pair(&Vec::from_iter(titles.split(' ').map(channel)))
         };
-        let cases: [(&[(&str, Option<&str>)], Option<[usize; 2]>); 7] = [
-            (&[("x", Some("mm")), ("y", Some("mm"))], Some([0, 1])),
-            (
-                &[("force", Some("N")), ("a", Some("mm")), ("b", Some("mm"))],
-                Some([1, 2]),
-            ),
-            (&[("x", Some("mm")), ("y", Some("cm"))], None),
-            (&[("fx", Some("N")), ("fy", Some("N"))], None),
-            (&[("states.c2", None), ("states.c3", None)], Some([0, 1])),
-            (&[("probe_x", None), ("probe.y", None)], Some([0, 1])),
-            (&[("weight", None), ("waist", None)], None),
-        ];
-        for (texts, expected) in cases {
-            assert_eq!(position_pair(&targets(texts)), expected, "{texts:?}");
+        for (titles, expected) in [
+            ("x/mm y/mm", Some([0, 1])),
+            ("force/N a/mm b/mm", Some([1, 2])),
+            ("x/mm y/cm", None),
+            ("fx/N fy/N", None),
+            ("states.c2 states.c3", Some([0, 1])),
+            ("probe_x probe.y", Some([0, 1])),
+            ("weight waist", None),
+        ] {
+            assert_eq!(pair(titles), expected, "{titles}");
         }
     }
 }

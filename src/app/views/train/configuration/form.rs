@@ -34,7 +34,7 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
             hidden_choice_ui(ui, &mut draft);
         });
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
-            method_choice_ui(ui, &mut draft.training.method)
+            method_choice_ui(ui, &mut draft.training.method);
         });
         ui.add_enabled_ui(!is_busy, |ui| {
             preset_section_ui(ui, &mut draft);
