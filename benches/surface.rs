@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use decoupler::app::surface_view::SurfaceView;
 use decoupler::app::theme::{self, Theme};
+use decoupler::figure::SequentialMap;
 use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode};
 use decoupler::surface::SurfaceMap;
 use divan::{Bencher, black_box};
@@ -60,6 +61,7 @@ fn frames(bencher: Bencher<'_, '_>, mode: ViewMode, turn: impl Fn(OrbitCamera) -
         quantity: Quantity::Height,
         range: 4.0..=5.0,
         mode,
+        colours: SequentialMap::default(),
     };
     let ctx = Context::default();
     theme::install(&ctx, true);
@@ -80,6 +82,8 @@ fn frames(bencher: Bencher<'_, '_>, mode: ViewMode, turn: impl Fn(OrbitCamera) -
                             label,
                             surface: &surface,
                             marked_node: None,
+                            lit_nodes: &[],
+                            section: None,
                             theme: Theme::dark(),
                         };
                         view.show(ui, camera);

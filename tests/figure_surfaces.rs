@@ -8,8 +8,10 @@ use std::sync::Arc;
 use decoupler::{
     export::figures::Picture,
     figure::{
-        ColourMap, Figure,
-        surface::{Bounds, Card, Drawing, Line, OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
+        Figure, SequentialMap,
+        surface::{
+            Bounds, Card, Drawing, Line, OrbitCamera, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode,
+        },
     },
     surface::SurfaceMap,
 };
@@ -41,6 +43,7 @@ fn over([rows, per_row]: [usize; 2], title: &str, quantity: Quantity, value: imp
         },
         quantity,
         mode: ViewMode::ThreeD,
+        colours: SequentialMap::default(),
     }
 }
 
@@ -65,7 +68,7 @@ fn figure(surfaces: Vec<Surface>) -> SurfaceFigure {
     SurfaceFigure {
         surfaces,
         camera: OrbitCamera::default(),
-        marked_node: None,
+        ..SurfaceFigure::default()
     }
 }
 
@@ -78,7 +81,7 @@ fn lay_out(surface: &Surface, camera: OrbitCamera) -> Drawing {
                 max: Vec2::new(360.0, 400.0),
             },
             measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
-            colours: ColourMap::viridis(),
+            colours: SequentialMap::Viridis.colours(),
         },
     )
 }
@@ -233,7 +236,7 @@ fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
     let drawn = |surfaces| fills(&draw(&figure(surfaces)));
     let [alone, both] = [vec![level(4.5)], vec![level(4.5), level(4.5)]].map(drawn);
     assert_eq!((alone.len(), &alone), (1, &both));
-    let [red, green, blue] = ColourMap::viridis().at(0.5);
+    let [red, green, blue] = SequentialMap::Viridis.colours().at(0.5);
     assert_eq!(alone[0], format!("#{red:02x}{green:02x}{blue:02x}"));
     let other = drawn(vec![level(4.5), level(5.0)]);
     assert!(other.len() == 2 && other.contains(&alone[0]), "{other:?}");
@@ -242,6 +245,31 @@ fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
     assert_eq!(drawn(vec![none]), ["#ffffff"]);
     let both_signs = drawn(vec![from_above(error())]);
     assert!(both_signs.len() > 30, "{} colours", both_signs.len());
+}
+
+#[test]
+fn lit_nodes_the_section_and_the_chosen_colours_are_in_print() {
+    let figure = |change: &dyn Fn(&mut SurfaceFigure)| {
+        let mut figure = figure(vec![from_above(dent("Actual"))]);
+        change(&mut figure);
+        draw(&figure)
+    };
+    let plain = figure(&|_| ());
+    let circles = |picture: &Picture| picture.svg().matches("<circle").count();
+    let lit = figure(&|figure| figure.lit_nodes = vec![1, 5, 999]);
+    assert_eq!(circles(&lit), circles(&plain) + 4, "two rings around each of two nodes");
+    let section = |at_mm| {
+        figure(&|figure| {
+            figure.section = Some(Section {
+                line: SectionLine::RowWire(1),
+                at_mm,
+            });
+        })
+    };
+    assert_ne!(section(1.0).svg(), plain.svg());
+    assert_eq!(section(99.0).svg(), plain.svg(), "beside the surface");
+    let cividis = figure(&|figure| figure.surfaces[0].colours = SequentialMap::Cividis);
+    assert_ne!(cividis.svg(), plain.svg());
 }
 
 #[test]

@@ -8,7 +8,8 @@ use decoupler::{
     evaluation::{Preset, TradeOffLevel, TradeOffLimits, measure_trade_off},
     export::figures::{Picture, PictureFormat},
     figure::{
-        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, Series, node_figure, trade_off_figure,
+        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, node_figure,
+        trade_off_figure,
     },
 };
 use glam::DVec3;
@@ -153,6 +154,7 @@ fn heat_maps_say_each_value_in_its_cell() {
         values,
         notes: Array2::default((2, 2)),
         value_axis: PlotAxis::linear("Z error (%)"),
+        colours: SequentialMap::default(),
     };
     let empty = HeatMap {
         columns: Vec::new(),
@@ -179,6 +181,7 @@ fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
         values: Array2::from_shape_vec((1, 3), values.to_vec()).unwrap(),
         notes: Array2::default((1, 3)),
         value_axis,
+        colours: SequentialMap::default(),
     };
     let cells = |map: HeatMap| -> Vec<String> {
         let svg = Figure::from(map).draw().svg().to_owned();

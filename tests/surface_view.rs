@@ -9,8 +9,8 @@ use std::sync::Arc;
 use decoupler::app::surface_view::{ColourBar, SurfaceView};
 use decoupler::app::theme::{self, Theme};
 use decoupler::export::figures::PictureFormat;
-use decoupler::figure::Figure;
 use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
+use decoupler::figure::{Figure, SequentialMap};
 use decoupler::surface::SurfaceMap;
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
 use egui_kittest::{
@@ -82,6 +82,7 @@ impl Skin {
             quantity,
             range,
             mode,
+            colours: SequentialMap::default(),
         }
     }
 }
@@ -91,6 +92,8 @@ fn view<'a>(surface: &'a Surface, theme: &'a Theme) -> SurfaceView<'a> {
         label: "Actual surface",
         surface,
         marked_node: None,
+        lit_nodes: &[],
+        section: None,
         theme,
     }
 }
@@ -285,6 +288,7 @@ fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> Surfac
         surfaces: vec![actual, beside],
         camera,
         marked_node,
+        ..SurfaceFigure::default()
     }
 }
 

@@ -7,11 +7,37 @@ use thiserror::Error;
 use crate::{
     dataset::Dataset,
     evaluation::{NodeAddress, Outlook, Pressed, RunError, SimulatedSettings},
-    figure::surface::{Quantity, Surface, ViewMode},
+    figure::{
+        SequentialMap,
+        surface::{Quantity, Surface, ViewMode},
+    },
     scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
+
+/// Look of the surfaces of a test set.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceStyle {
+    /// In space or from above.
+    pub mode: ViewMode,
+    /// Colours of heights.
+    pub colours: SequentialMap,
+    /// Heights that colours and axes span.
+    pub heights: HeightScale,
+    /// Errors at the ends of the colours, in millimetres, while they are locked; else those on show.
+    pub error_limit_mm: Option<f64>,
+}
+
+/// Heights that colours and axes span.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HeightScale {
+    /// From full compression to rest, whatever is on show.
+    #[default]
+    Stroke,
+    /// From the lowest to the highest node on show.
+    Fitted,
+}
 
 /// A test set ready to be drawn: its samples, and the surface through the array's nodes.
 #[derive(Clone, Debug)]
@@ -122,24 +148,29 @@ impl TestView {
     }
 
     /// The surface of heights.
-    pub fn heights(&self, title: impl Into<String>, frame: &Frame, mode: ViewMode) -> Surface {
+    pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
         Surface {
             quantity: Quantity::Height,
-            range: self.z_range_mm(),
-            ..self.errors(title, frame, mode)
+            range: match style.heights {
+                HeightScale::Stroke => self.z_range_mm(),
+                HeightScale::Fitted => frame.range_mm().unwrap_or_else(|| self.z_range_mm()),
+            },
+            ..self.errors(title, frame, style)
         }
     }
 
     /// The surface of errors of z.
-    pub fn errors(&self, title: impl Into<String>, frame: &Frame, mode: ViewMode) -> Surface {
+    pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
+        let locked = style.error_limit_mm.map(|limit| -limit..=limit);
         Surface {
             title: title.into(),
             map: Arc::clone(&self.surface),
             values: Arc::clone(&frame.grid_mm),
             nodes: Arc::clone(&frame.nodes_mm),
             quantity: Quantity::Error,
-            range: frame.symmetric_range_mm(),
-            mode,
+            range: locked.unwrap_or_else(|| frame.symmetric_range_mm()),
+            mode: style.mode,
+            colours: style.colours,
         }
     }
 }
@@ -193,6 +224,14 @@ impl Frame {
                 .collect(),
             grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
         }
+    }
+
+    /// Returns the lowest and highest z of a node; `None` without any.
+    pub fn range_mm(&self) -> Option<RangeInclusive<f64>> {
+        let heights = || self.nodes_mm.iter().map(|node| node.z).filter(|z| z.is_finite());
+        let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
+        // Nothing finer than a nanometre is told apart.
+        Some(low..=high.max(low + 1e-6))
     }
 
     /// ± the largest z of a node, so that zero keeps its colour.

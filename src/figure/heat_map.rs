@@ -2,7 +2,10 @@ use std::ops::RangeInclusive;
 
 use ndarray::Array2;
 
-use super::axis::{PlotAxis, share};
+use super::{
+    axis::{PlotAxis, share},
+    colour_map::SequentialMap,
+};
 
 /// Values over two axes as colours, with the number in each cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,9 +24,17 @@ pub struct HeatMap {
     pub notes: Array2<String>,
     /// Name of the values, and the scale of the colours.
     pub value_axis: PlotAxis,
+    /// Colours of the values.
+    pub colours: SequentialMap,
 }
 
 impl HeatMap {
+    /// The map in these colours.
+    #[must_use]
+    pub fn coloured(self, colours: SequentialMap) -> Self {
+        Self { colours, ..self }
+    }
+
     /// Returns the position of a value on the scale of colours over `range`, from 0 to 1; `None` for no value.
     pub(crate) fn colour_share(&self, value: f64, range: &RangeInclusive<f64>) -> Option<f64> {
         match self.value_axis.place(value) {

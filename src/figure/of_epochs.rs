@@ -2,9 +2,10 @@
 
 use super::{
     axis::{PlotAxis, TickRule},
+    decimation::outline,
     look::{Hue, Key, LineStyle, Look},
     plot::{LineAt, Plot, ReferenceLine, Series},
-    plot_figure::{PlotFigure, thinned},
+    plot_figure::PlotFigure,
 };
 use crate::training::{EpochRecord, Stage};
 
@@ -21,7 +22,8 @@ type OfEpoch = fn(&EpochRecord) -> Option<f64>;
 
 /// The curve of a quantity over the epochs.
 fn curve(name: impl Into<String>, look: Look, history: &[EpochRecord], of: OfEpoch) -> Series {
-    let points = thinned(history).filter_map(|epoch| Some([epoch.epoch as f64, of(&epoch)?]));
+    let outstanding = outline(history, of).into_iter().map(|place| &history[place]);
+    let points = outstanding.filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
     Series::new(name, look, points)
 }
 
@@ -154,7 +156,8 @@ fn parameter_name(stages: &[Stage]) -> &'static str {
 /// Validation failures hold from one epoch to the next: `[epoch, failures]` at both ends of each step.
 fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
-    for epoch in thinned(history) {
+    let of = |epoch: &EpochRecord| Some(epoch.validation_failures as f64);
+    for epoch in outline(history, of).into_iter().map(|place| &history[place]) {
         let (at, failures) = (epoch.epoch as f64, epoch.validation_failures as f64);
         if let Some(&[_, before]) = points.last().filter(|[_, before]| *before != failures) {
             points.push([at, before]);

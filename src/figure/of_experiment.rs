@@ -4,6 +4,7 @@ use ndarray::Array2;
 
 use super::{
     axis::{PlotAxis, TickRule},
+    colour_map::SequentialMap,
     heat_map::HeatMap,
     look::{Hue, Key, LineStyle, Look, Marker},
     plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span},
@@ -52,6 +53,7 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
         }
     }
     HeatMap {
+        colours: SequentialMap::default(),
         x_name: columns.name().to_owned(),
         y_name: rows.name().to_owned(),
         columns: labels(columns),

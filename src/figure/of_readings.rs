@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::{axis::PlotAxis, heat_map::HeatMap};
+use super::{axis::PlotAxis, colour_map::SequentialMap, heat_map::HeatMap};
 
 /// Readings of a frame, rows × columns, as what they say about it: their drop below the unloaded state.
 ///
@@ -21,6 +21,7 @@ pub fn zero_gains_figure(gains: &Array2<f64>, rows: &[usize]) -> HeatMap {
 
 fn of_wires(values: Array2<f64>, rows: &[usize], value_axis: PlotAxis) -> HeatMap {
     HeatMap {
+        colours: SequentialMap::default(),
         x_name: "column-wire".to_owned(),
         y_name: "row-wire".to_owned(),
         columns: (1..=values.ncols()).map(|column| column.to_string()).collect(),

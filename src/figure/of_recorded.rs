@@ -6,6 +6,7 @@ use ndarray::{Array2, ArrayView2};
 
 use super::{
     axis::PlotAxis,
+    colour_map::SequentialMap,
     heat_map::HeatMap,
     of_nodes::regression,
     plot_figure::PlotFigure,
@@ -83,6 +84,7 @@ pub fn position_error_map(
         values,
         notes,
         value_axis: PlotAxis::linear(title("error in both targets")).including([0.0]),
+        colours: SequentialMap::default(),
     })
 }
 

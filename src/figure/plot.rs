@@ -46,6 +46,8 @@ pub struct PlotPoint {
     pub bar: Option<[f64; 2]>,
     /// Words about the point in place of its coordinates.
     pub note: Option<String>,
+    /// Number of what it stands for, by which other figures know it too: a node, a bar.
+    pub item: Option<usize>,
 }
 
 /// A marked stretch of the x axis.

@@ -1,4 +1,7 @@
-use super::{look::Key, plot::Plot};
+use super::{
+    look::{Hue, Key, Look, Marker},
+    plot::{Plot, PlotPoint, Series},
+};
 
 /// Plots side by side with one legend.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,7 +14,28 @@ pub struct PlotFigure {
     pub notes: Vec<String>,
 }
 
-/// Largest number of points drawn of one curve; more would not be seen.
+impl PlotFigure {
+    /// Returns the figure with a halo around the points that stand for one of these items, and around `others`.
+    #[must_use]
+    pub fn lighting(mut self, is_lit: impl Fn(usize) -> bool, others: &[[f64; 2]]) -> Self {
+        for plot in &mut self.plots {
+            let points = plot.series.iter().filter(|series| series.bar_width.is_none());
+            let lit = points.flat_map(|series| &series.points);
+            let lit = lit.filter(|point| point.item.is_some_and(&is_lit)).cloned();
+            let points: Vec<PlotPoint> = lit.chain(others.iter().copied().map(PlotPoint::from)).collect();
+            if !points.is_empty() {
+                let look = Look::marker(Hue::Ink, Marker::Halo);
+                plot.series.push(Series {
+                    points,
+                    ..Series::new("lit", look, [])
+                });
+            }
+        }
+        self
+    }
+}
+
+/// Largest number of dots drawn of one cloud; more would not be seen.
 const MOST_POINTS: usize = 2000;
 
 /// Every so many items, so that at most [`MOST_POINTS`] and the last one remain.

@@ -11,7 +11,7 @@ use std::{
 use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views, WindowFile};
 use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
-use eframe::egui::{Context, Key, Modifiers, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
+use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
 use egui_kittest::{
     Harness, Node,
     kittest::{By, NodeT as _, Queryable as _},
@@ -323,6 +323,31 @@ impl Driver {
         self.press_with(Modifiers::COMMAND, Key::A);
         self.harness.event(eframe::egui::Event::Text(text.to_owned()));
         self.harness.run_steps(2);
+    }
+
+    /// Clicks what is labelled so with the secondary button.
+    #[track_caller]
+    pub(crate) fn right_click(&mut self, label: &str) {
+        self.get(label).scroll_to_me();
+        self.harness.run_steps(SCROLLING);
+        self.get(label).click_secondary();
+        self.harness.run_steps(3);
+    }
+
+    /// Clicks the button labelled so. Returns the text that it put on the clipboard.
+    #[track_caller]
+    pub(crate) fn click_and_copy(&mut self, label: &str) -> Option<String> {
+        self.get(label).click();
+        let mut copied = None;
+        for _ in 0..3 {
+            self.harness.step();
+            let commands = &self.harness.output().platform_output.commands;
+            copied = copied.or(commands.iter().find_map(|command| match command {
+                OutputCommand::CopyText(text) => Some(text.clone()),
+                _ => None,
+            }));
+        }
+        copied
     }
 
     /// Presses a key.

@@ -2,6 +2,7 @@
 #![cfg(feature = "gui")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod accessibility;
 mod closing;
 mod comparing;
 mod configuring;
@@ -18,12 +19,14 @@ mod looking;
 mod own_data;
 mod pictures;
 mod pressing;
+mod reading_errors;
 mod remembering;
 mod scenes;
 mod scrubbing;
 mod snapshots;
 mod trading;
 mod training;
+mod typing;
 
 #[path = "../support/folders.rs"]
 mod folders;

@@ -70,7 +70,7 @@ fn album(size: Vec2, is_dark: bool) {
     for place in places {
         album.driver.harness().hover_at(surface.lerp_inside(place));
         album.driver.harness().run_steps(2);
-        if album.driver.views().train.node.is_some() {
+        if album.driver.views().train.lights.node.is_some() {
             break;
         }
     }

@@ -24,7 +24,7 @@ fn over_a_node(driver: &mut Driver) -> (Pos2, usize) {
         let at = middle.min + share * middle.size();
         driver.harness().hover_at(at);
         driver.harness().step();
-        if let Some(node) = driver.views().train.node {
+        if let Some(node) = driver.views().train.lights.node {
             return (at, node);
         }
     }

@@ -110,7 +110,7 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
     driver.click("Show");
     let worst = driver.state().result().unwrap().errors.worst_node;
     assert_eq!(driver.views().train.snapshot, worst.snapshot);
-    assert_eq!(driver.views().train.node, Some(worst.row * 6 + worst.node));
+    assert_eq!(driver.views().train.lights.node, Some(worst.row * 6 + worst.node));
     for theme in ["Light theme", "Dark theme"] {
         driver.click_button(theme);
         driver.settle();

@@ -4,9 +4,12 @@ use eframe::egui::{
 
 use super::heat_map_frame::{HeatMapFrame, widest};
 use crate::{
-    app::theme::{Theme, rgb, semibold, space, type_size},
+    app::{
+        theme::{Theme, rgb, semibold, space, type_size},
+        widgets::value_under,
+    },
     export::format_number,
-    figure::{ColourMap, HeatMap, is_light},
+    figure::{HeatMap, is_light},
 };
 
 /// Click or hover on a cell.
@@ -20,7 +23,7 @@ pub enum CellPointed {
 
 /// Draws the map over the space that is left, one cell marked; returns the cell (row, column) that the user clicked.
 pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Option<([usize; 2], CellPointed)> {
-    let (palette, colours) = (Theme::of(ui).palette, ColourMap::viridis());
+    let (palette, colours) = (Theme::of(ui).palette, map.colours.colours());
     let frame = HeatMapFrame::allocate_ui(ui, map);
     let (grid, size) = (frame.grid, frame.cell);
     let note = FontId::proportional(type_size().note);
@@ -33,6 +36,7 @@ pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Op
         let cell = Rect::from_min_size(corner, size).shrink(1.0);
         let response = ui.interact(cell, ui.scope_id().with(("heat", row, column)), Sense::click());
         let is_marked = marked == Some([row, column]);
+        value_under(ui, cell, number);
         let words = &map.notes[[row, column]];
         response.widget_info(|| {
             let name = words.lines().next().unwrap_or_default();

@@ -6,7 +6,7 @@ use eframe::egui::{Align2, FontId, Pos2, Rect, Sense, Stroke, Ui, Vec2, epaint::
 
 use crate::{
     app::theme::{Theme, rgb, space, type_size},
-    figure::{ColourMap, HeatMap, share},
+    figure::{HeatMap, share},
 };
 
 /// Width of the scale of colours with its numbers and name, in points.
@@ -80,7 +80,7 @@ pub(super) fn widest(ui: &Ui, texts: &[String]) -> f32 {
 
 /// The meaning of the colours.
 fn scale_ui(ui: &Ui, map: &HeatMap, place: Rect) {
-    let (palette, colours) = (Theme::of(ui).palette, ColourMap::viridis());
+    let (palette, colours) = (Theme::of(ui).palette, map.colours.colours());
     let bar = Rect::from_min_max(
         place.min + vec2(space(2), 0.0),
         pos2(place.left() + space(5), place.bottom()),

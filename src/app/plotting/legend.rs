@@ -75,6 +75,13 @@ fn paint_sample(ui: &Ui, look: Look, sample: Rect) {
         }
         None => {}
     }
+    if look.line.is_none() && look.marker.is_none() {
+        // An area: as pale as it is behind the curves, with an edge.
+        let area = sample.shrink2(vec2(0.0, space(1)));
+        let (fill, edge) = (colour.gamma_multiply(0.3), Stroke::new(1.0, colour.gamma_multiply(0.6)));
+        painter.rect(area, CornerRadius::ZERO, fill, edge, StrokeKind::Inside);
+        return;
+    }
     let hollow = Stroke::new(1.2, colour);
     let diamond =
         |radius: f32| [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)].map(|(x, y)| middle + radius * vec2(x, y));

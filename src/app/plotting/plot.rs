@@ -3,14 +3,15 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    Align2, Color32, FontId, Id, Rangef, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role, pos2,
+    Align2, Color32, FontId, Id, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo,
+    accesskit::Role, pos2,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
 
-use super::{colours::hue_colour, plot_figure::Pointer};
+use super::{colours::hue_colour, per_pixel::per_pixel, plot_figure::Pointer};
 use crate::{
     app::theme::{Palette, Theme, space, type_size},
     figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, Series},
@@ -27,7 +28,7 @@ const LEAST_GRID: f32 = 8.0;
 const COINCIDENT: f64 = 5e-4;
 
 /// Draws the plot over the space of `ui`; `id` tells it apart from others in the window.
-pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> PlotTransform {
+pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -71,8 +72,11 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> Plo
     };
     let shown = shown.show(ui, |plot_ui| {
         lines_behind(plot_ui, plot, &palette);
+        let transform = *plot_ui.transform();
+        let pixels = f64::from(transform.frame().width() * plot_ui.ctx().pixels_per_point());
+        let column = transform.bounds().width() / pixels;
         for series in &plot.series {
-            draw_series(plot_ui, plot, series, [&x, &y], &palette);
+            draw_series(plot_ui, plot, series, ([&x, &y], column), &palette);
         }
     });
     shown.response.widget_info(|| {
@@ -80,8 +84,10 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> Plo
         let label = format!("{} against {}: {}", plot.y.name, plot.x.name, names.join(", "));
         WidgetInfo::labeled(Role::Image, true, label)
     });
+    ui.ctx()
+        .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
     labels_ui(ui, plot, &shown.transform, id);
-    shown.transform
+    (shown.transform, shown.response)
 }
 
 /// The ticks in view.
@@ -151,7 +157,7 @@ fn draw_series(
     plot_ui: &mut PlotUi<'_>,
     plot: &Plot,
     series: &Series,
-    ranges: [&RangeInclusive<f64>; 2],
+    (ranges, column): ([&RangeInclusive<f64>; 2], f64),
     palette: &Palette,
 ) {
     // The words under the pointer are found by it.
@@ -187,6 +193,10 @@ fn draw_series(
             if is_stepped {
                 let near = |a: f64, b: f64, range| (a - b).abs() < COINCIDENT * width(range);
                 stretch.dedup_by(|a, b| near(a[0], b[0], ranges[0]) && near(a[1], b[1], ranges[1]));
+            }
+            let is_ascending = stretch.windows(2).all(|ends| ends[0][0] <= ends[1][0]);
+            if is_ascending && !is_stepped {
+                stretch = per_pixel(stretch, column);
             }
             let line = Line::new(&*name, PlotPoints::from(stretch)).id((&name, part));
             // A band would make slopes of steps.

@@ -23,6 +23,12 @@ pub enum Pointer {
 pub struct DrawnPlot<'a> {
     /// Plot that is drawn.
     pub plot: &'a Plot,
+    /// True while the pointer is over it.
+    pub has_pointer: bool,
+    /// What the point or bar under the pointer stands for.
+    pub hovered: Option<usize>,
+    /// What a point or bar that was just clicked stands for.
+    pub clicked: Option<usize>,
     transform: PlotTransform,
 }
 
@@ -31,6 +37,29 @@ impl DrawnPlot<'_> {
     pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
         let [x, y] = self.plot.place(x, y)?;
         Some(self.transform.position_from_point(&Place::new(x, y)))
+    }
+
+    /// What stands for something at a point of the screen: the bar over it, or the nearest point in reach.
+    fn item_at(&self, at: Pos2) -> Option<usize> {
+        /// Distance within which the pointer is at a point.
+        const REACH: f32 = 12.0;
+        let value = self.transform.value_from_position(at);
+        let mut nearest: Option<(f32, usize)> = None;
+        for series in &self.plot.series {
+            for (point, [x, y]) in self.plot.placed(series) {
+                let Some(item) = point.item else { continue };
+                let distance = match series.bar_width {
+                    // However low the bar, it is meant anywhere above its foot.
+                    Some(width) if (x - value.x).abs() <= 0.5 * width => 0.0,
+                    Some(_) => continue,
+                    None => self.transform.position_from_point(&Place::new(x, y)).distance(at),
+                };
+                if distance <= REACH && nearest.is_none_or(|(least, _)| distance < least) {
+                    nearest = Some((distance, item));
+                }
+            }
+        }
+        nearest.map(|(_, item)| item)
     }
 }
 
@@ -78,8 +107,17 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     };
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
         let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
-        let transform = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
-        DrawnPlot { plot, transform }
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
+        let mut drawn = DrawnPlot {
+            plot,
+            has_pointer: response.contains_pointer(),
+            hovered: None,
+            clicked: None,
+            transform,
+        };
+        drawn.hovered = response.hover_pos().and_then(|at| drawn.item_at(at));
+        drawn.clicked = drawn.hovered.filter(|_| response.clicked());
+        drawn
     });
     let plots = plots.collect();
     if is_square {

@@ -143,7 +143,7 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
 
     let decoupled_mm = run.decouple_test();
     let pairs_mm = z_pairs_mm(run.test(), &decoupled_mm);
-    same("histogram", error_histogram_figure(&pairs_mm));
+    same("histogram", error_histogram_figure(&pairs_mm, None));
     let regression = same("regression", regression_figure(&pairs_mm));
     // A dot for each node, and one in the legend.
     assert_eq!(regression.circles, pairs_mm.len() + 1);

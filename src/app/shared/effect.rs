@@ -1,5 +1,5 @@
 use super::{FileTask, Look, Matter, Notice};
-use crate::{evaluation::SimulatedSettings, training::TrainerState};
+use crate::{evaluation::SimulatedSettings, figure::Figure, training::TrainerState};
 
 /// Request of a view to the window, which carries all of them out in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub enum Effect {
     Continue,
     /// Look at all surfaces so.
     Look(Look),
+    /// Show this snapshot of the results to come.
+    Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
     /// Ask for the path in the window itself.
@@ -30,6 +32,13 @@ pub enum Effect {
     Copy {
         /// The text.
         text: String,
+        /// Sentence that tells so.
+        notice: String,
+    },
+    /// Put this picture on the clipboard, and tell so.
+    CopyPicture {
+        /// The picture.
+        figure: Box<Figure>,
         /// Sentence that tells so.
         notice: String,
     },

@@ -57,10 +57,28 @@ impl ExportGroup {
     }
 }
 
+/// Form of a picture on the clipboard.
+const COPY: &str = "Copy";
+
 impl Export<'_> {
+    /// Returns the name of the action: "Export chart, SVG", "Copy error table as LaTeX".
+    pub fn action(&self) -> String {
+        if self.is_copy() {
+            self.label()
+        } else {
+            format!("Export {}", self.label())
+        }
+    }
+
+    /// Returns true for what goes to the clipboard.
+    pub fn is_copy(&self) -> bool {
+        self.group == ExportGroup::Copies || self.form == COPY
+    }
+
     /// Returns the whole name: "Error table, CSV", "Copy error table as LaTeX".
     pub fn label(&self) -> String {
         match self.group {
+            ExportGroup::Figures if self.form == COPY => format!("Copy {} as a picture", self.name.to_lowercase()),
             ExportGroup::Copies => format!("Copy {} as {}", self.name.to_lowercase(), self.form),
             _ => format!("{}, {}", self.name, self.form),
         }
@@ -74,7 +92,7 @@ impl fmt::Debug for Export<'_> {
     }
 }
 
-/// The picture as SVG and as PNG, in files named after `stem`; `figure` gives it, or the reason why there is none.
+/// The picture as SVG and as PNG, in files named after `stem`, and to the clipboard; `figure` gives it, or the reason why there is none.
 pub fn picture_exports<'a>(
     name: &str,
     stem: String,
@@ -94,7 +112,20 @@ pub fn picture_exports<'a>(
         },
     };
     let name = name.to_owned();
-    [PictureFormat::Svg, PictureFormat::Png].into_iter().map(move |format| {
+    let copied = Export {
+        group: ExportGroup::Figures,
+        name: name.clone(),
+        form: COPY.to_owned(),
+        description: "Copies the picture as shown, on a light background: pixels, 300 to the inch.",
+        ask: figure.clone().map(|figure| -> Ask<'a> {
+            let notice = format!("Copied the {} as a picture", name.to_lowercase());
+            Box::new(move || Effect::CopyPicture {
+                figure: Box::new(figure()),
+                notice,
+            })
+        }),
+    };
+    let files = [PictureFormat::Svg, PictureFormat::Png].into_iter().map(move |format| {
         let words: FileWords = words(format);
         let stem = stem.clone();
         Export {
@@ -112,7 +143,8 @@ pub fn picture_exports<'a>(
                 })
             }),
         }
-    })
+    });
+    files.chain([copied])
 }
 
 /// The table to the clipboard, in every form; `table` gives it, or the reason why there is none.

@@ -1,6 +1,12 @@
-use crate::figure::surface::{OrbitCamera, ViewMode};
+use crate::{
+    app::test_view::{HeightScale, SurfaceStyle},
+    figure::{
+        SequentialMap,
+        surface::{OrbitCamera, ViewMode},
+    },
+};
 
-/// Camera and mode in which all views draw surfaces.
+/// Camera, mode and colours in which all views draw surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Shared by all surfaces.
@@ -9,6 +15,24 @@ pub struct Look {
     pub mode: ViewMode,
     /// Dark or light.
     pub is_dark: bool,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
+    /// Heights that colours and axes span.
+    pub heights: HeightScale,
+    /// Errors at the ends of the colours, in millimetres, while they are locked.
+    pub error_limit_mm: Option<f64>,
+}
+
+impl Look {
+    /// Returns the look of the surfaces of a test set.
+    pub fn style(&self) -> SurfaceStyle {
+        SurfaceStyle {
+            mode: self.mode,
+            colours: self.colours,
+            heights: self.heights,
+            error_limit_mm: self.error_limit_mm,
+        }
+    }
 }
 
 /// Surface shown of a network.

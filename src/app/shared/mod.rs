@@ -1,6 +1,7 @@
 //! State shared by all views (the settings, the training on show, the run list, the look of surfaces) and the effects
 //! that a view may ask for.
 
+mod colour_scale;
 mod effect;
 mod export;
 mod file_task;
@@ -17,6 +18,7 @@ mod training_status;
 mod view;
 
 pub use super::training_worker::RunResult;
+pub use colour_scale::colour_scale_ui;
 pub use effect::Effect;
 pub use export::{Ask, Export, ExportGroup, copy_exports, csv_export, picture_exports};
 pub use file_task::{Contents, FileTask, FileWords, Purpose};

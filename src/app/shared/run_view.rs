@@ -4,6 +4,7 @@ use crate::{
         training_worker::{Began, Progress, RunId, RunResult, append_epochs},
     },
     evaluation::{Baselines, PastNetworks, PublishedErrors, SimulatedSettings, StartRecord},
+    figure::EpochOutline,
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -27,6 +28,8 @@ pub struct RunView {
     pub published: Option<PublishedErrors>,
     /// Every epoch of the leader so far.
     pub history: Vec<EpochRecord>,
+    /// Of these, what its curves need.
+    pub outline: EpochOutline,
     /// The methods that the leader went through.
     pub stages: Vec<Stage>,
     /// State of each start when last reported; empty where there is one only.
@@ -60,6 +63,7 @@ impl RunView {
             test,
             baselines,
             history: Vec::new(),
+            outline: EpochOutline::new(),
             stages: Vec::new(),
             starts: Vec::new(),
             past: PastNetworks::default(),
@@ -80,6 +84,7 @@ impl RunView {
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
+        self.outline.extend(&epochs);
         append_epochs(&mut self.history, epochs);
         self.stages = stages;
         self.past = past;

@@ -1,8 +1,11 @@
 use super::{Look, RunList, RunResult, RunView};
 use crate::{
-    app::test_view::TestView,
+    app::test_view::{HeightScale, TestView},
     evaluation::{Baselines, SimulatedSettings},
-    figure::surface::{OrbitCamera, ViewMode},
+    figure::{
+        SequentialMap,
+        surface::{OrbitCamera, ViewMode},
+    },
     training::StopReason,
 };
 
@@ -73,6 +76,9 @@ impl Shared {
                 camera: OrbitCamera::default(),
                 mode: ViewMode::ThreeD,
                 is_dark,
+                colours: SequentialMap::default(),
+                heights: HeightScale::default(),
+                error_limit_mm: None,
             },
             working: Vec::new(),
         }

@@ -3,7 +3,7 @@ use eframe::egui::{ComboBox, RichText, Ui};
 use crate::{
     app::{
         theme::{Theme, space, type_size},
-        widgets::fields::{capitalised, count_ui, input_text, quantity_ui},
+        widgets::fields::{capitalised, count_ui, input_text, quantity_ui, usually},
     },
     evaluation::MOST_STARTS,
     training::{Method, StoppingRules},
@@ -38,35 +38,52 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
 pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, is_new: bool) {
     for setting in method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
-        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, setting.range, "");
+        let limits = usually(setting.default, setting.range);
+        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
     }
     let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
                 error (training error if nothing is held out) is kept. Several starts show how much the results vary. Default 1.";
-    ui.add_enabled_ui(is_new, |ui| count_ui(ui, "Starts", hint, starts, 1..=MOST_STARTS));
+    ui.add_enabled_ui(is_new, |ui| {
+        count_ui(ui, "Starts", hint, starts, usually(1, 1..=MOST_STARTS))
+    });
 }
 
 /// The rules that end a training; changes `stopping`.
 pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
+    let usual = StoppingRules::default();
     let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
                 from the present one.";
-    count_ui(ui, "Epochs", hint, &mut stopping.epochs, 1..=StoppingRules::MOST_EPOCHS);
+    count_ui(
+        ui,
+        "Epochs",
+        hint,
+        &mut stopping.epochs,
+        usually(usual.epochs, 1..=StoppingRules::MOST_EPOCHS),
+    );
     let hint = "Training ends after this many epochs without a new best validation error. Default 6.";
     count_ui(
         ui,
         "Validation failures",
         hint,
         &mut stopping.max_fail,
-        1..=StoppingRules::MOST_EPOCHS,
+        usually(usual.max_fail, 1..=StoppingRules::MOST_EPOCHS),
     );
     let hint = "Training error (mse of the scaled targets) at which training ends. Default 0.";
-    quantity_ui(ui, "Goal (mse)", hint, &mut stopping.goal_mse, 0.0..=1e300, "");
+    quantity_ui(
+        ui,
+        "Goal (mse)",
+        hint,
+        &mut stopping.goal_mse,
+        usually(usual.goal_mse, 0.0..=1e300),
+        "",
+    );
     let hint = "Norm of the gradient below which training ends. Default 1e-7.";
     quantity_ui(
         ui,
         "Smallest gradient",
         hint,
         &mut stopping.min_gradient,
-        0.0..=1e300,
+        usually(usual.min_gradient, 0.0..=1e300),
         "",
     );
 }

@@ -3,6 +3,7 @@ use eframe::egui::{self, Mesh, Rect, Response, Sense, Stroke, StrokeKind, Ui, Wi
 use super::painted::{bounds, measure, paint_frame, to_egui};
 use crate::{
     app::theme::{Theme, rgb},
+    export::format_number,
     figure::surface::ColourScale,
 };
 
@@ -23,16 +24,34 @@ impl ColourBar<'_> {
 
     /// Draws the bar `height` points high.
     pub fn show(self, ui: &mut Ui, height: f32) -> Response {
-        let (rect, response) = ui.allocate_exact_size(vec2(Self::WIDTH, height), Sense::hover());
+        let (rect, response) = ui.allocate_exact_size(vec2(Self::WIDTH, height), Sense::click());
         let name = self.scale.quantity.axis_name();
-        response
-            .widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, format!("Colour scale of {name}")));
+        let label = format!("Colour scale of {name}");
+        response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Button, true, &label));
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            let (low, high) = (
+                format_number(*self.scale.range.start()),
+                format_number(*self.scale.range.end()),
+            );
+            node.set_value(format!("{low} to {high}"));
+        });
+        if response.has_focus() || response.hovered() {
+            let palette = &self.theme.palette;
+            let colour = if response.has_focus() {
+                palette.accent
+            } else {
+                palette.line
+            };
+            let corner = f32::from(crate::app::theme::radius());
+            ui.painter()
+                .rect_stroke(rect, corner, Stroke::new(1.0, colour), StrokeKind::Inside);
+        }
         let painter = ui.painter_at(rect);
         let Some(drawing) = self.scale.lay_out(bounds(rect), &|text| measure(&painter, text)) else {
             return response;
         };
         let bar = Rect::from_min_max(to_egui(drawing.bar.min), to_egui(drawing.bar.max));
-        let map = self.theme.colours(self.scale.quantity);
+        let map = self.theme.colours(self.scale.quantity, self.scale.colours);
         let mut mesh = Mesh::default();
         for strip in 0..=STRIPS {
             let part = strip as f32 / STRIPS as f32;

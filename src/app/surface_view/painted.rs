@@ -8,7 +8,9 @@ use glam::Vec2;
 use super::ribbon;
 use crate::{
     app::theme::{Palette, Theme, rgb, type_size},
-    figure::surface::{self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Sight, Surface, Text, ViewMode},
+    figure::surface::{
+        self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Section, Sight, Surface, Text, ViewMode,
+    },
 };
 
 /// A laid-out surface and what it was made of.
@@ -51,7 +53,7 @@ impl Painted {
             &Card {
                 bounds: bounds(rect),
                 measure: &|text| measure(ui.painter(), text),
-                colours: theme.colours(surface.quantity),
+                colours: theme.colours(surface.quantity, surface.colours),
             },
         );
         Self {
@@ -68,17 +70,32 @@ impl Painted {
         }
     }
 
-    /// The frame with its labels, the surface, and the dots with one of them marked.
-    pub(super) fn paint(&self, painter: &Painter, palette: &Palette, marked: Option<usize>) {
+    /// The frame with its labels, the surface, the line of its section, and the dots with one of them marked and some lit.
+    pub(super) fn paint(
+        &self,
+        painter: &Painter,
+        palette: &Palette,
+        section: Option<&Section>,
+        (marked, lit): (Option<usize>, &[usize]),
+    ) {
         paint_frame(painter, palette, &self.lines, &self.texts);
         painter.add(Shape::Mesh(Arc::clone(&self.mesh)));
+        for piece in section
+            .map(|section| section.pieces(&self.surface, &self.sight))
+            .unwrap_or_default()
+        {
+            let points: Vec<Pos2> = piece.iter().map(|at| to_egui(at.as_vec2())).collect();
+            for (width, colour) in [(3.5, palette.panel.gamma_multiply(0.7)), (1.8, palette.warning)] {
+                painter.add(Shape::line(points.clone(), Stroke::new(width, colour)));
+            }
+        }
         for Disc {
             at,
             radius,
             ring,
             ink,
             opacity,
-        } in self.dots.discs(marked)
+        } in self.dots.discs(marked, lit)
         {
             let (at, colour) = (to_egui(at), colour(ink, palette).gamma_multiply(opacity));
             match ring {

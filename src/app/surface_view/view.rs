@@ -10,7 +10,7 @@ use crate::{
     app::theme::{Theme, type_size},
     export::format_number,
     figure::{
-        surface::{OrbitCamera, Quantity, Sight, Surface, ViewMode},
+        surface::{OrbitCamera, Quantity, Section, Sight, Surface, ViewMode},
         ticks::tick_text,
     },
 };
@@ -24,6 +24,10 @@ pub struct SurfaceView<'a> {
     pub surface: &'a Surface,
     /// A node to mark, for instance the one hovered in a neighbouring view.
     pub marked_node: Option<usize>,
+    /// Nodes that are lit, for instance those of a chosen bar.
+    pub lit_nodes: &'a [usize],
+    /// Line along which a figure beside it cuts the surface.
+    pub section: Option<&'a Section>,
     /// Dark or light.
     pub theme: &'a Theme,
 }
@@ -106,7 +110,8 @@ impl SurfaceView<'_> {
             .hovered_node
             .and_then(|node| painted.dots.position(node))
             .map(to_egui);
-        painted.paint(&painter, &self.theme.palette, shown.hovered_node.or(self.marked_node));
+        let nodes = (shown.hovered_node.or(self.marked_node), self.lit_nodes);
+        painted.paint(&painter, &self.theme.palette, self.section, nodes);
         if let Some(note) = painted.dots.note() {
             // Below the axes, partly in the margin of the card, so that the picture keeps its size.
             let size = type_size().small;
@@ -120,6 +125,7 @@ impl SurfaceView<'_> {
     fn describe(&self, ui: &Ui, response: &Response) {
         response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, self.label));
         ui.ctx().accesskit_node_builder(response.id, |node| {
+            node.set_description(self.surface.summary());
             let values = self.surface.nodes.iter().map(|node| node.z);
             let finite = values.filter(|value| value.is_finite());
             let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));

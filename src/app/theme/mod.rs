@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 use eframe::egui::Color32;
 
-use crate::figure::{ColourMap, Rgb, surface::Quantity};
+use crate::figure::{ColourMap, Rgb, SequentialMap, surface::Quantity};
 
 /// Everything that depends on dark or light.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,12 +60,12 @@ impl Theme {
         }
     }
 
-    /// Colours of the values of a surface.
-    pub fn colours(&self, quantity: Quantity) -> &ColourMap {
+    /// Colours of the values of a surface; `sequential` are those of values that do not diverge.
+    pub fn colours(&self, quantity: Quantity, sequential: SequentialMap) -> &ColourMap {
         if quantity.is_diverging() {
             &self.errors
         } else {
-            ColourMap::viridis()
+            sequential.colours()
         }
     }
 }

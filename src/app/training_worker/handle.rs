@@ -2,7 +2,7 @@ use std::{
     cell::Cell,
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
         mpsc::{Sender, channel},
     },
 };
@@ -20,6 +20,8 @@ pub struct Worker {
     answered: Cell<u64>,
     /// The last of those that are cancelled; those before are too.
     cancelled: Arc<AtomicU64>,
+    /// The snapshot on show.
+    snapshot: Arc<AtomicUsize>,
 }
 
 impl Worker {
@@ -28,9 +30,10 @@ impl Worker {
         let (requests, incoming) = channel();
         let cancelled = Arc::<AtomicU64>::default();
         let mut job = Job::new("training", wake);
-        let in_thread = Arc::clone(&cancelled);
+        let snapshot = Arc::<AtomicUsize>::default();
+        let (in_thread, shown) = (Arc::clone(&cancelled), Arc::clone(&snapshot));
         job.start(
-            move |report| TrainingLoop::new(report, &in_thread).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread, &shown).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {
@@ -39,6 +42,7 @@ impl Worker {
             asked: Cell::default(),
             answered: Cell::default(),
             cancelled,
+            snapshot,
         }
     }
 
@@ -61,6 +65,11 @@ impl Worker {
         }
         // The other end is gone only if the worker died.
         let _ = self.requests.send(request);
+    }
+
+    /// Lays the surfaces of later results through the nodes of this snapshot.
+    pub fn watch(&self, snapshot: usize) {
+        self.snapshot.store(snapshot, Ordering::Relaxed);
     }
 
     /// Returns true while a training is being prepared and not cancelled.

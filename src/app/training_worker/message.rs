@@ -13,7 +13,7 @@ use ndarray::Array2;
 use crate::{
     app::{
         job::JobError,
-        test_view::{TestView, TestViewError},
+        test_view::{Frame, TestView, TestViewError},
     },
     evaluation::{Baselines, Errors, PastNetworks, Run, RunFlaw, SimulatedSettings, StartRecord},
     export::NetworkFile,
@@ -150,6 +150,8 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
 pub struct RunResult {
     /// Coordinates: samples × 3·M2.
     pub decoupled_mm: Arc<Array2<f64>>,
+    /// The snapshot that was on show, and its surface: laid through the nodes here, so that the window need not.
+    pub frame: Option<(usize, Frame)>,
     /// Their errors.
     pub errors: Errors,
     /// The epoch of the network.

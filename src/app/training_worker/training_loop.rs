@@ -1,7 +1,7 @@
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
         mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
@@ -33,9 +33,13 @@ pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
     /// The last preparation that is cancelled.
     cancelled: &'a AtomicU64,
+    /// The snapshot on show.
+    snapshot: &'a AtomicUsize,
     /// Preparations so far.
     preparations: u64,
     run: Option<Run>,
+    /// Its test set, as it is drawn.
+    test: Option<TestView>,
     /// Networks of its past epochs.
     past: PastNetworks,
     /// Which training `run` is.
@@ -50,12 +54,14 @@ pub(super) struct TrainingLoop<'a> {
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64) -> Self {
+    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64, snapshot: &'a AtomicUsize) -> Self {
         Self {
             report,
             cancelled,
+            snapshot,
             preparations: 0,
             run: None,
+            test: None,
             past: PastNetworks::default(),
             id: None,
             is_paused: false,
@@ -154,7 +160,7 @@ impl<'a> TrainingLoop<'a> {
         self.is_kept = run.stop_reason().is_some();
         self.past = PastNetworks::default();
         self.past.record(&run);
-        (self.run, self.id) = (Some(run), Some(began.id));
+        (self.run, self.id, self.test) = (Some(run), Some(began.id), Some(began.test.clone()));
         self.is_paused = is_paused;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
@@ -197,6 +203,10 @@ impl<'a> TrainingLoop<'a> {
         let Some(errors) = run.errors_of(&decoupled_mm) else {
             return;
         };
+        let frame = self.test.as_ref().map(|test| {
+            let snapshot = test.nearest_snapshot(self.snapshot.load(Ordering::Relaxed));
+            (snapshot, test.frame(decoupled_mm.view(), snapshot))
+        });
         let cost = begun.elapsed();
         let has_several = run.trainers().len() > 1;
         let is_standing = self.is_paused || run.stop_reason().is_some();
@@ -216,6 +226,7 @@ impl<'a> TrainingLoop<'a> {
             past: self.past.clone(),
             result: RunResult {
                 decoupled_mm: Arc::new(decoupled_mm),
+                frame,
                 errors,
                 best_epoch: trainer.best_epoch(),
                 flaw: run.flaw(),

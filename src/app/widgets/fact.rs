@@ -1,5 +1,6 @@
 use eframe::egui::{Align, Color32, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
+use super::value_under::value_under;
 use crate::app::theme::{Theme, type_size};
 
 /// A figure with its name, and its meaning under the pointer.
@@ -17,6 +18,7 @@ pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, col
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let response = ui.add(Label::new(text(value).color(colour)).truncate());
             let label = format!("{name}: {value}");
+            value_under(ui, response.rect, value);
             response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
             response.on_hover_text(meaning);
         });

@@ -2,42 +2,67 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{Align, ComboBox, DragValue, Layout, Response, Ui, emath::Numeric};
+use eframe::egui::{Align, ComboBox, Layout, Response, Ui};
 
-use super::explained_options_ui;
+use super::{
+    explained_options_ui,
+    number_field::{FIELD_SIZE, Limits, number_ui, refusal_ui},
+};
 use crate::app::theme::space;
 
-/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests.
+pub use super::number_field::usually;
+
+/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it stands why
+/// what was typed into it was not taken.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
-    ui.horizontal(|ui| {
+    let field = ui.horizontal(|ui| {
         let label = ui.label(name).on_hover_text(hint);
         let value = ui.with_layout(Layout::right_to_left(Align::Center), value_ui).inner;
         value.labelled_by(label.id).on_hover_text(hint)
-    })
-    .inner
+    });
+    refusal_ui(ui, &field.inner);
+    field.inner
 }
 
 /// A whole number.
-pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, range: RangeInclusive<usize>) -> Response {
-    field_ui(ui, name, hint, |ui| number_ui(ui, value, range, ""))
+pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, limits: impl Into<Limits<usize>>) -> Response {
+    let limits = limits.into();
+    field_ui(ui, name, hint, |ui| number_ui(ui, value, &limits, "", FIELD_SIZE))
 }
 
-/// A number with its unit; typing takes any notation, also 1e-3.
+/// The number from which a random draw begins.
+pub fn seed_ui(ui: &mut Ui, name: &str, hint: &str, seed: &mut u64, usual: u64) -> Response {
+    /// Larger whole numbers are not all told apart while they are typed.
+    const LARGEST: u64 = 1 << 53;
+    let limits = usually(usual, 0..=LARGEST);
+    field_ui(ui, name, hint, |ui| number_ui(ui, seed, &limits, "", FIELD_SIZE))
+}
+
+/// A number with its unit; typing takes any notation, also 1e-3, and other units of the same kind.
 pub fn quantity_ui(
     ui: &mut Ui,
     name: &str,
     hint: &str,
     value: &mut f64,
-    range: RangeInclusive<f64>,
+    limits: impl Into<Limits<f64>>,
     unit: &str,
 ) -> Response {
-    field_ui(ui, name, hint, |ui| number_ui(ui, value, range, unit))
+    let limits = limits.into();
+    field_ui(ui, name, hint, |ui| number_ui(ui, value, &limits, unit, FIELD_SIZE))
 }
 
-/// A quantity kept as a share of one and shown in percent.
-pub fn percent_ui(ui: &mut Ui, name: &str, hint: &str, share: &mut f64, range_percent: RangeInclusive<f64>) {
+/// A quantity kept as a share of one and shown in percent; `usual` is a share too.
+pub fn percent_ui(
+    ui: &mut Ui,
+    name: &str,
+    hint: &str,
+    share: &mut f64,
+    usual: f64,
+    range_percent: RangeInclusive<f64>,
+) {
     let mut percent = in_percent(*share);
-    if quantity_ui(ui, name, hint, &mut percent, range_percent, "%").changed() {
+    let limits = usually(in_percent(usual), range_percent);
+    if quantity_ui(ui, name, hint, &mut percent, limits, "%").changed() {
         *share = to_twelve_digits(percent / 100.0);
     }
 }
@@ -95,26 +120,6 @@ pub fn list_ui<T: Copy + PartialEq>(
         combo.response
     });
     picked
-}
-
-fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, range: RangeInclusive<N>, unit: &str) -> Response {
-    // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
-    let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
-    let mut drag = DragValue::new(value)
-        .range(range)
-        .speed(speed)
-        .suffix(if unit.is_empty() {
-            String::new()
-        } else {
-            format!(" {unit}")
-        })
-        .update_while_editing(false);
-    if !N::INTEGRAL {
-        drag = drag
-            .custom_formatter(|value, _| input_text(value))
-            .custom_parser(|text| text.trim().parse().ok());
-    }
-    ui.add_sized([space(16), space(6)], drag)
 }
 
 /// The name with its first letter large.

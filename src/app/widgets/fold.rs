@@ -1,6 +1,18 @@
-use eframe::egui::{Align, CollapsingHeader, Color32, Label, Layout, RichText, Ui, UiBuilder};
+use eframe::egui::{
+    Align, CollapsingHeader, Color32, Label, Layout, Response, RichText, Stroke, StrokeKind, Ui, UiBuilder,
+};
 
-use crate::app::theme::{Theme, space, type_size};
+use crate::app::theme::{Theme, radius, space, type_size};
+
+/// Rings what has the focus and shows it by nothing else.
+pub fn focus_ring_ui(ui: &Ui, response: &Response) {
+    if response.has_focus() {
+        let stroke = Stroke::new(1.0, Theme::of(ui).palette.accent);
+        let corner = f32::from(radius());
+        ui.painter()
+            .rect_stroke(response.rect, corner, stroke, StrokeKind::Inside);
+    }
+}
 
 /// A part of a form that is folded away until its name is clicked; `summary` tells beside the name how it stands.
 /// `contents` is added only while it is unfolded.
@@ -23,6 +35,7 @@ pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mu
             shown.header_response
         })
         .inner;
+    focus_ring_ui(ui, &header);
     let text_width =
         ui.painter()
             .layout_no_wrap(name.to_owned(), eframe::egui::TextStyle::Body.resolve(ui.style()), dim);

@@ -6,6 +6,7 @@ use eframe::egui::{
 };
 use egui_extras::{Column, TableBuilder};
 
+use super::value_under::value_under;
 use crate::app::theme::{Theme, radius, semibold, space, type_size};
 
 const ROW_HEIGHT: f32 = space(6);
@@ -78,6 +79,8 @@ pub enum TableClick {
     Mark(usize),
     /// Opened the row in this place by a double click.
     Open(usize),
+    /// Points at the row in this place.
+    Point(usize),
 }
 
 /// Lays out a table of so many rows over the available space. With `sort`, a click on a heading orders it.
@@ -134,6 +137,7 @@ pub fn scrolled_table_ui(
                                     rect.min.x += space(3);
                                 }
                             }
+                            value_under(ui, rect, &cell.text);
                             let is_cut = text_ui(ui, rect, column.is_figure, cell, type_size().note);
                             if is_cut {
                                 let whole = ui.interact(rect, ui.scope_id().with("whole"), Sense::hover());
@@ -248,7 +252,8 @@ fn line_ui(ui: &mut Ui, row: &TableRow, place: usize, total: f32) -> Option<Tabl
     if response.double_clicked() {
         Some(TableClick::Open(place))
     } else {
-        response.clicked().then_some(TableClick::Mark(place))
+        let is_pointed = response.contains_pointer().then_some(TableClick::Point(place));
+        response.clicked().then_some(TableClick::Mark(place)).or(is_pointed)
     }
 }
 

@@ -5,7 +5,7 @@ use eframe::egui::{
     accesskit::Role, pos2,
 };
 
-use super::fields::capitalised;
+use super::{fields::capitalised, value_under::value_under};
 use crate::app::theme::{Theme, semibold, space, type_size};
 
 /// A heading and what it means.
@@ -83,6 +83,7 @@ pub fn captioned_table_ui(ui: &mut Ui, caption: &str, columns: &[Column], rows: 
                     let gap = if caption.is_empty() { "" } else { ", " };
                     let label = format!("{caption}{gap}{}, {heading}: {cell}", row.name);
                     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+                    value_under(ui, rect, cell);
                 }
             },
             index + 1 == rows.len(),

@@ -6,7 +6,7 @@ use super::{
     palette::{Palette, Reply, palette_ui},
     top_bar::{DARK, LIGHT},
 };
-use crate::app::shared::{Action, Effect, ExportGroup, Offers};
+use crate::app::shared::{Action, Effect, Offers};
 
 /// What lies over the window for a moment.
 #[derive(Debug, Default)]
@@ -44,11 +44,7 @@ impl DecouplerWindow {
         // These have no keys, and take longer to list.
         if is_listed {
             for export in self.views.all()[self.shown].exports(&self.shared) {
-                let name = match export.group {
-                    ExportGroup::Copies => export.label(),
-                    _ => format!("Export {}", export.label()),
-                };
-                if offers.offer(name, export.ask.is_ok())
+                if offers.offer(export.action(), export.ask.is_ok())
                     && let Ok(ask) = export.ask
                 {
                     effects.push(ask());
@@ -66,6 +62,7 @@ impl DecouplerWindow {
         if offers.offer(theme, true) {
             self.choose_theme(!self.shared.look.is_dark);
         }
+        self.offer_colours(&mut offers);
         self.offer_scales(&mut offers);
         if offers.offer_keys("Search actions", Modifiers::COMMAND, Key::K, true) {
             self.overlay = Overlay::Palette(Palette::default());

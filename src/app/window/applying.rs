@@ -7,12 +7,14 @@ use super::{DecouplerWindow, closing::Closing, remembered::is_within_limits, sav
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileTask, Matter, Notice, Phase, Purpose},
+        shared::{Effect, FileTask, Look, Matter, Notice, Offers, Phase, Purpose},
+        test_view::HeightScale,
         theme,
         training_worker::{Inspection, LOST, Request, Worker},
         views::CHECKPOINT,
     },
     evaluation::SimulatedSettings,
+    figure::SequentialMap,
 };
 
 impl DecouplerWindow {
@@ -56,7 +58,8 @@ impl DecouplerWindow {
                     shared.phase = shared.phase_at_rest();
                 }
             }
-            Effect::Look(look) => shared.look = look,
+            Effect::Look(look) => self.look(look),
+            Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
                 if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
                     self.type_path(task);
@@ -67,6 +70,7 @@ impl DecouplerWindow {
                 self.ctx.copy_text(text);
                 self.notices.tell(Matter::Clipboard, Notice::Done(notice));
             }
+            Effect::CopyPicture { figure, notice } => self.copying.start(*figure, notice),
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
@@ -95,6 +99,35 @@ impl DecouplerWindow {
     pub(super) fn choose_theme(&mut self, is_dark: bool) {
         self.set_dark(is_dark);
         self.remembered.is_dark = Some(is_dark);
+    }
+
+    /// Draws all surfaces so, and remembers the colours that the user chose.
+    fn look(&mut self, look: Look) {
+        if look.colours != self.shared.look.colours {
+            self.remembered.colours = Some(look.colours);
+        }
+        self.shared.look = look;
+    }
+
+    /// Offers the colours of values, and to lock or free what they span.
+    pub(super) fn offer_colours(&mut self, offers: &mut Offers<'_>) {
+        let look = self.shared.look;
+        for colours in SequentialMap::ALL {
+            if offers.offer(format!("Colours: {}", colours.name()), colours != look.colours) {
+                self.look(Look { colours, ..look });
+            }
+        }
+        let (name, heights) = match look.heights {
+            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
+            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
+        };
+        if offers.offer(name, true) {
+            self.look(Look { heights, ..look });
+        }
+        if offers.offer("Free the scale of errors", look.error_limit_mm.is_some()) {
+            let error_limit_mm = None;
+            self.look(Look { error_limit_mm, ..look });
+        }
     }
 
     pub(super) fn set_dark(&mut self, is_dark: bool) {

@@ -6,6 +6,7 @@ use super::{
     actions::Overlay,
     closing::Closing,
     columns::{edge_ui, widths_points},
+    copying::{Copying, copy_menu_ui},
     dialogs::{DialogKind, Dialogs},
     export_menu::export_menu_ui,
     files::Files,
@@ -45,6 +46,7 @@ pub struct DecouplerWindow {
     pub(super) previews: Job<PreviewEvent>,
     pub(super) runs: RunsWorker,
     pub(super) files: Files,
+    pub(super) copying: Copying,
     pub(super) dialogs: Dialogs,
     pub(super) closing: Option<Closing>,
     /// A list that lies over the window.
@@ -90,6 +92,7 @@ impl DecouplerWindow {
             previews: Job::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
+            copying: Copying::new(Arc::clone(&wake)),
             dialogs: Dialogs::new(dialogs),
             closing: None,
             overlay: Overlay::None,
@@ -102,6 +105,9 @@ impl DecouplerWindow {
         };
         if let Some(scale) = window.remembered.scale.filter(|scale| SCALES.contains(scale)) {
             window.set_scale(scale);
+        }
+        if let Some(colours) = window.remembered.colours {
+            window.shared.look.colours = colours;
         }
         if let Some(draft) = window.remembered.draft {
             window.shared.draft = draft;
@@ -205,6 +211,12 @@ impl DecouplerWindow {
             view.body_ui(ui, shared, &mut effects);
             replies
         });
+        for part in [Some(&replies.response), report.as_ref().map(|report| &report.response)]
+            .into_iter()
+            .flatten()
+        {
+            copy_menu_ui(part, || view.exports(shared), &mut effects);
+        }
         let remembered = &mut self.remembered;
         let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
         edge_ui(ui, "Width of the left column", form, true, &mut remembered.form_points);

@@ -7,10 +7,12 @@ use crate::app::{
 };
 
 /// Keys that the part of the window in focus hears.
-const IN_FOCUS: [(&str, &str); 6] = [
+const IN_FOCUS: [(&str, &str); 8] = [
     ("Turn a surface", "Arrows"),
     ("Zoom a surface", "+ and −"),
     ("Usual camera", "Home"),
+    ("Set a field to its usual value", "Double-click"),
+    ("Copy a value, a table or a picture", "Right click"),
     ("Next control", "Tab"),
     ("Previous control", "Shift+Tab"),
     ("Close what lies above the window", "Escape"),

@@ -5,6 +5,7 @@ mod actions;
 mod applying;
 mod closing;
 mod columns;
+mod copying;
 mod decoupler_window;
 mod dialogs;
 mod dropping;

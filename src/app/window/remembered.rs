@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 use crate::{
     evaluation::{SimulatedSettings, Workload},
     export::{WriteError, atomic_write},
+    figure::SequentialMap,
 };
 
 /// The size of a window that remembers none, in points.
@@ -25,6 +26,9 @@ pub(super) struct Remembered {
     /// The theme, if the user has chosen one.
     #[serde(deserialize_with = "if_readable")]
     pub(super) is_dark: Option<bool>,
+    /// Colours of values, if the user has chosen them.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) colours: Option<SequentialMap>,
     /// The name of the view on show.
     #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,

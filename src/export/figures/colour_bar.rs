@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 
 use super::{
     canvas::{Anchor, Area, Canvas, Stroke},
-    colours::{DIM, INK, viridis},
+    colours::{DIM, INK},
 };
-use crate::figure::{PlotAxis, share};
+use crate::figure::{ColourMap, PlotAxis, share};
 
 const STEPS: usize = 64;
 const WIDTH: f64 = 9.0;
@@ -20,7 +20,7 @@ pub(super) fn draw_colour_bar(
     left: f64,
     top: f64,
     height: f64,
-    axis: &PlotAxis,
+    (axis, colours): (&PlotAxis, &ColourMap),
     range: &RangeInclusive<f64>,
 ) {
     let bar = Area {
@@ -36,7 +36,7 @@ pub(super) fn draw_colour_bar(
             height: step,
             ..bar
         };
-        canvas.block(block, viridis((at as f64 + 0.5) / STEPS as f64));
+        canvas.block(block, colours.at((at as f32 + 0.5) / STEPS as f32));
     }
     let edge = Stroke::new(DIM, 0.5);
     canvas.outline(bar, edge);

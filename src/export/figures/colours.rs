@@ -1,7 +1,7 @@
 //! The colours of figures: dark enough for paper.
 
+use crate::figure::Hue;
 pub(super) use crate::figure::Rgb;
-use crate::figure::{ColourMap, Hue};
 
 pub(super) const INK: Rgb = [0x1b, 0x24, 0x30];
 pub(super) const DIM: Rgb = [0x5b, 0x64, 0x72];
@@ -25,11 +25,6 @@ pub(super) fn rgb(hue: Hue) -> Rgb {
 /// A colour so much paler, from 0 (itself) to 1 (white).
 pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
     colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
-}
-
-/// Viridis over 0..=1; beyond, its ends.
-pub(super) fn viridis(position: f64) -> Rgb {
-    ColourMap::viridis().at(position as f32)
 }
 
 /// Ink on light colours, white on dark ones.

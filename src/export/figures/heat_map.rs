@@ -1,7 +1,7 @@
 use super::{
     canvas::{Anchor, Area, CHARACTER, Canvas, TEXT},
     colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
-    colours::{INK, MISSING, contrast, viridis},
+    colours::{INK, MISSING, contrast},
     picture::Picture,
 };
 use crate::{export::format_number, figure::HeatMap};
@@ -30,6 +30,7 @@ impl HeatMap {
         };
         let mut canvas = Canvas::new(WIDTH, area.bottom() + names + 2.5 * TEXT);
         let range = self.range();
+        let colours = self.colours.colours();
         for ((row, at), &value) in self.values.indexed_iter() {
             let cell = Area {
                 left: area.left + column * at as f64,
@@ -37,7 +38,8 @@ impl HeatMap {
                 width: column,
                 height: height / rows as f64,
             };
-            let colour = self.colour_share(value, &range).map_or(MISSING, viridis);
+            let share = self.colour_share(value, &range);
+            let colour = share.map_or(MISSING, |share| colours.at(share as f32));
             canvas.block(cell, colour);
             let text = format_number(value);
             if CHARACTER * text.chars().count() as f64 <= column {
@@ -69,7 +71,7 @@ impl HeatMap {
             area.right() + 12.0,
             area.top,
             area.height,
-            &self.value_axis,
+            (&self.value_axis, colours),
             &range,
         );
         canvas.finish()

@@ -87,6 +87,24 @@ impl Picture {
     /// # Errors
     /// There is no memory for the pixels.
     pub fn png(&self) -> Result<Vec<u8>, PictureError> {
+        let encoded = self.pixmap()?.encode_png();
+        encoded.map_err(|error| PictureError::Pixels(error.to_string()))
+    }
+
+    /// The figure as pixels, 300 to the inch: width, height, and red, green, blue and opacity of each, row by row.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    #[cfg(feature = "gui")]
+    pub(crate) fn pixels(&self) -> Result<([usize; 2], Vec<u8>), PictureError> {
+        let pixmap = self.pixmap()?;
+        let size = [pixmap.width() as usize, pixmap.height() as usize];
+        let colours = pixmap.pixels().iter().map(|pixel| pixel.demultiply());
+        let bytes = colours.flat_map(|colour| [colour.red(), colour.green(), colour.blue(), colour.alpha()]);
+        Ok((size, bytes.collect()))
+    }
+
+    fn pixmap(&self) -> Result<tiny_skia::Pixmap, PictureError> {
         let options = usvg::Options {
             dpi: DOTS_PER_INCH,
             fontdb: fonts(),
@@ -98,7 +116,7 @@ impl Picture {
         let pixels = tiny_skia::Pixmap::new(size.width(), size.height());
         let mut pixels = pixels.ok_or_else(|| failed(format!("no memory for {size:?}")))?;
         resvg::render(&tree, tiny_skia::Transform::default(), &mut pixels.as_mut());
-        pixels.encode_png().map_err(|error| failed(error.to_string()))
+        Ok(pixels)
     }
 
     /// Writes the figure atomically.

@@ -11,7 +11,7 @@ use super::{
     plot_figure::PAGE_WIDTH,
 };
 use crate::figure::{
-    ColourMap, Hue,
+    ColourMap, Hue, SequentialMap,
     surface::{
         Bounds, Card, ColourScale, ContourLine, Disc, Drawing, Ink, Line, Mesh, Quantity, Surface, SurfaceFigure, Text,
     },
@@ -49,7 +49,7 @@ pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
             &Card {
                 bounds: layout(width, height),
                 measure: &measure,
-                colours: colours(surface.quantity),
+                colours: colours(surface.quantity, surface.colours),
             },
         );
         notes.extend(drawing.dots.note().map(|note| (left, note)));
@@ -68,7 +68,7 @@ pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         };
         canvas.title([area.centre()[0], 0.5 * TITLE + 2.0], &surface.title);
         canvas.clipped(area, |canvas| {
-            Pen { canvas, area }.draw_surface(drawing, figure.marked_node);
+            Pen { canvas, area }.draw_surface(surface, drawing, figure);
         });
         if has_key(card) {
             let area = Area {
@@ -113,7 +113,7 @@ fn measure(text: &str) -> Vec2 {
     Vec2::new(text.chars().map(width).sum(), 1.2) * TYPE_SIZE
 }
 
-fn colours(quantity: Quantity) -> &'static ColourMap {
+fn colours(quantity: Quantity, sequential: SequentialMap) -> &'static ColourMap {
     static DIVERGING: OnceLock<ColourMap> = OnceLock::new();
     const STOPS: [Rgb; 5] = [
         [0x0b, 0x3d, 0x91],
@@ -125,7 +125,7 @@ fn colours(quantity: Quantity) -> &'static ColourMap {
     if quantity.is_diverging() {
         DIVERGING.get_or_init(|| ColourMap::diverging(STOPS))
     } else {
-        ColourMap::viridis()
+        sequential.colours()
     }
 }
 
@@ -153,7 +153,7 @@ impl Pen<'_> {
         [self.area.left + x * SCALE, self.area.top + y * SCALE]
     }
 
-    fn draw_surface(&mut self, drawing: &Drawing, marked_node: Option<usize>) {
+    fn draw_surface(&mut self, surface: &Surface, drawing: &Drawing, figure: &SurfaceFigure) {
         self.draw_frame(&drawing.lines, &drawing.texts);
         let mesh = &drawing.mesh;
         self.canvas.begin_facets();
@@ -162,13 +162,23 @@ impl Pen<'_> {
             self.draw_contours(lines);
         }
         self.canvas.end_group();
+        if let Some(section) = &figure.section {
+            for piece in section.pieces(surface, &drawing.sight) {
+                let ends: Vec<[At; 2]> = piece
+                    .windows(2)
+                    .map(|ends| [ends[0], ends[1]].map(|at| self.at(at.as_vec2())))
+                    .collect();
+                self.canvas
+                    .segments(&ends, Stroke::new(hue_rgb(Hue::Orange), 1.5 * SCALE), 1.0);
+            }
+        }
         for Disc {
             at,
             radius,
             ring,
             ink,
             opacity,
-        } in drawing.dots.discs(marked_node)
+        } in drawing.dots.discs(figure.marked_node, &figure.lit_nodes)
         {
             let [radius, opacity] = [radius, opacity].map(f64::from);
             let ring = ring.map(|width| f64::from(width) * SCALE);
@@ -236,7 +246,7 @@ impl Pen<'_> {
                 height: step,
                 ..bar
             };
-            let colour = colours(scale.quantity).at((at as f32 + 0.5) / BAR_STEPS as f32);
+            let colour = colours(scale.quantity, scale.colours).at((at as f32 + 0.5) / BAR_STEPS as f32);
             self.canvas.block(block, colour);
         }
         self.canvas.outline(bar, Stroke::new(EDGE, 0.75 * SCALE));

@@ -10,7 +10,7 @@ use crate::{
     evaluation::NodeAddress,
     export::NetworkFile,
     figure::{
-        Figure, error_histogram_figure, loss_figure, regression_figure,
+        Figure, SequentialMap, error_histogram_figure, loss_figure, regression_figure,
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
         training_state_figure, z_pairs_mm,
     },
@@ -43,7 +43,7 @@ pub(super) fn pictures(file: &NetworkFile, test: &Dataset, decoupled_mm: &Array2
         ),
         (
             "Distribution of the z errors of the test set.".to_owned(),
-            error_histogram_figure(&pairs_mm).into(),
+            error_histogram_figure(&pairs_mm, None).into(),
         ),
         (
             "Decoupled against actual z of the nodes of the test set.".to_owned(),
@@ -98,6 +98,7 @@ fn surfaces(
             quantity,
             range,
             mode: ViewMode::Top,
+            colours: SequentialMap::default(),
         }
     };
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
@@ -113,5 +114,6 @@ fn surfaces(
         ],
         camera: OrbitCamera::default(),
         marked_node: Some(place * scale.nodes_per_row() + worst.node),
+        ..SurfaceFigure::default()
     })
 }

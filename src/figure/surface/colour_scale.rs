@@ -10,7 +10,10 @@ use super::{
     quantity::Quantity,
     shapes::{Bounds, Ink, Line, Text},
 };
-use crate::figure::ticks::{multiples, round_steps, tick_text};
+use crate::figure::{
+    colour_map::SequentialMap,
+    ticks::{multiples, round_steps, tick_text},
+};
 
 const BAR_WIDTH: f32 = 12.0;
 
@@ -21,6 +24,8 @@ pub struct ColourScale {
     pub quantity: Quantity,
     /// Values at both ends.
     pub range: RangeInclusive<f64>,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
 }
 
 /// A laid-out colour scale: a bar from the lowest value at the bottom to the highest at the top.

@@ -324,8 +324,9 @@ mod tests {
             quantity: Quantity::Height,
             range: 4.0..=5.0,
             mode: ViewMode::ThreeD,
+            colours: Default::default(),
         };
-        let field = Field::new(&surface);
+        let (field, colours) = (Field::new(&surface), surface.colours.colours());
         let (min_mm, max_mm) = field.box_mm();
         let plot_box = PlotBox::new(min_mm, max_mm, 1.0);
         let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
@@ -333,7 +334,7 @@ mod tests {
         for turn in 0..6 {
             let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
             let projection = Projection::fit(plot_box, camera, screen);
-            let mesh = Mesh::new(&field, &Stage::Space(&projection), ColourMap::viridis());
+            let mesh = Mesh::new(&field, &Stage::Space(&projection), colours);
             let distance = |index: usize| {
                 let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
                 let z = field.values[index].clamp(min_mm.z, max_mm.z);

@@ -6,7 +6,7 @@
 //!
 //! `camera` and `projection` say where things lie; `box_axes` and `plan_axes` lay out the frame with its ticks, for which
 //! `labels` finds room; `mesh` is the height field with its contour lines from far to near; `nodes` are the dots on it. `sight` leads back from the
-//! screen, and `pick` to the surface.
+//! screen, and `pick` to the surface; `section` cuts it along a wire.
 
 mod box_axes;
 mod camera;
@@ -24,6 +24,7 @@ mod pick;
 mod plan_axes;
 mod projection;
 mod quantity;
+mod section;
 mod shapes;
 mod sight;
 mod surface_figure;
@@ -34,6 +35,7 @@ pub use drawing::{Card, Drawing};
 pub use mesh::{ContourLine, Mesh, Vertex};
 pub use nodes::Dots;
 pub use quantity::Quantity;
+pub use section::{Section, SectionLine};
 pub use shapes::{Bounds, Disc, Ink, Line, Text};
 pub use sight::{AboveSight, EyeSight, Ray, Sight};
 pub use surface_figure::{Surface, SurfaceFigure, ViewMode};

@@ -79,8 +79,8 @@ impl Dots {
         self.dots.get(node).copied().flatten().map(|dot| dot.at)
     }
 
-    /// The discs to paint, in this order, with a mark around one node.
-    pub fn discs(&self, marked: Option<usize>) -> impl Iterator<Item = Disc> {
+    /// The discs to paint, in this order, with rings around the nodes `lit` and a mark around one node.
+    pub fn discs<'a>(&'a self, marked: Option<usize>, lit: &'a [usize]) -> impl Iterator<Item = Disc> + 'a {
         let radius = self.radius();
         let drawn = self.dots.iter().flatten().filter(move |_| radius > 0.0);
         let dots = drawn.flat_map(move |dot| {
@@ -90,6 +90,16 @@ impl Dots {
                 at: dot.at,
                 radius,
                 ring: None,
+                ink,
+                opacity,
+            })
+        });
+        let lit = lit.iter().filter_map(|&node| self.position(node));
+        let rings = lit.flat_map(|at| {
+            [(Ink::Ground, 2.5, 0.8), (Ink::Accent, 1.5, 1.0)].map(|(ink, width, opacity)| Disc {
+                at,
+                radius: 4.5,
+                ring: Some(width),
                 ink,
                 opacity,
             })
@@ -109,7 +119,7 @@ impl Dots {
                 opacity,
             })
         });
-        dots.chain(mark)
+        dots.chain(rings).chain(mark)
     }
 
     /// Dots shrink when there are many of them, and go when they would cover the surface.

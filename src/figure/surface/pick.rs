@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::{
         figure::{
-            ColourMap,
+            SequentialMap,
             surface::{Bounds, Card, OrbitCamera, Quantity, Sight, ViewMode},
         },
         surface::SurfaceMap,
@@ -125,6 +125,7 @@ mod tests {
             quantity: Quantity::Height,
             range: 4.0..=5.0,
             mode,
+            colours: SequentialMap::default(),
         }
     }
 
@@ -137,7 +138,7 @@ mod tests {
                     max: Vec2::new(370.0, 400.0),
                 },
                 measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
-                colours: ColourMap::viridis(),
+                colours: SequentialMap::default().colours(),
             },
         );
         (drawing.sight, drawing.dots)

@@ -1,13 +1,13 @@
 /// Quantity that a surface shows, and with it its colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
-    /// Heights, in viridis.
+    /// Heights.
     Height,
     /// Errors, diverging about zero.
     Error,
     /// A deformation pattern without a scale of its own, diverging about zero.
     Pattern,
-    /// Change of the readings with each node, in viridis.
+    /// Change of the readings with each node.
     Sensitivity,
 }
 

@@ -5,8 +5,8 @@ use std::{ops::RangeInclusive, sync::Arc};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{camera::OrbitCamera, colour_scale::ColourScale, quantity::Quantity};
-use crate::surface::SurfaceMap;
+use super::{camera::OrbitCamera, colour_scale::ColourScale, quantity::Quantity, section::Section};
+use crate::{figure::colour_map::SequentialMap, surface::SurfaceMap};
 
 /// View of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -35,6 +35,8 @@ pub struct Surface {
     pub range: RangeInclusive<f64>,
     /// In space or from above.
     pub mode: ViewMode,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
 }
 
 impl Surface {
@@ -43,6 +45,7 @@ impl Surface {
         ColourScale {
             quantity: self.quantity,
             range: self.range.clone(),
+            colours: self.colours,
         }
     }
 
@@ -53,12 +56,13 @@ impl Surface {
         Arc::ptr_eq(&self.map, &other.map)
             && Arc::ptr_eq(&self.values, &other.values)
             && Arc::ptr_eq(&self.nodes, &other.nodes)
-            && (self.quantity, self.mode, bits(self)) == (other.quantity, other.mode, bits(other))
+            && (self.quantity, self.mode, self.colours, bits(self))
+                == (other.quantity, other.mode, other.colours, bits(other))
     }
 }
 
 /// Surfaces side by side, seen by one camera.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SurfaceFigure {
     /// From left to right.
     pub surfaces: Vec<Surface>,
@@ -66,6 +70,10 @@ pub struct SurfaceFigure {
     pub camera: OrbitCamera,
     /// Index of the node that is marked on each.
     pub marked_node: Option<usize>,
+    /// Indices of nodes that are lit on each.
+    pub lit_nodes: Vec<usize>,
+    /// Line along which the surfaces are cut in a figure of their section.
+    pub section: Option<Section>,
 }
 
 impl SurfaceFigure {

@@ -21,6 +21,8 @@ pub struct CompareView {
     pub card: RightCard,
     /// The run that the user is asked about before it is removed.
     pub removing: Option<u64>,
+    /// The node under the pointer, lit on both surfaces.
+    pub node: Option<usize>,
     wake: Wake,
 }
 
@@ -77,6 +79,7 @@ impl CompareView {
             snapshot: 0,
             card: RightCard::default(),
             removing: None,
+            node: None,
             wake,
         }
     }

@@ -1,10 +1,10 @@
-use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
 use super::{CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui};
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Export, Look, PLACES, RightCard, RunList, Shared, View},
+        shared::{Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui},
         surface_view::{ColourBar, SurfaceView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
@@ -56,10 +56,8 @@ impl View for CompareView {
             card_ui(ui, card, |ui| self.side_ui(ui, shared, place, surface, effects));
         }
         if let [colours, ..] = &figure.scales()[..] {
-            let (slot, theme) = (scale.shrink2(Vec2::new(0.0, space(4))), Theme::of(ui));
-            let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-            let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
-            bar.on_hover_text(figure.note());
+            let slot = scale.shrink2(Vec2::new(0.0, space(4)));
+            colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
         }
         let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
         let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
@@ -86,16 +84,17 @@ impl CompareView {
             let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
             let [_, decoupled, error] = frames;
             let name = shared.runs.pinned(place).map_or("", |run| &run.name);
-            let (letter, mode) = (PLACES[place], look.mode);
+            let (letter, style) = (PLACES[place], look.style());
             Some(match self.card {
-                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, mode),
-                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, mode),
+                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, style),
+                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, style),
             })
         };
         SurfaceFigure {
             surfaces: (0..self.places.len()).filter_map(surface).collect(),
             camera: look.camera,
-            marked_node: None,
+            marked_node: self.node,
+            ..SurfaceFigure::default()
         }
         .with_common_scales()
     }
@@ -141,7 +140,7 @@ impl CompareView {
             });
         });
         match surface {
-            Some(surface) => surface_ui(ui, place, surface, look, effects),
+            Some(surface) => surface_ui(ui, place, surface, look, &mut self.node, effects),
             None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
             None => {
                 let text = format!("Press {} next to a run in the list to show it here.", PLACES[place]);
@@ -151,14 +150,29 @@ impl CompareView {
     }
 }
 
-fn surface_ui(ui: &mut Ui, place: usize, surface: &Surface, look: Look, effects: &mut Vec<Effect>) {
+fn surface_ui(
+    ui: &mut Ui,
+    place: usize,
+    surface: &Surface,
+    look: Look,
+    node: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) {
     let view = SurfaceView {
         label: ["Surface of A", "Surface of B"][place],
         surface,
-        marked_node: None,
+        marked_node: *node,
+        lit_nodes: &[],
+        section: None,
         theme: Theme::of(ui),
     };
-    let camera = view.show(ui, look.camera).camera;
+    let shown = view.show(ui, look.camera);
+    let camera = shown.camera;
+    // The node of the same number is lit on the other surface.
+    if shown.response.contains_pointer() && shown.hovered_node != *node {
+        *node = shown.hovered_node;
+        ui.ctx().request_repaint();
+    }
     if camera != look.camera {
         effects.push(Effect::Look(Look { camera, ..look }));
     }

@@ -9,6 +9,7 @@ use crate::{
     },
     evaluation::experiments::verdicts,
     export::{atomic_write, cells_table, describe_conditions, trials_table, write_experiment_markdown},
+    figure::{Figure, SequentialMap},
 };
 
 const CELLS: FileWords = FileWords {
@@ -30,12 +31,17 @@ const MARKDOWN: FileWords = FileWords {
 };
 
 /// The figure, the tables, and the verdicts of the experiment on show.
-pub(super) fn experiment_exports(view: &ExperimentsView) -> Vec<Export<'_>> {
+pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");
     let outcome = view.outcome().filter(|outcome| outcome.trials().0 > 0);
     let outcome = outcome.ok_or_else(|| "No trial has finished yet: press Run first.".to_owned());
-    let figure = outcome.clone().map(|outcome| || outcome.figure.clone());
+    let figure = outcome.clone().map(|outcome| {
+        move || match outcome.figure.clone() {
+            Figure::HeatMap(map) => map.coloured(colours).into(),
+            figure => figure,
+        }
+    });
     let mut exports: Vec<Export<'_>> = picture_exports("Figure", stem.clone(), figure).collect();
     let cells = outcome.clone().map(|outcome| || cells_table(&outcome.results));
     exports.push(csv_export("Table", CELLS, stem.clone(), cells));

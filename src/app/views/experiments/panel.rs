@@ -1,4 +1,4 @@
-use eframe::egui::{Button, ComboBox, DragValue, TextEdit, Ui, vec2};
+use eframe::egui::{Button, ComboBox, TextEdit, Ui, vec2};
 
 use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
         theme::space,
         widgets::{
             dim_ui,
-            fields::{count_ui, field_ui},
+            fields::{count_ui, seed_ui},
             ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
         },
     },
@@ -110,12 +110,7 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettin
     let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
     count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MOST_TRIALS);
     let hint = "First of the consecutive seeds. The same seeds give the same results.";
-    field_ui(ui, "First seed", hint, |ui| {
-        let drag = DragValue::new(&mut template.base.seed.0)
-            .speed(0.1)
-            .update_while_editing(false);
-        ui.add_sized([space(16), space(6)], drag)
-    });
+    seed_ui(ui, "First seed", hint, &mut template.base.seed.0, 0);
     let hint = "Largest number of epochs per training. The paper does not state its own.";
     let epochs = &mut template.base.training.stopping.epochs;
     count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MOST_EPOCHS);

@@ -66,8 +66,8 @@ impl View for ExperimentsView {
         }
     }
 
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
-        experiment_exports(self)
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        experiment_exports(self, shared.look.colours)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -129,7 +129,10 @@ fn picture_ui(
     effects: &mut Vec<Effect>,
 ) {
     match &outcome.figure {
-        Figure::HeatMap(map) => sweep_ui(ui, (outcome, &**map), look, shared, effects),
+        Figure::HeatMap(map) => {
+            let map = (**map).clone().coloured(shared.look.colours);
+            sweep_ui(ui, (outcome, &map), look, shared, effects);
+        }
         Figure::Plots(plots) => {
             legend_ui(ui, &plots.keys);
             plots_ui(ui, topic.name(), plots, Pointer::Moves);

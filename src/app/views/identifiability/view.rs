@@ -1,12 +1,12 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
-use eframe::egui::{Align, Layout, Rect, Response, RichText, Sense, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, Vec2};
 
 use super::{Analysis, IdentifiabilityView, facts::facts_ui, form};
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Export, Look, Shared, View, picture_exports},
+        shared::{Effect, Export, Look, Shared, View, colour_scale_ui, picture_exports},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
@@ -100,8 +100,8 @@ fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Sha
         let left = upper.left() + (width + gap) * card as f32;
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
         card_ui(ui, card, |ui| {
-            let scale = surface_ui(ui, (surface, label), shared.look, analysis, &mut pointed, effects);
-            scale.on_hover_text(figure.note());
+            let slot = surface_ui(ui, (surface, label), shared.look, analysis, &mut pointed, effects);
+            colour_scale_ui(ui, slot, &surface.scale(), &figure.note(), shared.look, effects);
         });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
@@ -142,6 +142,7 @@ fn identifiability_figure(shown: &IdentifiabilityView, analysis: &Analysis, plac
         quantity,
         range,
         mode,
+        colours: look.colours,
     };
     let (pattern, sensitivity) = (&analysis.patterns[place], &analysis.sensitivities[place]);
     let pattern = surface(
@@ -157,10 +158,12 @@ fn identifiability_figure(shown: &IdentifiabilityView, analysis: &Analysis, plac
         surfaces: vec![pattern, sensitivity],
         camera: look.camera,
         marked_node: shown.node,
+        ..SurfaceFigure::default()
     }
 }
 
-/// One of the two pictures: `axis` is the one on show, `node` the one marked on both. Returns the scale of its colours.
+/// One of the two pictures: `axis` is the one on show, `node` the one marked on both. Returns the place of the scale of its
+/// colours.
 fn surface_ui(
     ui: &mut Ui,
     (surface, label): (&Surface, &str),
@@ -168,7 +171,7 @@ fn surface_ui(
     analysis: &Analysis,
     (axis, node): &mut (usize, Option<usize>),
     effects: &mut Vec<Effect>,
-) -> Response {
+) -> Rect {
     let theme = Theme::of(ui);
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
@@ -190,6 +193,8 @@ fn surface_ui(
         label,
         surface,
         marked_node,
+        lit_nodes: &[],
+        section: None,
         theme,
     };
     let shown = view.show(&mut slot, look.camera);
@@ -202,9 +207,7 @@ fn surface_ui(
         ui.ctx().request_repaint();
     }
     shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
-    let mut slot = ui.new_child(UiBuilder::new().max_rect(scale));
-    let colours = surface.scale();
-    ColourBar { scale: &colours, theme }.show(&mut slot, scale.height())
+    scale
 }
 
 fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {

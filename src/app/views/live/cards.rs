@@ -1,13 +1,13 @@
 use std::sync::Arc;
 
-use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 
 use super::{LiveView, engine::LiveFrame};
 use crate::{
     app::{
-        shared::{Effect, Look, Shared},
+        shared::{Effect, Look, Shared, colour_scale_ui},
         surface_view::{ColourBar, SurfaceView},
-        test_view::Frame,
+        test_view::{Frame, HeightScale},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, segmented_ui},
     },
@@ -41,10 +41,8 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared
         });
     }
     if let [colours, ..] = &figure.scales()[..] {
-        let (slot, theme) = (scale.shrink2(Vec2::new(0.0, space(4))), Theme::of(ui));
-        let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-        let bar = ColourBar { scale: colours, theme }.show(&mut slot_ui, slot.height());
-        bar.on_hover_text(figure.note());
+        let slot = scale.shrink2(Vec2::new(0.0, space(4)));
+        colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
     }
     view.node = node;
 }
@@ -57,8 +55,12 @@ pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look)
         values: Arc::clone(&heights.grid_mm),
         nodes: Arc::clone(&heights.nodes_mm),
         quantity: Quantity::Height,
-        range: frame.z_range_mm.clone(),
+        range: match look.heights {
+            HeightScale::Stroke => frame.z_range_mm.clone(),
+            HeightScale::Fitted => heights.range_mm().unwrap_or_else(|| frame.z_range_mm.clone()),
+        },
         mode: look.mode,
+        colours: look.colours,
     };
     let actual = frame.actual.as_ref().map(|actual| surface("Actual", actual));
     SurfaceFigure {
@@ -67,7 +69,9 @@ pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look)
             .collect(),
         camera: look.camera,
         marked_node,
+        ..SurfaceFigure::default()
     }
+    .with_common_scales()
 }
 
 fn modes_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
@@ -88,6 +92,8 @@ fn surface_ui(
         label: &format!("Live {} surface", surface.title.to_lowercase()),
         surface,
         marked_node: *node,
+        lit_nodes: &[],
+        section: None,
         theme: Theme::of(ui),
     }
     .show(ui, look.camera);

@@ -16,7 +16,8 @@ pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a
     let surfaces = frame
         .clone()
         .map(|frame| || Figure::from(surface_figure(frame, None, shared.look)));
-    let readings = frame.map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent())));
+    let readings = frame
+        .map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent()).coloured(shared.look.colours)));
     let recording = view.recorded.as_ref().map(save_recording);
     let zero = view.zero.as_ref().map(save_zero);
     let files = [

@@ -8,16 +8,16 @@ use super::{
 use crate::{
     app::{
         plotting::cells_ui,
-        theme::{semibold, space, type_size},
+        theme::{Theme, semibold, space, type_size},
         widgets::segmented_ui,
     },
     export::format_number,
-    figure::{HeatMap, readings_figure, zero_gains_figure},
+    figure::{HeatMap, SequentialMap, readings_figure, zero_gains_figure},
     live::ZeroGains,
 };
 
 /// Readings of the frame as a map of rows and columns, or the gains of the unloaded state.
-pub fn readings_ui(ui: &mut Ui, view: &mut LiveView) {
+pub fn readings_ui(ui: &mut Ui, view: &mut LiveView, colours: SequentialMap) {
     let Some(frame) = &view.shown.frame else { return };
     let gains = view.zero.as_ref().and_then(|zero| gains_of(zero, frame));
     ui.horizontal(|ui| {
@@ -35,8 +35,10 @@ pub fn readings_ui(ui: &mut Ui, view: &mut LiveView) {
         Some(gains) if view.shows_zero => ("Gains of the unloaded state", zero_gains_figure(gains, &frame.rows)),
         _ => ("Live readings", figure_of(frame, view.drops.largest_percent())),
     };
+    let map = map.coloured(colours);
     let (rows, columns) = marked(frame);
-    let Some(([row, column], cell)) = cells_ui(ui, label, &map, (&rows, &columns)) else {
+    let warning = Theme::of(ui).palette.warning;
+    let Some(([row, column], cell)) = cells_ui(ui, label, &map, (&rows, &columns, warning)) else {
         return;
     };
     let value = format_number(map.values[[row, column]]);

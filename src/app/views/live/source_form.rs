@@ -167,7 +167,7 @@ impl SourceForm {
                 SourceKind::Simulated => {
                     let hint = "Rate at which the simulated array is read.";
                     let rate = &mut self.frames_per_second;
-                    quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "");
+                    quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "Hz");
                 }
                 SourceKind::Replay => self.file_ui(ui, effects),
                 SourceKind::Serial => {

@@ -192,7 +192,7 @@ fn split_ui(ui: &mut Ui, draft: &mut Draft, needs_validation: bool, task: FileTa
         );
     } else {
         let hint = "Share of the samples that test and are never trained on.";
-        percent_ui(ui, "Test share", hint, &mut division.test_fraction, 1.0..=90.0);
+        percent_ui(ui, "Test share", hint, &mut division.test_fraction, 0.2, 1.0..=90.0);
         match division.by {
             SplitBy::Random => {
                 note_ui(ui, flattery(SplitBy::Random));
@@ -212,6 +212,7 @@ fn split_ui(ui: &mut Ui, draft: &mut Draft, needs_validation: bool, task: FileTa
         "Validation share",
         hint,
         &mut division.validation_fraction,
+        if needs_validation { 0.2 } else { 0.0 },
         0.0..=90.0,
     );
     if needs_validation && division.validation_fraction == 0.0 {

@@ -7,7 +7,7 @@ use super::{
 use crate::app::{
     plotting::{Pointer, cells_ui, legend_ui, plots_ui},
     shared::Phase,
-    theme::space,
+    theme::{Theme, space},
     widgets::{placeholder_ui, tabs_ui},
 };
 
@@ -50,7 +50,12 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
             plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
         }
         Chart::Map(map) => {
-            if let Some(([row, column], response)) = cells_ui(ui, "Error over the position", &map, (&[], &[])) {
+            if let Some(([row, column], response)) = cells_ui(
+                ui,
+                "Error over the position",
+                &map,
+                (&[], &[], Theme::of(ui).palette.warning),
+            ) {
                 response.on_hover_text_at_pointer(&map.notes[[row, column]]);
             }
         }

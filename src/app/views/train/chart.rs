@@ -1,4 +1,8 @@
-use super::state::TrainView;
+use super::{
+    bottom_tab::BottomTab,
+    inspect::{section_of, with_lights},
+    state::TrainView,
+};
 use crate::{
     app::shared::Shared,
     figure::{
@@ -7,45 +11,17 @@ use crate::{
     },
 };
 
-/// The charts below the surfaces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BottomTab {
-    /// Error against epoch.
-    #[default]
-    Loss,
-    /// Gradient, damping or rate, and validation failures against epoch.
-    TrainingState,
-    /// Distribution of the errors of z.
-    ErrorHistogram,
-    /// Decoupled against actual z.
-    Regression,
-    /// The nodes of the snapshot: the paper's Fig. 6.
-    Nodes,
-    /// Readings of the snapshot, where there is no room for a card of their own.
-    Readings,
-}
-
-impl BottomTab {
-    /// The word for the chart in a file's name.
-    pub(super) fn file_word(self) -> &'static str {
-        match self {
-            Self::Loss => "loss",
-            Self::TrainingState => "training-state",
-            Self::ErrorHistogram => "histogram",
-            Self::Regression => "regression",
-            Self::Nodes => "nodes",
-            Self::Readings => "readings",
-        }
-    }
-}
-
-/// The chart on show; `None` before there is anything to draw.
+/// The chart on show, with what is lit standing out; `None` before there is anything to draw.
 pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
+    Some(with_lights(figure(view, shared)?, view, shared))
+}
+
+fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
     let trained = || shared.shown_run().zip(view.result(shared));
     Some(match view.tab {
         BottomTab::Loss => {
             let (run, result) = trained()?;
-            let mut figure = loss_figure(&run.history, &run.stages, result.best_epoch);
+            let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
             if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
                 let at = LineAt::X(epoch as f64);
                 plot.lines
@@ -55,9 +31,9 @@ pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigu
         }
         BottomTab::TrainingState => {
             let (run, _) = trained()?;
-            training_state_figure(&run.history, &run.stages)
+            training_state_figure(run.outline.records(), &run.stages)
         }
-        BottomTab::ErrorHistogram => error_histogram_figure(view.drawn.pairs_mm()?),
+        BottomTab::ErrorHistogram => error_histogram_figure(view.drawn.pairs_mm()?, view.lights.bar),
         BottomTab::Regression => regression_figure(view.drawn.pairs_mm()?),
         BottomTab::Nodes => {
             let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
@@ -66,6 +42,7 @@ pub(super) fn chart_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigu
             let bars_mm = view.error_bars_mm();
             node_figure(&frames.actual.nodes_mm, decoupled_mm, bars_mm, nodes_per_row)
         }
+        BottomTab::Section => section_of(&view.section, shared.test()?, view.frames(), shared.look),
         BottomTab::Readings => return None,
     })
 }

@@ -62,6 +62,9 @@ impl Drawn {
         if is_same && self.snapshot == snapshot {
             return snapshot;
         }
+        let is_same_test = self.of.as_ref().is_some_and(|of| Arc::ptr_eq(&of.test, &test.set));
+        // The surface of what is actual stays while the network learns.
+        let actual = (is_same_test && self.snapshot == snapshot).then(|| std::mem::take(&mut self.frames.actual));
         if !is_same {
             *self = Self {
                 of: Some(Of {
@@ -73,8 +76,11 @@ impl Drawn {
         }
         self.snapshot = snapshot;
         self.drops_percent = test.drops_percent(&test.readings_ohm(snapshot));
-        let actual = test.frame(test.set.targets(), snapshot);
-        let decoupled = decoupled_mm.map(|decoupled_mm| test.frame(decoupled_mm.view(), snapshot));
+        let actual = actual.unwrap_or_else(|| test.frame(test.set.targets(), snapshot));
+        let decoupled = result.map(|result| match &result.frame {
+            Some((of, frame)) if *of == snapshot => frame.clone(),
+            _ => test.frame(result.decoupled_mm.view(), snapshot),
+        });
         self.frames = Frames {
             decoupled: decoupled.map(|decoupled| {
                 let error = actual.error_of(&decoupled);
@@ -119,6 +125,7 @@ mod tests {
         RunResult {
             errors: run.errors_of(&decoupled_mm).unwrap(),
             decoupled_mm: Arc::new(decoupled_mm),
+            frame: None,
             best_epoch: 0,
             flaw: None,
             epochs_run: 0,

@@ -1,11 +1,13 @@
 //! The Train view: one training and what it makes of the sensor.
 
+mod bottom_tab;
 mod chart;
 mod charts_card;
 mod configuration;
 mod decoders;
 mod drawn;
 mod exports;
+mod inspect;
 mod paper_figure;
 mod press;
 mod report;
@@ -15,7 +17,7 @@ mod surfaces;
 mod view;
 mod workbench;
 
-pub use chart::BottomTab;
+pub use bottom_tab::BottomTab;
 pub use decoders::DecoderResult;
 pub use exports::{CHECKPOINT, checkpoint_task};
 pub use state::TrainView;

@@ -1,4 +1,4 @@
-use super::chart::BottomTab;
+use super::bottom_tab::BottomTab;
 use crate::{evaluation::SimulatedSettings, figure::surface::ViewMode, sensor::SensorModel};
 
 /// A figure of the paper that the window can show: its configuration, trained and looked at in its way.

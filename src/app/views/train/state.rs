@@ -3,9 +3,10 @@ use std::sync::Arc;
 use ndarray::Array2;
 
 use super::{
-    chart::BottomTab,
+    bottom_tab::BottomTab,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
+    inspect::{Lighting, SectionChoice},
     paper_figure::PaperFigure,
     press::PressState,
     scrub::ScrubState,
@@ -24,12 +25,16 @@ use crate::{
 pub struct TrainView {
     /// Snapshot of the test set.
     pub snapshot: usize,
+    /// The snapshot that the worker was told of.
+    pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
     /// The chart below.
     pub tab: BottomTab,
-    /// The node under the pointer, marked on every picture.
-    pub node: Option<usize>,
+    /// What the pointer lights up in every picture.
+    pub lights: Lighting,
+    /// The wire along which the surfaces are cut.
+    pub section: SectionChoice,
     /// True if each decoupled node has a bar of its root mean square error.
     pub has_error_bars: bool,
     /// Drawings of the test set.
@@ -48,9 +53,11 @@ impl TrainView {
     pub fn new(wake: Wake) -> Self {
         Self {
             snapshot: 0,
+            watched: 0,
             right: RightCard::default(),
             tab: BottomTab::default(),
-            node: None,
+            lights: Lighting::default(),
+            section: SectionChoice::default(),
             has_error_bars: false,
             drawn: Drawn::default(),
             press: PressState::new(&wake),
@@ -66,7 +73,8 @@ impl TrainView {
         let result = result_of(&self.scrub, shared);
         self.snapshot = self.drawn.follow(shared, result, self.snapshot);
         self.press.follow(shared, result);
-        self.node = self.node.filter(|&node| node < self.frames().actual.nodes_mm.len());
+        let nodes = self.frames().actual.nodes_mm.len();
+        self.lights.node = self.lights.node.filter(|&node| node < nodes);
     }
 
     /// The result on show: of the training so far, or of the past epoch that was brought back.
@@ -101,7 +109,7 @@ impl TrainView {
     /// Goes to this node and marks it.
     pub(super) fn go_to(&mut self, address: NodeAddress, shared: &Shared) {
         self.show_snapshot(address.snapshot);
-        self.node = shared.test().and_then(|test| test.node(address));
+        self.lights.node = shared.test().and_then(|test| test.node(address));
     }
 
     /// Looks at a figure of the paper, and trains what it shows unless that is there.

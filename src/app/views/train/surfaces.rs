@@ -1,20 +1,23 @@
-use eframe::egui::{Align, Layout, Rect, RichText, Ui, UiBuilder, Vec2};
+use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
+use glam::DVec2;
 
 use super::{
+    bottom_tab::BottomTab,
     drawn::Frames,
+    inspect::lit_nodes,
     press::{Hand, Shown},
     state::TrainView,
 };
 use crate::{
     app::{
-        shared::{Effect, Look, RightCard, Shared},
+        shared::{Effect, Look, RightCard, Shared, colour_scale_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
     },
     export::format_number,
-    figure::surface::{Surface, SurfaceFigure, ViewMode},
+    figure::surface::{Section, Surface, SurfaceFigure, ViewMode},
 };
 
 /// Work of the pointer on the actual surface.
@@ -38,25 +41,40 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
     let figure = surface_figure(view, shared);
     card_ui(ui, left, |ui| actual_card_ui(ui, &figure, view, shared, effects));
     card_ui(ui, right, |ui| right_card_ui(ui, &figure, view, shared, effects));
-    colour_scales_ui(ui, scales, &figure);
+    let (parts, note) = (figure.scales(), figure.note());
+    let part = scales.height() / parts.len().max(1) as f32;
+    for (index, scale) in parts.iter().enumerate() {
+        let top = scales.top() + part * index as f32;
+        let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
+        colour_scale_ui(ui, slot, scale, &note, shared.look, effects);
+    }
 }
 
 /// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
-    let (frames, mode) = (view.frames(), shared.look.mode);
+    let (frames, style) = (view.frames(), shared.look.style());
     let surfaces = shared.test().into_iter().flat_map(|test| {
-        let actual = test.heights("Actual", &frames.actual, mode);
+        let actual = test.heights("Actual", &frames.actual, style);
         let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
-            RightCard::Decoupled => test.heights("Decoupled", decoupled, mode),
-            RightCard::Error => test.errors("Error", error, mode),
+            RightCard::Decoupled => test.heights("Decoupled", decoupled, style),
+            RightCard::Error => test.errors("Error", error, style),
         });
         std::iter::once(actual).chain(beside)
     });
     SurfaceFigure {
         surfaces: surfaces.collect(),
         camera: shared.look.camera,
-        marked_node: view.node,
+        marked_node: view.lights.node,
+        lit_nodes: lit_nodes(view, shared),
+        section: section(view, shared),
     }
+    .with_common_scales()
+}
+
+/// The line of the section, while that is on show.
+fn section(view: &TrainView, shared: &Shared) -> Option<Section> {
+    let test = shared.test().filter(|_| view.tab == BottomTab::Section)?;
+    Some(view.section.section(test))
 }
 
 /// The invitation of a card without a network: to press, which a small one answers, or to train.
@@ -123,7 +141,7 @@ fn actual_card_ui(
         });
     });
     if let Some(surface) = figure.surfaces.first() {
-        surface_ui(ui, surface, Role::Actual, view, shared, effects);
+        surface_ui(ui, (surface, figure), Role::Actual, view, shared, effects);
     }
 }
 
@@ -145,22 +163,8 @@ fn right_card_ui(
         });
     });
     match figure.surfaces.get(1) {
-        Some(surface) => surface_ui(ui, surface, Role::Network, view, shared, effects),
+        Some(surface) => surface_ui(ui, (surface, figure), Role::Network, view, shared, effects),
         None => invitation_ui(ui, view, shared),
-    }
-}
-
-/// The scale that both surfaces share; beside it that of the errors while they are shown.
-fn colour_scales_ui(ui: &mut Ui, rect: Rect, figure: &SurfaceFigure) {
-    let scales = figure.scales();
-    let part = rect.height() / scales.len() as f32;
-    for (index, scale) in scales.iter().enumerate() {
-        let top = rect.top() + part * index as f32;
-        let slot = Rect::from_x_y_ranges(rect.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
-        let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-        let theme = Theme::of(ui);
-        let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
-        bar.on_hover_text(figure.note());
     }
 }
 
@@ -173,7 +177,7 @@ enum Role {
 
 fn surface_ui(
     ui: &mut Ui,
-    surface: &Surface,
+    (surface, figure): (&Surface, &SurfaceFigure),
     role: Role,
     view: &mut TrainView,
     shared: &Shared,
@@ -186,7 +190,9 @@ fn surface_ui(
     let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
-        marked_node: view.node,
+        marked_node: view.lights.node,
+        lit_nodes: &figure.lit_nodes,
+        section: figure.section.as_ref(),
         theme,
     };
     let is_touched = role == Role::Actual && view.press.hand == Hand::Press;
@@ -206,8 +212,20 @@ fn surface_ui(
         effects.push(Effect::Look(Look { camera, ..look }));
     }
     // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
-    if shown.response.contains_pointer() && shown.hovered_node != view.node {
-        view.node = shown.hovered_node;
+    if shown.response.contains_pointer() && shown.hovered_node != view.lights.node {
+        view.lights.node = shown.hovered_node;
+        ui.ctx().request_repaint();
+    }
+    // What is pressed is cut too.
+    let is_chosen = shown.response.clicked() || (is_touched && shown.response.is_pointer_button_down_on());
+    if let (true, true, Some(at), Some(sight)) = (
+        view.tab == BottomTab::Section,
+        is_chosen,
+        shown.response.interact_pointer_pos(),
+        shown.sight,
+    ) && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
+    {
+        view.section.choose_at(place.truncate(), test);
         ui.ctx().request_repaint();
     }
     shown.node_tooltip_ui(|ui, node| node_values_ui(ui, view.frames(), test, node));

@@ -56,11 +56,12 @@ impl View for TrainView {
         ) {
             self.show_snapshot(self.snapshot - 1);
         }
+        self.offer_charts(offers, shared);
     }
 
     fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
         let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames, self.node);
+        self.press.take_pointer(ctx, shared.test(), &frames, self.lights.node);
         self.follow(shared);
     }
 
@@ -107,6 +108,10 @@ impl View for TrainView {
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(shared);
+        if self.watched != self.snapshot {
+            self.watched = self.snapshot;
+            effects.push(Effect::Watch(self.snapshot));
+        }
         workbench_ui(ui, self, shared, effects);
     }
 }

@@ -1,7 +1,11 @@
 use eframe::egui::{Sense, Ui};
 
 use super::{
-    charts_card::charts_card_ui, press::readings_card_ui, report::report_ui, state::TrainView, surfaces::surfaces_ui,
+    charts_card::{charts_card_ui, readings_of_view_ui},
+    press::readings_head_ui,
+    report::report_ui,
+    state::TrainView,
+    surfaces::surfaces_ui,
 };
 use crate::app::{
     shared::{Effect, Shared},
@@ -48,7 +52,8 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
             let width = (0.4 * lower.width()).floor();
             let (charts, readings) = lower.split_left_right_at_x(lower.right() - width);
             card_ui(ui, readings, |ui| {
-                readings_card_ui(ui, view.drops_percent(), shared.test());
+                readings_head_ui(ui, view.drops_percent());
+                readings_of_view_ui(ui, view, shared);
             });
             (charts.with_max_x(charts.max.x - gap), false)
         }

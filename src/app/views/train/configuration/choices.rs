@@ -4,7 +4,7 @@ use crate::{
     app::{
         theme::{Theme, space, type_size},
         widgets::{
-            fields::{capitalised, count_ui},
+            fields::{capitalised, count_ui, usually},
             note_ui, segmented_ui, slider_style,
         },
     },
@@ -71,7 +71,14 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 /// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
 pub fn hidden_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let hint = "Number of nodes in the tanh layer between resistances and coordinates.";
-    count_ui(ui, "Hidden nodes", hint, &mut draft.hidden, 1..=LARGEST_HIDDEN);
+    let usual = SimulatedSettings::default().hidden;
+    count_ui(
+        ui,
+        "Hidden nodes",
+        hint,
+        &mut draft.hidden,
+        usually(usual, 1..=LARGEST_HIDDEN),
+    );
     let scale = draft.source.sensor.scale;
     let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
     let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());

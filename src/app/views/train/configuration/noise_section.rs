@@ -3,7 +3,8 @@ use eframe::egui::{CollapsingHeader, RichText, Ui};
 use crate::{
     app::{
         theme::{Theme, type_size},
-        widgets::fields::{count_ui, in_percent, input_text, options_ui, percent_ui, quantity_ui},
+        widgets::fields::{count_ui, in_percent, input_text, options_ui, percent_ui, quantity_ui, usually},
+        widgets::focus_ring_ui,
     },
     scene::{Noise, NoisySets},
 };
@@ -11,6 +12,7 @@ use crate::{
 /// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
 pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
     let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
+    focus_ring_ui(ui, &shown.header_response);
     if shown.body_response.is_none() && !noise.is_none() {
         let dim = Theme::of(ui).palette.dim;
         ui.label(RichText::new(in_words(noise)).size(type_size().note).color(dim));
@@ -19,18 +21,25 @@ pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
 
 fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
     let hint = "Noise of each reading (standard deviation), in percent of the reading.";
-    percent_ui(ui, "Relative noise", hint, &mut noise.relative, 0.0..=100.0);
+    percent_ui(ui, "Relative noise", hint, &mut noise.relative, 0.0, 0.0..=100.0);
     let hint = "Noise of each reading (standard deviation), in Ω.";
-    quantity_ui(ui, "Additive noise", hint, &mut noise.additive_ohm, 0.0..=1e12, "Ω");
+    quantity_ui(
+        ui,
+        "Additive noise",
+        hint,
+        &mut noise.additive_ohm,
+        usually(0.0, 0.0..=1e12),
+        "Ω",
+    );
     let mut bits = noise.converter_bits.map_or(0, usize::from);
     let most = usize::from(Noise::MOST_BITS);
     let hint = "Resolution of the analogue-to-digital converter, in bits; its range is 0 to twice the largest \
                 resistance at rest. 0 for no quantisation.";
-    count_ui(ui, "Converter bits", hint, &mut bits, 0..=most);
+    count_ui(ui, "Converter bits", hint, &mut bits, usually(0, 0..=most));
     noise.converter_bits = u8::try_from(bits).ok().filter(|&bits| bits > 0);
     let hint = "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, in \
                 percent).";
-    percent_ui(ui, "Drift", hint, &mut noise.drift, 0.0..=100.0);
+    percent_ui(ui, "Drift", hint, &mut noise.drift, 0.0, 0.0..=100.0);
     if !noise.is_none() {
         let options = [
             (

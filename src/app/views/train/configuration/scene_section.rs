@@ -1,19 +1,16 @@
-use eframe::egui::{DragValue, Ui};
+use eframe::egui::Ui;
 
 use super::noise_section::noise_ui;
 use crate::{
-    app::{
-        theme::space,
-        widgets::{
-            dim_ui,
-            fields::{capitalised, count_ui, field_ui, list_ui, options_ui, percent_ui, quantity_ui},
-            note_ui,
-        },
+    app::widgets::{
+        dim_ui,
+        fields::{capitalised, count_ui, list_ui, options_ui, percent_ui, quantity_ui, seed_ui, usually},
+        note_ui,
     },
     dataset::LARGEST_SAMPLES,
     evaluation::{Outlook, SimulatedSettings},
     export::format_number,
-    scene::{Indenter, IndenterShape, Loading, Movement, Rows},
+    scene::{Indenter, IndenterShape, Loading, Movement, Rows, Scene},
 };
 
 /// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
@@ -28,6 +25,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
         "Largest compression",
         hint,
         &mut draft.source.scene.largest_compression,
+        Scene::default().largest_compression,
         0.001..=99.0,
     );
     noise_ui(ui, &mut draft.source.scene.noise);
@@ -37,6 +35,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
 
 /// Shows the numbers of samples and the seed; changes `draft`.
 pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    let usual = SimulatedSettings::default();
     let rows = draft.source.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
         1 => "Number of samples to which the network is fitted.".to_owned(),
@@ -50,7 +49,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Training samples",
         &hint,
         &mut draft.source.samples,
-        1..=LARGEST_SAMPLES,
+        usually(usual.source.samples, 1..=LARGEST_SAMPLES),
     );
     let hint = "Number of samples that select the best weights and end the training. 0 for none.";
     count_ui(
@@ -58,7 +57,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Validation samples",
         hint,
         &mut draft.source.validation_samples,
-        0..=LARGEST_SAMPLES,
+        usually(usual.source.validation_samples, 0..=LARGEST_SAMPLES),
     );
     let hint = "Number of held-out samples, on which all errors are measured and whose snapshots are shown.";
     count_ui(
@@ -66,12 +65,10 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         "Test samples",
         hint,
         &mut draft.source.test_samples,
-        1..=LARGEST_SAMPLES,
+        usually(usual.source.test_samples, 1..=LARGEST_SAMPLES),
     );
     let hint = "Seed of all random numbers: the same seed gives the same network.";
-    field_ui(ui, "Seed", hint, |ui| {
-        ui.add_sized([space(16), space(6)], DragValue::new(&mut draft.seed.0).speed(0.1))
-    });
+    seed_ui(ui, "Seed", hint, &mut draft.seed.0, usual.seed.0);
 }
 
 fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {

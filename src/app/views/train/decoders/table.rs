@@ -6,7 +6,7 @@ use crate::{
         shared::Phase,
         theme::Theme,
         theme::space,
-        widgets::{Column, Row, dim_ui, note_ui, table_ui},
+        widgets::{Column, Row, dim_ui, focus_ring_ui, note_ui, table_ui},
     },
     decoupling::DecoderKind,
     evaluation::{DecoderReport, Errors},
@@ -53,6 +53,7 @@ pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, refe
                 dim_ui(ui, text);
             }
         });
+    focus_ring_ui(ui, &header.header_response);
     let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, \
                 times, and distance from the limit.";
     if header.header_response.on_hover_text(hint).clicked() {

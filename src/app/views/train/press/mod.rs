@@ -18,7 +18,7 @@ mod subject;
 mod target;
 
 pub use finger::Hand;
-pub use readings_card::{readings_card_ui, readings_ui};
+pub use readings_card::{readings_head_ui, readings_ui};
 pub use section::press_section_ui;
 pub use shown::Shown;
 pub use state::PressState;

@@ -5,15 +5,24 @@ use crate::{
     app::{
         plotting::cells_ui,
         test_view::TestView,
-        theme::{semibold, space, type_size},
+        theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, placeholder_ui},
     },
     export::format_number,
-    figure::{HeatMap, readings_figure},
+    figure::{HeatMap, SequentialMap, readings_figure},
 };
 
-/// The card of the readings: [`readings_ui`] under a title.
-pub fn readings_card_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Option<&TestView>) {
+/// A reading under the pointer.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadingPointed {
+    /// Places of its row-wire among those read, and of its column-wire.
+    pub cell: [usize; 2],
+    /// True if it was clicked.
+    pub is_clicked: bool,
+}
+
+/// The head of the card of the readings.
+pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(6));
         ui.label(RichText::new("Readings").font(semibold(type_size().title)));
@@ -22,26 +31,35 @@ pub fn readings_card_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: 
             dim_ui(ui, &format!("{rows} row-wires × {columns} column-wires"));
         }
     });
-    readings_ui(ui, drops_percent, test);
 }
 
-/// Readings of the surface on show as a map of row-wires and column-wires; `drops_percent` are their drops below those at
-/// rest.
-pub fn readings_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>, test: Option<&TestView>) {
+/// Readings of the surface on show as a map of row-wires and column-wires, in `colours` and with one row pointed out;
+/// `drops_percent` are their drops below those at rest. Returns the one under the pointer.
+pub fn readings_ui(
+    ui: &mut Ui,
+    drops_percent: Option<&Array2<f64>>,
+    test: Option<&TestView>,
+    lit_row: Option<usize>,
+    colours: SequentialMap,
+) -> Option<ReadingPointed> {
     let Some((drops_percent, test)) = drops_percent.zip(test) else {
         placeholder_ui(ui, "The readings of the surface appear here.");
-        return;
+        return None;
     };
-    let map = readings_map(drops_percent, &test.rows);
-    let Some(([row, column], cell)) = cells_ui(ui, "Readings of the actual surface", &map, (&[], &[])) else {
-        return;
-    };
+    let map = readings_map(drops_percent, &test.rows).coloured(colours);
+    let marked = (lit_row.as_slice(), &[][..], Theme::of(ui).palette.text);
+    let ([row, column], cell) = cells_ui(ui, "Readings of the actual surface", &map, marked)?;
+    let is_clicked = cell.clicked();
     let value = format_number(map.values[[row, column]]);
-    let row = test.rows.get(row).map_or(0, |row| row + 1);
+    let wire = test.rows.get(row).map_or(0, |row| row + 1);
     cell.on_hover_text_at_pointer(format!(
-        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
+        "Row-wire {wire}, column-wire {}\ndrop from unloaded: {value} %\nClick for the section along it.",
         column + 1
     ));
+    Some(ReadingPointed {
+        cell: [row, column],
+        is_clicked,
+    })
 }
 
 /// Colours from none to the largest drop, up to a round number so that they hold while the finger moves a little.

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, DragValue, Layout, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Layout, Response, Slider, Ui, Vec2, WidgetInfo};
 
 use super::{
     comparing::Compared,
@@ -13,7 +13,10 @@ use crate::{
         shared::{Phase, Shared},
         test_view::TestView,
         theme::{Theme, space},
-        widgets::{Column, Row, dim_ui, explained_options_ui, note_ui, section_heading_ui, slider_style, table_ui},
+        widgets::{
+            Column, Row, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui, section_heading_ui,
+            slider_style, table_ui, usually,
+        },
     },
     decoupling::{DecoderKind, Precision},
     evaluation::PressedAnswer,
@@ -87,27 +90,25 @@ fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
         press.finger.tool = tool;
     }
     let finger = &mut press.finger;
+    let mut refused = Vec::new();
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         if finger.has_radius() {
             let hint = "Radius of the body that presses, in mm.";
             let label = ui.label("Radius").on_hover_text(hint);
-            let radius = DragValue::new(&mut finger.radius_mm)
-                .range(Finger::RADIUS_MM)
-                .speed(0.05)
-                .suffix(" mm");
-            let radius = radius.max_decimals(2).update_while_editing(false);
-            ui.add_sized([space(14), space(6)], radius)
-                .labelled_by(label.id)
-                .on_hover_text(hint);
+            let limits = usually(Finger::default().radius_mm, Finger::RADIUS_MM);
+            let size = Vec2::new(space(14), space(6));
+            let radius = number_ui(ui, &mut finger.radius_mm, &limits, "mm", size);
+            refused.push(radius.labelled_by(label.id).on_hover_text(hint));
             ui.add_space(space(1));
         }
         if finger.tool == Tool::OneNode {
             dim_ui(ui, "Take a node and drag it up or down.");
             return;
         }
-        depth_ui(ui, finger, test.stroke_mm);
+        refused.push(depth_ui(ui, finger, test.stroke_mm));
     });
+    refused.iter().for_each(|field| refusal_ui(ui, field));
     if press.finger != before {
         press.follow_finger(test.stroke_mm);
         ui.request_repaint();
@@ -115,23 +116,22 @@ fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
 }
 
 /// The depth as a number and on a slider that ends at the scene's largest compression.
-fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) {
+fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
     let limit = format_number(stroke_mm);
     let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
     let mut depth_mm = finger.depth_share * stroke_mm;
     let before_mm = depth_mm;
     let label = ui.label("Depth").on_hover_text(&hint);
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let number = DragValue::new(&mut depth_mm)
-            .range(0.0..=stroke_mm)
-            .speed(0.01 * stroke_mm);
-        let number = number
-            .suffix(" mm")
-            .max_decimals(3)
-            .min_decimals(2)
-            .update_while_editing(false);
-        let number = ui.add_sized([space(16), space(6)], number);
-        number.labelled_by(label.id).on_hover_text(&hint);
+    let field = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let limits = usually(Finger::default().depth_share * stroke_mm, 0.0..=stroke_mm);
+        // A thousandth of a millimetre is finer than any finger.
+        let shown_mm = (1e3 * depth_mm).round() / 1e3;
+        let mut typed_mm = shown_mm;
+        let number = number_ui(ui, &mut typed_mm, &limits, "mm", Vec2::new(space(16), space(6)));
+        if typed_mm != shown_mm {
+            depth_mm = typed_mm;
+        }
+        let number = number.labelled_by(label.id).on_hover_text(&hint);
         ui.scope(|ui| {
             slider_style(ui);
             ui.spacing_mut().slider_width = (ui.available_width() - space(2)).max(space(8));
@@ -139,10 +139,12 @@ fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) {
             slider.widget_info(|| WidgetInfo::slider(true, depth_mm, "Depth of the press"));
             slider.on_hover_text(&hint);
         });
+        number
     });
     if depth_mm != before_mm {
         finger.depth_share = (depth_mm / stroke_mm).clamp(0.0, 1.0);
     }
+    field.inner
 }
 
 fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {

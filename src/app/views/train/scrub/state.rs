@@ -121,16 +121,19 @@ impl ScrubState {
 
     fn compute(&mut self, run: &RunView, epoch: usize) {
         let Some(present) = &run.result else { return };
-        let (past, networks, test) = (
-            run.past.clone(),
-            Arc::clone(&present.networks),
-            Arc::clone(&run.test.set),
-        );
-        let (stroke_mm, is_standing) = (run.test.stroke_mm, present.is_standing);
+        let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
+        let is_standing = present.is_standing;
+        // The surface on show is laid there too, as with the training's own results.
+        let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
             move |_| {
-                let result = result_at(epoch, &past, &networks, &test, stroke_mm)?;
-                Some(RunResult { is_standing, ..result })
+                let result = result_at(epoch, &past, &networks, &test.set, test.stroke_mm)?;
+                let frame = test.frame(result.decoupled_mm.view(), snapshot);
+                Some(RunResult {
+                    is_standing,
+                    frame: Some((snapshot, frame)),
+                    ..result
+                })
             },
             |computed| computed,
         );
@@ -149,6 +152,7 @@ fn result_at(
     Some(RunResult {
         errors: Errors::measure(test, &decoupled_mm, stroke_mm),
         decoupled_mm: Arc::new(decoupled_mm),
+        frame: None,
         best_epoch,
         flaw: None,
         epochs_run: epoch,

@@ -1,0 +1,178 @@
+//! Work of the interface thread for each frame of the window, without a GPU: layout and tessellation, at rest, under a
+//! moving pointer and while a network trains; and the first frame. Drawing the triangles is the renderer's and not counted.
+//!
+//! `cargo bench --bench interface`
+
+mod clock;
+
+use std::{
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use decoupler::{
+    app::{DecouplerWindow, DialogKind, Effect, Phase, Shared},
+    evaluation::SimulatedSettings,
+};
+use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, pos2, vec2};
+
+/// Time between two frames of a screen.
+const FRAME: Duration = Duration::from_millis(16);
+/// Frames that each row of the table is measured over.
+const FRAMES: usize = 240;
+
+/// The window as eframe runs it, without a screen.
+struct Bench {
+    ctx: Context,
+    window: DecouplerWindow,
+    begun: Instant,
+}
+
+impl Bench {
+    fn open() -> Self {
+        let ctx = Context::default();
+        let window = DecouplerWindow::new(&ctx, DialogKind::None, None);
+        let begun = Instant::now();
+        Self { ctx, window, begun }
+    }
+
+    fn state(&self) -> &Shared {
+        self.window.shared()
+    }
+
+    /// Lays out and tessellates a frame.
+    fn frame(&mut self, events: Vec<Event>) -> Duration {
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), vec2(1440.0, 900.0))),
+            time: Some(self.begun.elapsed().as_secs_f64()),
+            events,
+            ..RawInput::default()
+        };
+        let begun = Instant::now();
+        let (ctx, window) = (&self.ctx, &mut self.window);
+        window.take_news();
+        let mut output = ctx.run_ui(input, |ui| window.show_ui(ui));
+        let shapes = std::mem::take(&mut output.shapes);
+        let primitives = ctx.tessellate(shapes, output.pixels_per_point);
+        let taken = begun.elapsed();
+        std::hint::black_box(primitives);
+        output.drop_without_applying_deltas();
+        taken
+    }
+
+    fn wait(&mut self, holds: impl Fn(&Shared) -> bool) {
+        let latest = Instant::now() + Duration::from_secs(60);
+        while !holds(self.state()) && Instant::now() < latest {
+            self.frame(Vec::new());
+            sleep(FRAME);
+        }
+    }
+
+    /// Measures frames at the rate of a screen.
+    fn measure(&mut self, name: &str, mut events: impl FnMut(usize) -> Vec<Event>) {
+        let mut frames = Vec::with_capacity(FRAMES);
+        sleep(FRAME);
+        let before = clock::on_processor();
+        for number in 0..FRAMES {
+            let begun = Instant::now();
+            frames.push(self.frame(events(number)));
+            sleep(FRAME.saturating_sub(begun.elapsed()));
+        }
+        sleep(FRAME);
+        let processor = clock::on_processor().zip(before).map(|(after, before)| after - before);
+        clock::print_row(name, frames, processor);
+    }
+
+    /// Shows a chart by the list of actions.
+    fn show_chart(&mut self, chart: &str) {
+        let events = |text: &str| -> Vec<Vec<Event>> {
+            let key = |key, modifiers| Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers,
+            };
+            vec![
+                vec![key(eframe::egui::Key::K, Modifiers::COMMAND)],
+                Vec::new(),
+                vec![Event::Text(text.to_owned())],
+                vec![key(eframe::egui::Key::Enter, Modifiers::NONE)],
+                Vec::new(),
+                Vec::new(),
+            ]
+        };
+        for frame in events(&format!("Chart: {chart}")) {
+            self.frame(frame);
+        }
+    }
+}
+
+/// A training that does not end while it is measured.
+fn endless(scale: &str) -> SimulatedSettings {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = scale.parse().expect("a scale");
+    settings.training.stopping.epochs = 1_000_000;
+    settings.training.stopping.min_gradient = 0.0;
+    settings.training.stopping.goal_mse = 0.0;
+    settings
+}
+
+fn over_the_surfaces(number: usize) -> Vec<Event> {
+    let turn = number as f32 * 0.05;
+    vec![Event::PointerMoved(pos2(
+        500.0 + 120.0 * turn.cos(),
+        300.0 + 90.0 * turn.sin(),
+    ))]
+}
+
+fn main() {
+    let begun = Instant::now();
+    let mut bench = Bench::open();
+    let first = bench.frame(Vec::new());
+    println!(
+        "first frame: {:.1} ms from the start of the program, of these {:.1} ms laid out and tessellated\n",
+        1e3 * begun.elapsed().as_secs_f64(),
+        1e3 * first.as_secs_f64()
+    );
+    bench.wait(|state| state.test().is_some());
+    clock::print_head();
+    for scale in ["10x10_5x30", "20x20_5x60"] {
+        let settings = endless(scale);
+        bench.window.apply(Effect::Configure(Box::new(settings)));
+        bench.wait(|state| {
+            state
+                .test()
+                .is_some_and(|test| test.sensor.scale == settings.source.sensor.scale)
+        });
+        let points = bench.state().test().map_or([0, 0], |test| {
+            let grid = test.surface.grid();
+            [grid.x_mm().len(), grid.y_mm().len()]
+        });
+        let name = |what: &str| format!("{scale}, surfaces of {}×{}: {what}", points[0], points[1]);
+        bench.measure(&name("at rest, drawn anew"), |_| Vec::new());
+        bench.measure(&name("pointer moves"), over_the_surfaces);
+        bench.window.apply(Effect::Train);
+        bench.wait(|state| state.result().is_some());
+        for chart in ["Loss", "Histogram", "Nodes", "Section"] {
+            bench.show_chart(chart);
+            bench.measure(&name(&format!("training, {}", chart.to_lowercase())), over_the_surfaces);
+        }
+        let turned = |number: usize| {
+            let button = |pressed| Event::PointerButton {
+                pos: pos2(850.0, 300.0),
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            };
+            match number {
+                0 => vec![Event::PointerMoved(pos2(850.0, 300.0)), button(true)],
+                _ if number + 1 == FRAMES => vec![button(false)],
+                _ => vec![Event::PointerMoved(pos2(850.0 + (number % 90) as f32, 300.0))],
+            }
+        };
+        bench.measure(&name("training, turned by hand"), turned);
+        bench.window.apply(Effect::Stop);
+        bench.wait(|state| matches!(state.phase, Phase::Ended(_)));
+    }
+}

@@ -1,0 +1,11 @@
+//! Reading errors: what the pointer lights up, the section through the surfaces, and the nodes in a bar of the histogram.
+
+mod bar_nodes;
+mod lighting;
+mod lights;
+mod section;
+
+pub use bar_nodes::bar_nodes_ui;
+pub use lighting::{lit_nodes, take_pointed, with_lights};
+pub use lights::Lighting;
+pub use section::{Along, SectionChoice, section_bar_ui, section_of};

@@ -1,0 +1,139 @@
+//! The one field for numbers.
+
+use std::{cell::RefCell, ops::RangeInclusive};
+
+use eframe::egui::{
+    DragValue, Id, Key, Response, RichText, Stroke, StrokeKind, Ui, Vec2, accesskit::Invalid, emath::Numeric,
+};
+
+use super::{fields::input_text, quantity_text::parse, value_under::claim_right_click};
+use crate::app::theme::{Theme, radius, space, type_size};
+
+/// Numbers that a field takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits<N> {
+    range: RangeInclusive<N>,
+    usual: Option<N>,
+}
+
+impl<N> From<RangeInclusive<N>> for Limits<N> {
+    fn from(range: RangeInclusive<N>) -> Self {
+        Self { range, usual: None }
+    }
+}
+
+/// The range of a field that a double click sets back to its `usual` value.
+pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
+    Limits {
+        range,
+        usual: Some(usual),
+    }
+}
+
+/// What was typed and could not be taken, with the reason.
+#[derive(Clone, Debug, PartialEq)]
+struct Refusal {
+    reason: String,
+    /// The value that stayed; the refusal goes when it changes.
+    kept: u64,
+}
+
+/// A number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". What is no number, out of `limits`, or of
+/// another unit is refused: the old value stays, and [`refusal_ui`] tells why. A double click sets the usual value; a right
+/// click copies.
+pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {
+    let range = limits.range.start().to_f64()..=limits.range.end().to_f64();
+    // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
+    let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
+    let suffix = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    let tried: RefCell<Option<Result<f64, String>>> = RefCell::new(None);
+    let before = *value;
+    let drag = DragValue::new(value)
+        .range(limits.range.clone())
+        .speed(speed)
+        .suffix(suffix)
+        .update_while_editing(false)
+        .custom_formatter(|value, _| input_text(value))
+        .custom_parser(|text| {
+            let parsed = parse(text, unit, &range, N::INTEGRAL);
+            let value = parsed.as_ref().ok().copied();
+            *tried.borrow_mut() = Some(parsed);
+            value
+        });
+    let mut response = ui.add_sized(size, drag);
+    if let Some(usual) = limits.usual.filter(|_| response.double_clicked()) {
+        *value = usual;
+        response.surrender_focus();
+    }
+    claim_right_click(ui, &response);
+    response.context_menu(|ui| menu_ui(ui, value, limits.usual, unit));
+    if *value != before {
+        response.mark_changed();
+    }
+    take_refusal(ui, &response, tried.into_inner(), value.to_f64());
+    response
+}
+
+/// Copies the value, or sets the usual one.
+fn menu_ui<N: Numeric>(ui: &mut Ui, value: &mut N, usual: Option<N>, unit: &str) {
+    let text = |value: N| format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned();
+    let shown = text(*value);
+    if ui.button(format!("Copy {shown}")).clicked() {
+        ui.ctx().copy_text(shown);
+        ui.close();
+    }
+    if let Some(usual) = usual.filter(|usual| *usual != *value)
+        && ui.button(format!("Reset to {}", text(usual))).clicked()
+    {
+        *value = usual;
+        ui.close();
+    }
+}
+
+fn refusal_id(field: Id) -> Id {
+    field.with("refusal")
+}
+
+fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<f64, String>>, value: f64) {
+    let id = refusal_id(response.id);
+    let kept = value.to_bits();
+    match tried {
+        Some(Err(reason)) => {
+            ui.data_mut(|data| data.insert_temp(id, Refusal { reason, kept }));
+        }
+        Some(Ok(_)) => ui.data_mut(|data| data.remove::<Refusal>(id)),
+        None => {}
+    }
+    let Some(refusal) = ui.data(|data| data.get_temp::<Refusal>(id)) else {
+        return;
+    };
+    let is_dismissed = response.has_focus() && ui.input(|input| input.key_pressed(Key::Escape));
+    if refusal.kept != kept || is_dismissed {
+        ui.data_mut(|data| data.remove::<Refusal>(id));
+        return;
+    }
+    let stroke = Stroke::new(1.0, Theme::of(ui).palette.bad);
+    let corner = f32::from(radius());
+    ui.painter()
+        .rect_stroke(response.rect, corner, stroke, StrokeKind::Inside);
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        node.set_invalid(Invalid::True);
+        node.set_description(refusal.reason.as_str());
+    });
+}
+
+/// Tells below a field why what was typed was not taken.
+pub fn refusal_ui(ui: &mut Ui, field: &Response) {
+    let refusal = ui.data(|data| data.get_temp::<Refusal>(refusal_id(field.id)));
+    if let Some(refusal) = refusal {
+        let bad = Theme::of(ui).palette.bad;
+        ui.label(RichText::new(refusal.reason).size(type_size().note).color(bad));
+    }
+}
+
+/// Usual size of a field, in points.
+pub const FIELD_SIZE: Vec2 = Vec2::new(space(16), space(6));

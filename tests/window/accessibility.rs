@@ -1,0 +1,188 @@
+//! What readers of the screen hear, and what hands on the keyboard reach.
+
+use decoupler::app::Phase;
+use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use crate::driver::Driver;
+
+const VIEWS: [&str; 6] = [
+    "Train",
+    "Experiments",
+    "Compare",
+    "Identifiability",
+    "Trade-off",
+    "Live",
+];
+
+/// Roles of what can be worked.
+const CONTROLS: [Role; 10] = [
+    Role::Button,
+    Role::CheckBox,
+    Role::RadioButton,
+    Role::ComboBox,
+    Role::Slider,
+    Role::SpinButton,
+    Role::Tab,
+    Role::TextInput,
+    Role::MultilineTextInput,
+    Role::SearchInput,
+];
+
+/// Opens a view once what it shows at first is there.
+fn show(driver: &mut Driver, view: &str) {
+    driver.click_button(view);
+    if view == "Identifiability" {
+        driver.wait("the analysis", |driver| driver.says("Condition number: "));
+    }
+    driver.settle();
+}
+
+#[test]
+fn every_control_has_a_name_and_every_number_a_value() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    for view in VIEWS {
+        show(&mut driver, view);
+        let root = driver.harness().root();
+        let mut seen = 0;
+        for node in root.children_recursive() {
+            let inner = node.accesskit_node();
+            if !CONTROLS.contains(&inner.role()) {
+                continue;
+            }
+            seen += 1;
+            let name = inner.label().unwrap_or_default();
+            let (role, place) = (inner.role(), inner.bounding_box());
+            assert!(!name.trim().is_empty(), "{view}: a {role:?} at {place:?} has no name");
+            if matches!(inner.role(), Role::Slider | Role::SpinButton) {
+                let has_value = inner.numeric_value().is_some() || inner.value().is_some();
+                assert!(has_value, "{view}: {name} has no value");
+            }
+        }
+        assert!(seen > 10, "{view}: {seen} controls");
+    }
+}
+
+#[test]
+fn every_picture_is_told_in_a_sentence() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    for view in VIEWS {
+        show(&mut driver, view);
+        let tabs: &[&str] = match view {
+            "Train" => &["Loss", "Training state", "Histogram", "Regression", "Nodes", "Section"],
+            _ => &[""],
+        };
+        for tab in tabs {
+            if !tab.is_empty() {
+                driver.click(tab);
+                driver.settle();
+            }
+            let pictures = driver.harness().query_all(By::new().role(Role::Image));
+            for picture in pictures {
+                let inner = picture.accesskit_node();
+                let name = inner.label().unwrap_or_default();
+                let sentence = inner.description().or(inner.value()).unwrap_or_default();
+                let is_told = sentence.split_whitespace().count() > 2 || name.split_whitespace().count() > 6;
+                assert!(is_told, "{view} {tab}: “{name}” is told by “{sentence}” only");
+            }
+        }
+    }
+}
+
+/// Name and place of what has the focus.
+fn focused(driver: &mut Driver) -> Option<(String, Rect)> {
+    let nodes = driver.harness().root().children_recursive();
+    let mut focused = nodes.filter(|node| node.accesskit_node().is_focused());
+    focused
+        .next()
+        .map(|node| (node.accesskit_node().label().unwrap_or_default(), node.rect()))
+}
+
+/// Presses Tab until what is called so has the focus.
+#[track_caller]
+fn tab_to(driver: &mut Driver, name: &str) {
+    for _ in 0..200 {
+        driver.press(Key::Tab);
+        if focused(driver).is_some_and(|(label, _)| label == name) {
+            return;
+        }
+    }
+    panic!("Tab never comes to {name}");
+}
+
+fn write(driver: &mut Driver, text: &str) {
+    driver.press_with(Modifiers::COMMAND, Key::A);
+    driver.harness().event(Event::Text(text.to_owned()));
+    driver.harness().run_steps(2);
+    driver.press(Key::Enter);
+}
+
+#[test]
+fn a_network_is_configured_and_trained_by_keys_alone() {
+    let mut driver = Driver::open();
+    tab_to(&mut driver, "Array scale");
+    write(&mut driver, "10×6_3×18");
+    tab_to(&mut driver, "Hidden nodes");
+    write(&mut driver, "6");
+    tab_to(&mut driver, "Training samples");
+    write(&mut driver, "200");
+    tab_to(&mut driver, "Epochs");
+    write(&mut driver, "15");
+    assert_eq!(driver.state().draft, crate::driver::small());
+    tab_to(&mut driver, "▶ Train");
+    driver.press(Key::Space);
+    driver.wait("the end of the training", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_))
+    });
+    // What it found is reached by keys too.
+    tab_to(&mut driver, "Regression");
+    driver.press(Key::Enter);
+    driver.settle();
+    assert!(driver.says("Correlation R = "));
+    tab_to(&mut driver, "Next snapshot");
+    driver.press(Key::Space);
+    assert_eq!(driver.views().train.snapshot, 1);
+    driver.act("Chart: Section");
+    driver.press(Key::CloseBracket);
+    assert!(driver.says("7 of 10"));
+}
+
+/// Shapes painted where something is.
+fn painted(driver: &mut Driver, place: Rect) -> Vec<Shape> {
+    let shapes = driver.harness().output().shapes.iter();
+    let there = shapes.filter(|shape| shape.shape.visual_bounding_rect().intersects(place));
+    there.map(|shape| shape.shape.clone()).collect()
+}
+
+#[test]
+fn the_focus_is_seen_wherever_it_comes() {
+    for view in VIEWS {
+        let mut driver = Driver::open();
+        show(&mut driver, view);
+        driver.press(Key::Tab);
+        let (mut seen, mut unseen) = (0, Vec::new());
+        for _ in 0..70 {
+            let Some((name, place)) = focused(&mut driver) else {
+                driver.press(Key::Tab);
+                continue;
+            };
+            // Of what lies out of sight nothing is painted; it is scrolled to.
+            driver.harness().run_steps(2);
+            let place = focused(&mut driver).map_or(place, |(_, place)| place);
+            let with_focus = painted(&mut driver, place);
+            driver.press(Key::Tab);
+            driver.harness().run_steps(3);
+            let without = painted(&mut driver, place);
+            seen += 1;
+            if with_focus == without {
+                unseen.push(name);
+            }
+        }
+        assert!(unseen.is_empty(), "{view}: the focus is not seen on {unseen:?}");
+        assert!(seen > 8, "{view}: {seen}");
+    }
+}

@@ -1,0 +1,280 @@
+//! Reading errors: what is pointed at lights up everywhere; sections, the nodes in a bar, colours and their scales.
+
+use decoupler::{app::BottomTab, figure::SequentialMap};
+use eframe::egui::{Key, PointerButton, Pos2, accesskit::Role, pos2, vec2};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use crate::driver::Driver;
+
+/// The window with the small network trained.
+fn trained() -> Driver {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    driver.wait_for_hold();
+    driver.settle();
+    driver
+}
+
+fn lit(driver: &Driver) -> Option<usize> {
+    driver.views().train.lights.node
+}
+
+/// The sentence about the picture of this label.
+fn description(driver: &mut Driver, role: Role, part: &str) -> String {
+    let by = By::new().role(role);
+    let nodes = driver.harness().get_all(by);
+    let found = nodes
+        .filter(|node| node.accesskit_node().label().unwrap_or_default().contains(part))
+        .find_map(|node| node.accesskit_node().description());
+    found.unwrap_or_else(|| panic!("nothing describes {part}"))
+}
+
+/// Moves the pointer over a place in small steps until a node is lit.
+fn hover_a_node(driver: &mut Driver, from: Pos2, step: eframe::egui::Vec2, count: usize) -> Option<(usize, Pos2)> {
+    (0..count).find_map(|number| {
+        let at = from + step * number as f32;
+        driver.harness().hover_at(at);
+        driver.harness().run_steps(2);
+        lit(driver).map(|node| (node, at))
+    })
+}
+
+fn plot_place(driver: &mut Driver, part: &str) -> eframe::egui::Rect {
+    let by = By::new().role(Role::Image);
+    let nodes = driver.harness().get_all(by);
+    let mut found = nodes.filter(|node| node.accesskit_node().label().unwrap_or_default().contains(part));
+    found.next().unwrap_or_else(|| panic!("no {part}")).rect()
+}
+
+#[test]
+fn a_node_lit_on_a_surface_is_lit_in_the_charts_and_the_readings() {
+    let mut driver = trained();
+    driver.click("Top view");
+    let surface = driver.get("Decoupled surface").rect();
+    let found = hover_a_node(&mut driver, surface.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
+    let (node, _) = found.expect("a node under the pointer");
+    for (tab, halo) in [("Nodes", "1 point of lit"), ("Regression", "lit: ")] {
+        driver.click(tab);
+        let place = driver.get("Decoupled surface").rect();
+        let again = hover_a_node(&mut driver, place.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
+        assert!(again.is_some(), "{tab}");
+        let text = description(&mut driver, Role::Image, "z (mm)");
+        let has_halo = text.contains(halo) || text.contains("points of lit");
+        assert!(has_halo, "{tab}: {text}");
+    }
+    let _ = node;
+    driver.click("Histogram");
+    let place = driver.get("Decoupled surface").rect();
+    hover_a_node(&mut driver, place.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40).unwrap();
+    let text = description(&mut driver, Role::Image, "error of z");
+    assert!(text.contains("node under the pointer at "), "{text}");
+}
+
+#[test]
+fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
+    let mut driver = trained();
+    driver.click("Nodes");
+    driver.settle();
+    let plot = plot_place(&mut driver, "z (mm) against node");
+    let frames = &driver.views().train.drawn.frames;
+    let (nodes, count) = (frames.actual.nodes_mm.len(), 60);
+    assert_eq!(nodes, count, "10 × 6");
+    // Across the plot at all heights: some points lie under the way, and gaps between them.
+    let mut found = Vec::new();
+    for row in 1..20 {
+        let y = plot.top() + plot.height() * row as f32 / 20.0;
+        for column in 8..36 {
+            driver
+                .harness()
+                .hover_at(pos2(plot.left() + plot.width() * column as f32 / 40.0, y));
+            driver.harness().run_steps(2);
+            found.push(lit(&driver));
+        }
+    }
+    let nodes_lit = found.iter().flatten().count();
+    assert!(nodes_lit > 10, "{nodes_lit} of {}", found.len());
+    assert!(found.iter().flatten().all(|node| *node < nodes));
+    assert!(found.contains(&None), "between the points nothing is lit");
+    // From the left to the right of the plot the nodes follow each other.
+    let halves = found
+        .chunks(28)
+        .flat_map(|row| [(&row[..10], 0..30), (&row[18..], 30..60)]);
+    for (half, expected) in halves {
+        assert!(half.iter().flatten().all(|node| expected.contains(node)), "{half:?}");
+    }
+}
+
+#[test]
+fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
+    let mut driver = trained();
+    driver.click("Section");
+    driver.settle();
+    let words = |driver: &mut Driver| description(driver, Role::Image, "along ");
+    let first = words(&mut driver);
+    assert!(first.contains("y along row-wire 6 (mm): actual from"), "{first}");
+    assert!(first.contains("; decoupled from "), "{first}");
+    driver.press(Key::CloseBracket);
+    assert!(words(&mut driver).contains("row-wire 7"));
+    driver.press(Key::OpenBracket);
+    driver.press(Key::OpenBracket);
+    assert!(words(&mut driver).contains("row-wire 5"));
+    driver.click("Previous section");
+    assert!(words(&mut driver).contains("row-wire 4"));
+    driver.press(Key::Backslash);
+    assert!(words(&mut driver).contains("x along column-wire"));
+    driver.click_button("Row-wire");
+    // A click on the map of readings chooses its wires: the last row.
+    let readings = driver.get("Readings of the actual surface").rect();
+    driver.harness().drag_at(readings.left_bottom() + vec2(12.0, -4.0));
+    driver.harness().drop_at(readings.left_bottom() + vec2(12.0, -4.0));
+    driver.harness().run_steps(3);
+    assert!(words(&mut driver).contains("row-wire 10"), "{}", words(&mut driver));
+    // A click on the surface from above chooses the nearest wire: the middle of ten.
+    driver.click("Top view");
+    let surface = driver.get("Decoupled surface").rect();
+    driver.harness().drag_at(surface.center());
+    driver.harness().drop_at(surface.center());
+    driver.harness().run_steps(3);
+    let clicked = words(&mut driver);
+    assert!(
+        ["row-wire 5", "row-wire 6"].iter().any(|wire| clicked.contains(wire)),
+        "{clicked}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("section.svg");
+    driver.save("Chart, SVG", &path);
+    let svg = std::fs::read_to_string(&path).unwrap();
+    assert!(svg.contains("along row-wire") && svg.contains("beyond the nodes"));
+}
+
+#[test]
+fn a_bar_of_the_histogram_lists_and_lights_its_nodes() {
+    let mut driver = trained();
+    driver.click("Histogram");
+    driver.settle();
+    assert!(!driver.says("Go to"), "nothing is chosen");
+    let plot = plot_place(&mut driver, "nodes of the test set against error");
+    // Just above the axis, in the middle of the plot, stand the bars of small errors.
+    let at = pos2(plot.left() + 0.56 * plot.width(), plot.bottom() - 40.0);
+    driver.harness().drag_at(at);
+    driver.harness().drop_at(at);
+    driver.harness().run_steps(3);
+    let bar = driver.views().train.lights.bar.expect("a bar under the pointer");
+    let listed = driver
+        .texts()
+        .into_iter()
+        .filter(|text| text.starts_with("Snapshot "))
+        .count();
+    assert!(listed > 0, "its nodes are listed");
+    driver.press(Key::CloseBracket);
+    assert_eq!(driver.views().train.lights.bar, Some(bar + 1));
+    driver.press(Key::OpenBracket);
+    // Each listed node has an error within the bar.
+    let texts = driver.texts();
+    let range = texts
+        .iter()
+        .find(|text| text.contains(" to ") && text.ends_with(" mm") && !text.starts_with('z'));
+    let ends: Vec<f64> = range
+        .expect("its range")
+        .trim_end_matches(" mm")
+        .split(" to ")
+        .map(|end| end.replace('−', "-").parse().unwrap())
+        .collect();
+    let label = texts
+        .iter()
+        .find(|text| text.starts_with("Snapshot ") && text.contains(": "))
+        .unwrap();
+    let error = label
+        .split(": ")
+        .nth(1)
+        .unwrap()
+        .trim_end_matches(" mm")
+        .replace('−', "-");
+    let error: f64 = error.parse().unwrap();
+    let slack = 0.01 * (ends[1] - ends[0]).abs() + 1e-3 * error.abs();
+    assert!(
+        ends[0] - slack <= error && error <= ends[1] + slack,
+        "{error} in {ends:?}"
+    );
+    // A click on a listed node goes to it.
+    let label = label.clone();
+    driver.click(&label);
+    driver.settle();
+    let numbers: Vec<usize> = label
+        .split(|c: char| !c.is_ascii_digit())
+        .filter_map(|word| word.parse().ok())
+        .take(3)
+        .collect();
+    assert_eq!(driver.views().train.snapshot, numbers[0] - 1);
+    assert_eq!(lit(&driver), Some((numbers[1] - 1) * 6 + numbers[2] - 1));
+}
+
+#[test]
+fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("window.json");
+    let mut driver = Driver::open_remembering(&path);
+    driver.click("Colour scale of z (mm)");
+    driver.click("Cividis");
+    driver.settle();
+    assert_eq!(driver.state().look.colours, SequentialMap::Cividis);
+    let value = |driver: &Driver, label: &str| driver.get(label).accesskit_node().value().unwrap();
+    assert_eq!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
+    driver.act("Free the scale of heights");
+    assert_ne!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
+    driver.act("Lock the scale of heights");
+    assert_eq!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
+    driver.configure_small();
+    driver.train();
+    driver.click_button("Error");
+    driver.settle();
+    let free = value(&driver, "Colour scale of error (mm)");
+    driver.press(Key::PageDown);
+    driver.settle();
+    let next = value(&driver, "Colour scale of error (mm)");
+    assert_ne!(free, next, "it fits each snapshot");
+    driver.click("Colour scale of error (mm)");
+    driver.click("Locked");
+    driver.settle();
+    driver.press(Key::Escape);
+    driver.press(Key::PageUp);
+    driver.settle();
+    assert_eq!(value(&driver, "Colour scale of error (mm)"), next, "locked");
+    drop(driver);
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().look.colours, SequentialMap::Cividis);
+}
+
+#[test]
+fn a_right_click_copies_what_it_points_at() {
+    let mut driver = trained();
+    let cell = driver
+        .table()
+        .into_iter()
+        .find(|cell| cell.starts_with("network, Z %"))
+        .unwrap();
+    let number = cell.split(": ").nth(1).unwrap().to_owned();
+    driver.right_click(&cell);
+    let copied = driver.click_and_copy(&format!("Copy “{number}”"));
+    assert_eq!(copied, Some(number));
+    driver.right_click(&cell);
+    let table = driver.click_and_copy("Copy error table as Markdown").unwrap();
+    assert!(table.starts_with("| ") && table.contains("| network |"), "{table}");
+    // A field has a menu of its own.
+    driver.right_click("Hidden nodes");
+    assert_eq!(driver.click_and_copy("Copy 6"), Some("6".to_owned()));
+    driver.right_click("Hidden nodes");
+    driver.click("Reset to 12");
+    assert_eq!(driver.state().draft.hidden, 12);
+    let _ = PointerButton::Secondary;
+    assert_eq!(driver.views().train.tab, BottomTab::Loss);
+}
+
+#[test]
+fn a_picture_is_copied_from_its_card() {
+    let mut driver = trained();
+    driver.right_click("Decoupled surface");
+    driver.click("Copy surfaces as a picture");
+    driver.wait("the picture", |driver| driver.says("Copied the surfaces as a picture"));
+}

@@ -1,0 +1,93 @@
+//! Numbers as they are typed: with units, and refused in place where they cannot be taken.
+
+use eframe::egui::{Event, Key, Modifiers, PointerButton, accesskit::Role};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use crate::driver::Driver;
+
+#[test]
+fn values_are_taken_with_their_units() {
+    let mut driver = Driver::open();
+    driver.enter("Height", "0.6 cm");
+    assert_eq!(driver.state().draft.source.sensor.geometry.height_mm, 6.0);
+    driver.enter("Row pitch", "1500um");
+    assert_eq!(driver.state().draft.source.sensor.geometry.row_pitch_mm, 1.5);
+    driver.enter("Largest compression", "15%");
+    assert_eq!(driver.state().draft.source.scene.largest_compression, 0.15);
+    driver.enter("Resistivity", "2 kohm/mm");
+    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 2000.0);
+    driver.enter("Smallest gradient", "1e-9");
+    assert_eq!(driver.state().draft.training.stopping.min_gradient, 1e-9);
+}
+
+#[test]
+fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
+    let mut driver = Driver::open();
+    let before = driver.state().draft;
+    for (field, typed, reason) in [
+        ("Hidden nodes", "0", "0 is too small: at least 1."),
+        ("Hidden nodes", "2.5", "“2.5” is not a whole number."),
+        (
+            "Height",
+            "5 kg",
+            "“kg” is no unit of this field: type mm, µm, nm, cm, m, in or none.",
+        ),
+        ("Height", "thick", "“thick” is not a number: type for instance 0.5 mm."),
+        ("Largest compression", "120 %", "120 % is too large: at most 99 %."),
+        ("Seed", "-1", "−1 is too small: at least 0."),
+    ] {
+        driver.enter(field, typed);
+        assert!(driver.has(reason), "{field}: {typed}: {:#?}", driver.texts());
+        assert_eq!(driver.state().draft, before, "{field}: {typed}");
+        let by = By::new().role(Role::SpinButton).label(field);
+        let described = driver.harness().get(by).accesskit_node().description();
+        assert_eq!(described.as_deref(), Some(reason), "it is read out with the field");
+    }
+    driver.enter("Hidden nodes", "7");
+    assert!(!driver.says("too small: at least 1"), "the next number settles it");
+    assert_eq!(driver.state().draft.hidden, 7);
+}
+
+#[test]
+fn a_reason_is_near_its_field_and_goes_with_escape() {
+    let mut driver = Driver::open();
+    driver.enter("Hidden nodes", "0");
+    let (field, reason) = (
+        driver.get("Hidden nodes").rect(),
+        driver.get("0 is too small: at least 1.").rect(),
+    );
+    assert!(
+        reason.top() >= field.bottom() - 1.0 && reason.top() < field.bottom() + 12.0,
+        "{field} {reason}"
+    );
+    driver.get("Hidden nodes").focus();
+    driver.harness().run_steps(2);
+    driver.press(Key::Escape);
+    driver.harness().run_steps(2);
+    assert!(!driver.has("0 is too small: at least 1."));
+}
+
+#[test]
+fn a_double_click_sets_the_usual_value() {
+    let mut driver = Driver::open();
+    driver.enter("Hidden nodes", "33");
+    assert_eq!(driver.state().draft.hidden, 33);
+    let at = driver.get("Hidden nodes").rect().center();
+    let harness = driver.harness();
+    let now = harness.ctx.input(|input| input.time);
+    for click in 0..2 {
+        for pressed in [true, false] {
+            harness.input_mut().time = Some(now + 0.1 * f64::from(click) + if pressed { 0.02 } else { 0.05 });
+            harness.input_mut().events.push(Event::PointerMoved(at));
+            harness.input_mut().events.push(Event::PointerButton {
+                pos: at,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            });
+            harness.step();
+        }
+    }
+    driver.harness().run_steps(3);
+    assert_eq!(driver.state().draft.hidden, 12);
+}
