@@ -30,7 +30,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Train(Box<Train>),
-    Inspect(Inspect),
+    Inspect(Box<Inspect>),
     Decode(Decode),
     Export(Export),
     Calibrate(Box<Calibrate>),

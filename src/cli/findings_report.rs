@@ -192,10 +192,16 @@ impl<'a> Report<'a> {
     }
 
     fn write_splits(&self, out: &mut impl Write) -> io::Result<()> {
-        for target in &self.targets {
-            if let Some(splits) = &target.splits {
-                writeln!(out, "{}", capitalised(&splits.sentence))?;
-            }
+        let splits: Vec<&Splits> = self
+            .targets
+            .iter()
+            .filter_map(|target| target.splits.as_ref())
+            .collect();
+        if splits.is_empty() {
+            return Ok(());
+        }
+        for splits in splits {
+            writeln!(out, "{}", capitalised(&splits.sentence))?;
         }
         writeln!(out)
     }
@@ -288,7 +294,13 @@ impl<'a> Target<'a> {
             }),
             sentence: best.map_or_else(
                 || format!("{name} is constant, or all its samples are one stretch or group: nothing can be judged"),
-                |(_, determination)| determination.sentence(name),
+                |(_, determination)| {
+                    let sentence = determination.sentence(name);
+                    match of.network {
+                        Some(_) => sentence,
+                        None => format!("{sentence}, as far as a linear map goes"),
+                    }
+                },
             ),
             r2_network: r2(of.network),
             r2_ridge: r2(of.ridge),

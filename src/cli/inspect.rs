@@ -16,6 +16,7 @@ use super::{
 use crate::{
     export::format_number,
     import::{ColumnKind, ColumnSummary, Dialect, Inspection, TimeSummary},
+    sensor::counted,
 };
 
 /// Show what is in a file of own data, and what its readings tell of targets
@@ -64,10 +65,10 @@ impl Inspect {
         print(|out| {
             writeln!(
                 out,
-                "{}: {} rows × {} columns",
+                "{}: {} × {}",
                 data.display(),
-                inspection.rows,
-                inspection.columns.len()
+                counted(inspection.rows, "row"),
+                counted(inspection.columns.len(), "column")
             )?;
             writeln!(out, "{}\n", format_words(&table.format))?;
             write_columns(&inspection.columns, out)?;

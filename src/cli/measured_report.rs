@@ -16,6 +16,7 @@ use crate::{
     },
     export::{MeasuredNetworkFile, format_duration},
     import::{Channel, Dropped, Plan, PlannedSets, Recording},
+    sensor::counted,
     training::StopReason,
 };
 
@@ -181,23 +182,26 @@ pub(super) fn print(
         write_files(&report.files, report.rows, &report.dropped, out)?;
         writeln!(
             out,
-            "{} samples for training, {} for validation, {} for the test (split by {})",
-            report.samples, report.validation_samples, report.test_samples, report.split
+            "{} for training, {} for validation, {} for the test (split by {})",
+            counted(report.samples, "sample"),
+            report.validation_samples,
+            report.test_samples,
+            report.split
         )?;
         writeln!(
             out,
-            "{} inputs, {} hidden nodes, {}, {} starts, seed {}",
-            file.inputs.len(),
-            settings.hidden,
+            "{}, {}, {}, {}, seed {}",
+            counted(file.inputs.len(), "input"),
+            counted(settings.hidden, "hidden node"),
             settings.training.method,
-            settings.starts,
+            counted(settings.starts, "start"),
             settings.seed
         )?;
         let reason = training
             .stop_reason
             .map_or("not ended".to_owned(), |reason| reason.to_string());
         let time = wall_time.map_or_else(String::new, |time| format!(", {}", format_duration(time)));
-        writeln!(out, "Ended after {epochs} epochs{time}: {reason}")?;
+        writeln!(out, "Ended after {}{time}: {reason}", counted(epochs, "epoch"))?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         let rows = [
             ("mean", &file.mean[..]),

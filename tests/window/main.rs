@@ -16,6 +16,7 @@ mod habits;
 mod identifying;
 mod live;
 mod looking;
+mod newcomer;
 mod own_data;
 mod pictures;
 mod pressing;

@@ -3,7 +3,7 @@ use eframe::egui::{Response, Ui, WidgetInfo, accesskit::Role};
 use super::Phase;
 use crate::app::{
     theme::space,
-    widgets::{ghost_button, primary_button},
+    widgets::{Landmark, ghost_button, primary_button},
 };
 
 /// Wish of the user for a training.
@@ -56,6 +56,7 @@ pub fn run_buttons_ui(
         wish = Some(toggled);
     }
     let train = ui.add_enabled(can_train && !is_busy, primary_button("▶ Train"));
+    Landmark::Train.stands_at(ui, train.rect);
     let hint = if can_continue {
         format!("Starts again: {hint} (Ctrl+Enter).")
     } else {

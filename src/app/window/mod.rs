@@ -12,8 +12,8 @@ mod dropping;
 mod export_menu;
 mod files;
 mod frames;
+mod help;
 mod interface_scale;
-mod keys_list;
 mod memory;
 mod news;
 mod notice;
@@ -25,6 +25,7 @@ mod save_form;
 #[cfg(test)]
 mod tests;
 mod top_bar;
+mod tour;
 mod undoing;
 
 pub use decoupler_window::DecouplerWindow;

@@ -45,6 +45,7 @@ pub(super) fn error_tables_ui(ui: &mut Ui, targets: &[Channel], rows: &[(&'stati
             .filter_map(|(number, (name, errors))| {
                 let is_network = number + 1 == rows.len();
                 Some(Row {
+                    mark: "",
                     name,
                     meaning: meaning(name),
                     cells: cells(errors.get(index)?),
