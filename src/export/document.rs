@@ -1,5 +1,6 @@
 use std::{
-    fmt, io,
+    fmt, fs,
+    io::{self, Read as _},
     ops::RangeInclusive,
     path::{Path, PathBuf},
 };
@@ -40,6 +41,33 @@ pub enum DocumentKind {
 }
 
 impl DocumentKind {
+    /// Every kind.
+    const ALL: [Self; 9] = [
+        Self::Network,
+        Self::Checkpoint,
+        Self::MeasuredNetwork,
+        Self::MeasuredCheckpoint,
+        Self::Recipe,
+        Self::Sensor,
+        Self::RunList,
+        Self::Trial,
+        Self::SweepPlan,
+    ];
+
+    /// Kind of the file at `path` by its beginning; `None` if it is none of them, or cannot be read.
+    pub fn of_file(path: &Path) -> Option<Self> {
+        /// Number of bytes in which the format is named, however a recipe is laid out by hand.
+        const BEGINNING: u64 = 512;
+        let mut beginning = Vec::new();
+        let file = fs::File::open(path).ok()?;
+        file.take(BEGINNING).read_to_end(&mut beginning).ok()?;
+        let text = String::from_utf8_lossy(&beginning);
+        let (_, rest) = text.trim_start().strip_prefix('{')?.split_once("\"format\"")?;
+        let format = rest.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?;
+        let (format, _) = format.split_once('"')?;
+        Self::ALL.into_iter().find(|kind| kind.format() == format)
+    }
+
     /// Text of the field "format".
     pub(super) fn format(self) -> &'static str {
         match self {
@@ -115,7 +143,12 @@ impl DocumentKind {
             NoHeading::Other => other(format!("it has no field \"format\": \"{}\"", self.format())),
         })?;
         if heading.format != self.format() {
-            return Err(other(format!("its format is {}", heading.format)));
+            let measured = [Self::MeasuredNetwork, Self::MeasuredCheckpoint];
+            let found = measured.into_iter().find(|kind| heading.format == kind.format());
+            return Err(other(match found {
+                Some(kind) => format!("it is a {kind}, which has no sensor's geometry"),
+                None => format!("its format is {}", heading.format),
+            }));
         }
         match heading.newer_than(*self.versions().end()) {
             Some(version) => Err(DocumentError::Version {

@@ -133,12 +133,17 @@ pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) ->
 
 /// Decoupled against actual z, with the line on which they would be equal and the line fitted to them.
 pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
-    let numbered: Vec<(usize, (f64, f64))> = pairs_mm.iter().copied().enumerate().collect();
+    regression(pairs_mm, ("z", Some("mm")), "nodes of the test set")
+}
+
+/// Decoupled against actual values of a quantity (its name and unit) in pairs of `what`.
+pub(super) fn regression(pairs: &[(f64, f64)], (name, unit): (&str, Option<&str>), what: &str) -> PlotFigure {
+    let numbered: Vec<(usize, (f64, f64))> = pairs.iter().copied().enumerate().collect();
     let dots = thinned(&numbered).map(|(pair, (actual, decoupled))| PlotPoint {
         item: Some(pair),
         ..PlotPoint::from([actual, decoupled])
     });
-    let actual = || pairs_mm.iter().map(|pair| pair.0).filter(|z| z.is_finite());
+    let actual = || pairs.iter().map(|pair| pair.0).filter(|value| value.is_finite());
     let ends = [actual().reduce(f64::min), actual().reduce(f64::max)];
     let line = |name: &str, look: Look, of: &dyn Fn(f64) -> f64| {
         Series::new(
@@ -150,21 +155,26 @@ pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
     let mut series = vec![
         Series {
             points: dots.collect(),
-            ..Series::new("nodes of the test set", Look::marker(Hue::Blue, Marker::Dot), [])
+            ..Series::new(what, Look::marker(Hue::Blue, Marker::Dot), [])
         },
         line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual),
     ];
     let mut notes = Vec::new();
-    if let Some(fit) = Fit::new(pairs_mm) {
+    if let Some(fit) = Fit::new(pairs) {
         let look = Look::line(Hue::Orange, LineStyle::Solid);
-        series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset_mm));
-        let sign = if fit.offset_mm < 0.0 { '−' } else { '+' };
-        let [slope, offset] = [fit.slope, fit.offset_mm.abs()].map(format_number);
+        series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset));
+        let sign = if fit.offset < 0.0 { '−' } else { '+' };
+        let [slope, offset] = [fit.slope, fit.offset.abs()].map(format_number);
+        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
         notes = vec![
             format!("Correlation R = {}", format_number(fit.correlation)),
-            format!("Fitted line: decoupled = {slope} · actual {sign} {offset} mm"),
+            format!("Fitted line: decoupled = {slope} · actual {sign} {offset}{unit}"),
         ];
     }
+    let title = match unit {
+        Some(unit) => format!("{name} ({unit})"),
+        None => name.to_owned(),
+    };
     PlotFigure {
         keys: series
             .iter()
@@ -173,8 +183,8 @@ pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
         plots: vec![Plot {
             has_equal_scales: true,
             ..Plot::new(
-                PlotAxis::linear("actual z (mm)"),
-                PlotAxis::linear("decoupled z (mm)"),
+                PlotAxis::linear(format!("actual {title}")),
+                PlotAxis::linear(format!("decoupled {title}")),
                 series,
             )
         }],
@@ -188,17 +198,18 @@ struct Fit {
     /// Pearson's.
     correlation: f64,
     slope: f64,
-    offset_mm: f64,
+    /// In the unit of the values.
+    offset: f64,
 }
 
 impl Fit {
     /// `None` where one side does not vary.
-    fn new(pairs_mm: &[(f64, f64)]) -> Option<Self> {
-        let count = pairs_mm.len() as f64;
-        let mean = |pick: fn(&(f64, f64)) -> f64| pairs_mm.iter().map(pick).sum::<f64>() / count;
+    fn new(pairs: &[(f64, f64)]) -> Option<Self> {
+        let count = pairs.len() as f64;
+        let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / count;
         let (mean_a, mean_d) = (mean(|pair| pair.0), mean(|pair| pair.1));
         let (mut aa, mut dd, mut ad) = (0.0, 0.0, 0.0);
-        for (a, d) in pairs_mm {
+        for (a, d) in pairs {
             aa += (a - mean_a).powi(2);
             dd += (d - mean_d).powi(2);
             ad += (a - mean_a) * (d - mean_d);
@@ -207,9 +218,9 @@ impl Fit {
         let fit = Self {
             correlation: ad / (aa * dd).sqrt(),
             slope,
-            offset_mm: mean_d - slope * mean_a,
+            offset: mean_d - slope * mean_a,
         };
-        let is_finite = fit.correlation.is_finite() && fit.offset_mm.is_finite();
+        let is_finite = fit.correlation.is_finite() && fit.offset.is_finite();
         is_finite.then_some(fit)
     }
 }
@@ -353,7 +364,7 @@ mod tests {
         let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 * f64::from(i) - 1.0)).collect();
         let fit = Fit::new(&line).unwrap();
         assert!((fit.correlation - 1.0).abs() < 1e-15);
-        assert!((fit.slope - 3.0).abs() < 1e-14 && (fit.offset_mm + 1.0).abs() < 1e-13);
+        assert!((fit.slope - 3.0).abs() < 1e-14 && (fit.offset + 1.0).abs() < 1e-13);
         assert_eq!(Fit::new(&[(1.0, 2.0), (1.0, 3.0)]), None);
         assert_eq!(Fit::new(&[]), None);
         assert_eq!(

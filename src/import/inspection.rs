@@ -95,13 +95,18 @@ impl Inspection {
         watch: Watch<'_>,
     ) -> Result<(Self, Table), ImportError> {
         let table = read_table(path, choice, watch)?;
+        Ok((Self::of(&table, time)?, table))
+    }
+
+    /// Looks at each column of `table`; see [`Self::read`].
+    pub(super) fn of(table: &Table, time: Option<&str>) -> Result<Self, ImportError> {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
-        name_duplicates(&table, &mut columns);
+        name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((super::names::Names::of(&[&table], &[]).find(name)?.column, false)),
-            None => guess_time(&table, &columns).map(|column| (column, true)),
+            Some(name) => Some((super::names::Names::of(&[table], &[]).find(name)?.column, false)),
+            None => guess_time(table, &columns).map(|column| (column, true)),
         };
-        let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(&table, column, is_guessed));
+        let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
         if let Some(line) = table.too_short.first_line {
             let rows = table.too_short.rows;
@@ -115,13 +120,12 @@ impl Inspection {
                 "{rows} rows, the first on line {line}, have more cells than there are columns and are left out"
             ));
         }
-        let inspection = Self {
+        Ok(Self {
             rows: table.rows,
             columns,
             time,
             warnings,
-        };
-        Ok((inspection, table))
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
 //! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
-//! [`Plan`] adds how the samples are divided for training and test.
+//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files.
 
 mod arrays;
 mod column;
@@ -15,9 +15,11 @@ mod error;
 mod gather;
 mod importing;
 mod inputs;
+mod inspected;
 mod inspection;
 mod join;
 mod matlab;
+mod meaning;
 mod meanings;
 mod missing;
 mod names;
@@ -30,6 +32,7 @@ mod recipe;
 mod recording;
 mod rows;
 mod selection;
+mod suggestion;
 mod table;
 mod utf16;
 mod watch;
@@ -39,11 +42,14 @@ pub use condition::Condition;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
 pub use inputs::InputTable;
+pub use inspected::InspectedFile;
 pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
+pub use meaning::Meaning;
 pub use missing::Missing;
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use read::read_table;
 pub use recipe::{Joined, Recipe};
 pub use recording::{Channel, Dropped, FileReport, JoinReport, Recording};
+pub use suggestion::suggested_plan;
 pub use table::{Excess, Format, Table};
 pub use watch::{Progress, Watch};

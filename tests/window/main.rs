@@ -17,6 +17,7 @@ mod identifying;
 mod live;
 mod looking;
 mod newcomer;
+mod own_data;
 mod pictures;
 mod pressing;
 mod reading_errors;

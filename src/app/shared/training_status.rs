@@ -5,7 +5,7 @@ use eframe::egui::{Align, Color32, Layout, RichText, Sense, Ui, Vec2};
 use super::{Phase, RunView, Shared};
 use crate::{
     app::{
-        theme::{Theme, space, type_size},
+        theme::{Palette, Theme, space, type_size},
         widgets::state_ui,
     },
     export::{format_duration, format_number, format_percent},
@@ -16,7 +16,7 @@ use crate::{
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
-        let (colour, text) = phase_in_words(shared, ui);
+        let (colour, text) = phase_in_words(shared.phase, "Drawing samples", &palette);
         state_ui(ui, colour, &text);
         let Some(run) = shared
             .shown_run()
@@ -33,11 +33,11 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     });
 }
 
-fn phase_in_words(shared: &Shared, ui: &Ui) -> (Color32, String) {
-    let palette = Theme::of(ui).palette;
-    match shared.phase {
+/// Colour and words of a phase; `preparing` are those of the work before a training.
+pub fn phase_in_words(phase: Phase, preparing: &str, palette: &Palette) -> (Color32, String) {
+    match phase {
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
-        Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
+        Phase::Preparing => (palette.accent, preparing.to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),
         Phase::Paused => (palette.warning, "Paused".to_owned()),
         Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),

@@ -1,4 +1,4 @@
-use std::fmt::Debug;
+use std::{fmt::Debug, path::PathBuf};
 
 use eframe::egui::{Context, Ui};
 
@@ -19,6 +19,16 @@ pub trait View: Debug {
 
     /// Returns true while its threads compute.
     fn is_working(&self) -> bool {
+        false
+    }
+
+    /// Takes files dropped on the window; false if they are not for it.
+    fn take_files(&mut self, _paths: &[PathBuf], _effects: &mut Vec<Effect>) -> bool {
+        false
+    }
+
+    /// Returns true while closing the window would lose a training.
+    fn has_unfinished(&self) -> bool {
         false
     }
 

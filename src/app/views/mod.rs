@@ -8,6 +8,7 @@ mod compare;
 mod experiments;
 mod identifiability;
 mod live;
+mod own_data;
 mod trade_off;
 mod train;
 
@@ -21,7 +22,7 @@ pub use train::{BottomTab, DecoderResult};
 
 use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
-    trade_off::TradeOffView, train::TrainView,
+    own_data::OwnDataView, trade_off::TradeOffView, train::TrainView,
 };
 pub(super) use train::{CHECKPOINT, checkpoint_task};
 
@@ -40,6 +41,8 @@ pub struct Views {
     pub trade_off: TradeOffView,
     /// View of frames decoded as they come.
     pub live: LiveView,
+    /// View of recordings and networks trained on them.
+    pub own_data: OwnDataView,
 }
 
 impl Views {
@@ -52,11 +55,12 @@ impl Views {
             identifiability: IdentifiabilityView::new(Arc::clone(wake)),
             trade_off: TradeOffView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
+            own_data: OwnDataView::new(Arc::clone(wake)),
         }
     }
 
     /// In the order of the top bar. The first is the one that trains.
-    pub fn all(&mut self) -> [&mut dyn View; 6] {
+    pub fn all(&mut self) -> [&mut dyn View; 7] {
         [
             &mut self.train,
             &mut self.experiments,
@@ -64,6 +68,7 @@ impl Views {
             &mut self.identifiability,
             &mut self.trade_off,
             &mut self.live,
+            &mut self.own_data,
         ]
     }
 }

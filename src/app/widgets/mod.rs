@@ -22,5 +22,5 @@ pub use landmark::Landmark;
 pub use number_field::{number_ui, refusal_ui, usually};
 pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;
-pub use table::{Column, Row, table_ui};
+pub use table::{Column, Row, captioned_table_ui, table_ui};
 pub use value_under::{take_claim, take_value_under, value_under};

@@ -28,6 +28,11 @@ pub struct Row {
 
 /// Lays out the table over the available width, in smaller type where that is narrow.
 pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
+    captioned_table_ui(ui, "", columns, rows);
+}
+
+/// As [`table_ui`], for one of several tables that differ by `caption`: assistive technology reads it with every figure.
+pub fn captioned_table_ui(ui: &mut Ui, caption: &str, columns: &[Column], rows: &[Row]) {
     let palette = Theme::of(ui).palette;
     let whole = ui.available_width();
     let row_height = space(6);
@@ -80,7 +85,8 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
                 Some(at) => {
                     let (heading, cell) = (columns[at].heading, &row.cells[at]);
                     let response = cell_ui(ui, rect, Align::Max, text(cell));
-                    let label = format!("{}, {heading}: {cell}", row.name);
+                    let gap = if caption.is_empty() { "" } else { ", " };
+                    let label = format!("{caption}{gap}{}, {heading}: {cell}", row.name);
                     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
                     value_under(ui, rect, cell);
                 }

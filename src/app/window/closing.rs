@@ -28,8 +28,9 @@ impl DecouplerWindow {
         if is_requested && self.closing.is_none() {
             self.closing = Some(Closing::Asking);
         }
+        let loses_nothing = !self.has_unfinished_training() && self.unfinished_view().is_none();
         match self.closing {
-            Some(Closing::Asking) if !self.has_unfinished_training() => {
+            Some(Closing::Asking) if loses_nothing => {
                 if self.shared.phase == Phase::Preparing {
                     self.apply(Effect::Stop);
                 }
@@ -62,9 +63,24 @@ impl DecouplerWindow {
         matches!(self.shared.phase, Phase::Training | Phase::Paused) && !is_saved
     }
 
+    /// Name of a view with a training of its own that closing would lose.
+    fn unfinished_view(&mut self) -> Option<&'static str> {
+        let mut views = self.views.all().into_iter();
+        views.find_map(|view| view.has_unfinished().then(|| view.name()))
+    }
+
     /// Asks about the unfinished training, or tells what closing waits for.
     pub(super) fn closing_ui(&mut self, ui: &Ui) {
         let (heading, text, buttons): (_, _, &[_]) = match self.closing {
+            Some(Closing::Asking) if !self.has_unfinished_training() => {
+                let view = self.unfinished_view().unwrap_or_default();
+                let text = format!(
+                    "The training of the {view} view has not ended. Closing discards it; to keep it, stay, pause it and \
+                     export its checkpoint."
+                );
+                let buttons = &[("Stay", None), ("Discard and close", Some(Closing::Finishing))];
+                ("Close during a training?", text, buttons)
+            }
             Some(Closing::Asking) => (
                 "Close during a training?",
                 format!(

@@ -160,6 +160,7 @@ impl DecouplerWindow {
         }
         let mut effects = Vec::new();
         let actions = self.offer_actions(ui.ctx(), &mut effects);
+        self.take_dropped(ui.ctx(), &mut effects);
         let is_asked = self.is_asked();
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
         if !is_asked {
@@ -254,6 +255,7 @@ impl DecouplerWindow {
         }
         self.undoing.follow(ui.input(|input| input.time), &self.shared.draft);
         self.overlay_ui(ui, &actions);
+        self.dropping_ui(ui);
         self.tour_ui(ui, &actions);
         self.ask_for_path(ui);
         self.remember();

@@ -92,6 +92,9 @@ impl Dialogs {
 fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
     let suggestion = task.suggested_path();
     let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+    if task.is_read() && task.words.extensions.len() > 1 {
+        dialog = dialog.add_filter(task.words.kind, task.words.extensions);
+    }
     for extension in task.words.extensions {
         dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
     }

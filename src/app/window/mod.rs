@@ -8,6 +8,7 @@ mod columns;
 mod copying;
 mod decoupler_window;
 mod dialogs;
+mod dropping;
 mod export_menu;
 mod files;
 mod frames;

@@ -9,6 +9,9 @@ use crate::app::{
 /// Width from which on there is room for everything, in points.
 const WIDE: f32 = 1280.0;
 
+/// Width below which the names of the views stand closer.
+const TIGHT: f32 = 1100.0;
+
 /// Width below which every point counts.
 const NARROW: f32 = 1000.0;
 
@@ -46,7 +49,13 @@ pub(super) fn top_bar_ui(
             ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
         }
         ui.add_space(space(2));
-        let picked = segmented_ui(ui, "View", views, shown, false).map(Reach::View);
+        let views_ui = |ui: &mut Ui| {
+            if width < TIGHT {
+                ui.spacing_mut().button_padding.x = space(1);
+            }
+            segmented_ui(ui, "View", views, shown, false)
+        };
+        let picked = ui.scope(views_ui).inner.map(Reach::View);
         let reached = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let mut reached = None;
             let mut button_ui = |ui: &mut Ui, name: &str, text: &str| {

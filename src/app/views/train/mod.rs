@@ -11,7 +11,6 @@ mod inspect;
 mod paper_figure;
 mod press;
 mod report;
-mod run_buttons;
 mod scrub;
 mod state;
 mod surfaces;

@@ -5,11 +5,10 @@ use super::{
     configuration::configuration_ui,
     exports::train_exports,
     report,
-    run_buttons::run_buttons_ui,
     workbench::{WorkbenchLayout, workbench_ui},
 };
 use crate::app::{
-    shared::{Columns, Effect, Export, Offers, Phase, Shared, View},
+    shared::{Columns, Effect, Export, Offers, Phase, RunWish, Shared, View, run_buttons_ui},
     theme::space,
     widgets::snapshot_ui,
 };
@@ -80,7 +79,16 @@ impl View for TrainView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        run_buttons_ui(ui, shared, effects);
+        let can_train = shared.phase != Phase::Died;
+        let hint = "draws the sets and trains the network";
+        let wish = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
+        effects.extend(wish.map(|wish| match wish {
+            RunWish::Train => Effect::Train,
+            RunWish::Continue => Effect::Continue,
+            RunWish::Pause => Effect::Pause,
+            RunWish::Resume => Effect::Resume,
+            RunWish::Stop => Effect::Stop,
+        }));
         ui.add_space(space(4));
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
         if let Some(snapshot) = snapshot_ui(ui, self.snapshot, snapshots) {

@@ -2,7 +2,6 @@ use eframe::egui::Ui;
 
 use super::{
     choices::{array_choice_ui, hidden_choice_ui},
-    method_section::{method_choice_ui, method_settings_ui, stopping_ui},
     network_section::inputs_ui,
     preset_section::{applied, present, preset_section_ui},
     scene_choice::scene_choice_ui,
@@ -12,7 +11,7 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Effect, Phase, Shared},
+        shared::{Effect, Phase, Shared, method_choice_ui, method_settings_ui, stopping_ui},
         theme::space,
         views::train::paper_figure::PaperFigure,
         widgets::{Landmark, fold_ui, ghost_button, scrolled_ui},
@@ -36,7 +35,9 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
             array_choice_ui(ui, &mut draft.source.sensor.scale);
             hidden_choice_ui(ui, &mut draft);
         });
-        ui.add_enabled_ui(!is_busy || is_held, |ui| method_choice_ui(ui, &mut draft));
+        ui.add_enabled_ui(!is_busy || is_held, |ui| {
+            method_choice_ui(ui, &mut draft.training.method);
+        });
         Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
         ui.add_enabled_ui(!is_busy, |ui| {
             preset_section_ui(ui, &mut draft);
@@ -62,10 +63,10 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
         });
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
             fold_ui(ui, "When to stop", &summaries::of_stopping(&draft), |ui| {
-                stopping_ui(ui, &mut draft);
+                stopping_ui(ui, &mut draft.training.stopping);
             });
             fold_ui(ui, "Method settings", &summaries::of_method(&draft), |ui| {
-                method_settings_ui(ui, &mut draft, !is_busy);
+                method_settings_ui(ui, &mut draft.training.method, &mut draft.starts, !is_busy);
             });
         });
         ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {

@@ -3,7 +3,6 @@
 
 mod choices;
 mod form;
-mod method_section;
 mod network_section;
 mod noise_section;
 mod preset_section;

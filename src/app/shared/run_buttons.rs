@@ -1,14 +1,35 @@
 use eframe::egui::{Response, Ui, WidgetInfo, accesskit::Role};
 
+use super::Phase;
 use crate::app::{
-    shared::{Effect, Phase, Shared},
     theme::space,
     widgets::{Landmark, ghost_button, primary_button},
 };
 
-/// The buttons that run the training, from right to left.
-pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-    let is_busy = shared.phase.is_busy();
+/// Wish of the user for a training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunWish {
+    /// Begin one.
+    Train,
+    /// Go on from the present weights with the settings as they are now.
+    Continue,
+    /// Hold it.
+    Pause,
+    /// Go on with it.
+    Resume,
+    /// End it.
+    Stop,
+}
+
+/// The buttons that run a training in this phase, from right to left. Train draws or reads the samples, as `hint` says.
+pub fn run_buttons_ui(
+    ui: &mut Ui,
+    phase: Phase,
+    (can_train, can_continue): (bool, bool),
+    hint: &str,
+) -> Option<RunWish> {
+    let mut wish = None;
+    let is_busy = phase.is_busy();
     // In a narrow window the signs must do.
     let is_short = ui.available_width() < space(120);
     let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
@@ -17,15 +38,14 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         .on_hover_text("Ends the training; the best network so far is kept (Ctrl+.).")
         .clicked()
     {
-        effects.push(Effect::Stop);
+        wish = Some(RunWish::Stop);
     }
-    let held = shared.phase == Phase::Paused;
-    let (text, effect) = if held {
-        ("▶ Resume", Effect::Resume)
+    let (text, toggled) = if phase == Phase::Paused {
+        ("▶ Resume", RunWish::Resume)
     } else {
-        ("⏸ Pause", Effect::Pause)
+        ("⏸ Pause", RunWish::Pause)
     };
-    let can_pause = matches!(shared.phase, Phase::Training | Phase::Paused);
+    let can_pause = matches!(phase, Phase::Training | Phase::Paused);
     let sign = text.split(' ').next().unwrap_or(text);
     let pause = ui.add_enabled(can_pause, ghost_button(if is_short { sign } else { text }));
     name(&pause, text);
@@ -33,28 +53,29 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         .on_hover_text("Pauses or resumes the training (Ctrl+P).")
         .clicked()
     {
-        effects.push(effect);
+        wish = Some(toggled);
     }
-    let can_train = !is_busy && shared.phase != Phase::Died;
-    let train = ui.add_enabled(can_train, primary_button("▶ Train"));
+    let train = ui.add_enabled(can_train && !is_busy, primary_button("▶ Train"));
     Landmark::Train.stands_at(ui, train.rect);
-    let can_continue = shared.can_continue();
     let hint = if can_continue {
-        "Starts again: draws the sets and trains the network (Ctrl+Enter)."
+        format!("Starts again: {hint} (Ctrl+Enter).")
     } else {
-        "Draws the sets and trains the network (Ctrl+Enter)."
+        let mut letters = hint.chars();
+        let first = letters.next().into_iter().flat_map(char::to_uppercase);
+        format!("{} (Ctrl+Enter).", first.chain(letters).collect::<String>())
     };
     if train.on_hover_text(hint).clicked() {
-        effects.push(Effect::Train);
+        wish = Some(RunWish::Train);
     }
     if can_continue {
         let hint = "Continues from the present weights with the method and the epochs on the left, counted from here. \
                     Train starts again from random weights.";
         let go_on = ui.add(ghost_button("Continue"));
         if go_on.on_hover_text(hint).clicked() {
-            effects.push(Effect::Continue);
+            wish = Some(RunWish::Continue);
         }
     }
+    wish
 }
 
 /// Gives the button its whole name, for assistive technology.

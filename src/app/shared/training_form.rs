@@ -6,13 +6,12 @@ use crate::{
         theme::{Theme, space, type_size},
         widgets::fields::{capitalised, count_ui, input_text, quantity_ui, usually},
     },
-    evaluation::{MOST_STARTS, SimulatedSettings},
+    evaluation::MOST_STARTS,
     training::{Method, StoppingRules},
 };
 
-/// The choice of the method; changes `draft`.
-pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let method = &mut draft.training.method;
+/// The choice of the method; changes `method`.
+pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
     // The longest names fill a line.
     let label = ui.label("Method").on_hover_text(glossary::METHOD.hint);
     let combo = ComboBox::from_id_salt("method")
@@ -35,23 +34,23 @@ pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
 }
 
-/// The settings of the chosen method and the number of starts; changes `draft`. A training that is held
-/// (`is_new` is false) keeps its starts.
-pub fn method_settings_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bool) {
-    for setting in draft.training.method.settings() {
+/// The settings of the chosen method and the number of starts; changes both. A training that is held (`is_new` is false)
+/// keeps its starts.
+pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, is_new: bool) {
+    for setting in method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         let limits = usually(setting.default, setting.range);
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", &hint, &mut draft.starts, usually(1, 1..=MOST_STARTS))
+        count_ui(ui, "Starts", &hint, starts, usually(1, 1..=MOST_STARTS))
     });
 }
 
-/// The rules that end a training; changes `draft`.
-pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let (stopping, usual) = (&mut draft.training.stopping, StoppingRules::default());
+/// The rules that end a training; changes `stopping`.
+pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
+    let usual = StoppingRules::default();
     let hint = format!(
         "Largest number of epochs. {} Train counts from the first epoch, Continue from the present one.",
         glossary::EPOCH.hint

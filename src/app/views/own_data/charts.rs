@@ -1,0 +1,113 @@
+use ndarray::Axis;
+
+use super::model::{Trained, position_pair};
+use crate::{
+    figure::{
+        Figure, HeatMap, PlotFigure, loss_figure, position_error_map, target_regression_figure, training_state_figure,
+    },
+    import::Channel,
+};
+
+/// Charts of a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum ChartTab {
+    /// Error against epoch.
+    #[default]
+    Loss,
+    /// The method's own quantities against epoch.
+    TrainingState,
+    /// Decoded against actual values of a target.
+    Regression,
+    /// Error over the position.
+    Map,
+}
+
+/// The chart on show.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ChartChoice {
+    pub(super) tab: ChartTab,
+    /// Target of the regression.
+    pub(super) target: usize,
+}
+
+/// A chart, or why there is none.
+pub(super) enum Chart {
+    Plots(PlotFigure),
+    Map(Box<HeatMap>),
+    None(&'static str),
+}
+
+impl ChartTab {
+    pub(super) const ALL: [(Self, &'static str); 4] = [
+        (Self::Loss, "Loss"),
+        (Self::TrainingState, "Training state"),
+        (Self::Regression, "Regression"),
+        (Self::Map, "Error map"),
+    ];
+
+    /// Word in names of files.
+    pub(super) fn file_word(self) -> &'static str {
+        match self {
+            Self::Loss => "loss",
+            Self::TrainingState => "training-state",
+            Self::Regression => "regression",
+            Self::Map => "error-map",
+        }
+    }
+}
+
+impl ChartChoice {
+    /// Chooses the chart that says most about networks for these targets.
+    pub(super) fn fit(&mut self, targets: &[Channel]) {
+        self.target = 0;
+        self.tab = if position_pair(targets).is_some() {
+            ChartTab::Map
+        } else {
+            ChartTab::Regression
+        };
+    }
+
+    /// The chart of a network.
+    pub(super) fn chart(&self, trained: &Trained) -> Chart {
+        const NO_SAMPLES: &str = "There are no test samples at hand: the recording of this network was not found.";
+        let record = &trained.file.training;
+        let targets = &trained.file.targets;
+        match (self.tab, &trained.tested) {
+            (ChartTab::Loss, _) => Chart::Plots(loss_figure(&record.history, &record.stages, record.best_epoch)),
+            (ChartTab::TrainingState, _) => Chart::Plots(training_state_figure(&record.history, &record.stages)),
+            (_, None) => Chart::None(NO_SAMPLES),
+            (ChartTab::Regression, Some(tested)) => {
+                let target = self.target.min(targets.len().saturating_sub(1));
+                let channel = &targets[target];
+                let pairs = tested.pairs(target);
+                Chart::Plots(target_regression_figure(&pairs, &channel.name, channel.unit.as_deref()))
+            }
+            (ChartTab::Map, Some(tested)) => {
+                let Some(pair) = position_pair(targets) else {
+                    return Chart::None(
+                        "A map needs two targets that are positions: lengths in the same unit, or both without a unit.",
+                    );
+                };
+                let [actual, answers] =
+                    [tested.set().targets(), tested.answers.view()].map(|values| values.select(Axis(1), &pair));
+                let names = pair.map(|target| targets[target].name.as_str());
+                let unit = targets[pair[0]].unit.as_deref();
+                position_error_map(actual.view(), answers.view(), names, unit).map_or(
+                    Chart::None("The positions of the test samples do not vary, so there is no map."),
+                    |map| Chart::Map(Box::new(map)),
+                )
+            }
+        }
+    }
+}
+
+impl Chart {
+    /// The chart as a figure to be exported.
+    pub(super) fn into_figure(self) -> Option<Figure> {
+        match self {
+            Self::Plots(plots) => Some(plots.into()),
+            Self::Map(map) => Some((*map).into()),
+            Self::None(_) => None,
+        }
+    }
+}

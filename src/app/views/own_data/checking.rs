@@ -1,0 +1,112 @@
+//! Trying an import out in the background: which samples it gives, and which rows it drops.
+
+use std::{ops::ControlFlow, path::Path};
+
+use crate::{
+    app::job::{Job, JobError, Report, Wake},
+    dataset::{Dataset, Seed},
+    evaluation::recorded::channel_remarks,
+    import::{Dropped, FileReport, Plan, Recording},
+};
+
+/// What an import gives.
+#[derive(Clone, Debug)]
+pub(super) struct Checked {
+    /// Number of samples for training, validation and test.
+    pub(super) samples: [usize; 3],
+    /// Number of rows of the files, dropped ones included.
+    pub(super) rows: usize,
+    /// Rows that are no samples, by reason.
+    pub(super) dropped: Vec<Dropped>,
+    /// The files, and how they are joined.
+    pub(super) files: Vec<FileReport>,
+    /// What the user should look at.
+    pub(super) warnings: Vec<String>,
+}
+
+#[derive(Debug)]
+struct CheckingEvent(Result<Box<Checked>, String>);
+
+/// The import being tried out, and what came of the last.
+#[derive(Debug)]
+pub(super) struct Checking {
+    job: Job<CheckingEvent>,
+    asked: Option<(Plan, Seed)>,
+    /// What came of it, once it is known.
+    pub(super) checked: Option<Result<Box<Checked>, String>>,
+}
+
+impl Checking {
+    pub(super) fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::new("import", wake),
+            asked: None,
+            checked: None,
+        }
+    }
+
+    /// Tries this plan out, unless that is done or under way; none if there is nothing to try.
+    pub(super) fn follow(&mut self, plan: Option<Plan>, seed: Seed) {
+        let wanted = plan.map(|plan| (plan, seed));
+        if wanted != self.asked {
+            self.asked.clone_from(&wanted);
+            self.checked = None;
+            match wanted {
+                None => self.job.abandon(),
+                Some((plan, seed)) => self.job.start(
+                    move |report| check(&plan, seed, report),
+                    |checked: Result<_, JobError>| {
+                        CheckingEvent(checked.unwrap_or_else(|error| Err(error.to_string())))
+                    },
+                ),
+            }
+        }
+        while let Some(CheckingEvent(checked)) = self.job.next_event() {
+            self.checked = Some(checked);
+        }
+    }
+
+    /// Tells whether an import is being tried out.
+    pub(super) fn is_under_way(&self) -> bool {
+        self.asked.is_some() && self.checked.is_none()
+    }
+}
+
+fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<Checked>, String> {
+    let mut watch = |_| {
+        if report.is_cancelled() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let sets = plan
+        .sets(Path::new(""), seed, &mut watch)
+        .map_err(|error| error.to_string())?;
+    let recordings = || std::iter::once(&sets.recording).chain(&sets.test_recording);
+    let mut warnings: Vec<String> = recordings()
+        .flat_map(|recording| recording.warnings.iter().cloned())
+        .collect();
+    warnings.extend(channels(&sets.recording));
+    let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
+    Ok(Box::new(Checked {
+        samples: [sets.split.training.samples(), validation, sets.test.samples()],
+        rows: recordings().map(|recording| recording.rows).sum(),
+        dropped: recordings()
+            .flat_map(|recording| recording.dropped.iter().cloned())
+            .collect(),
+        files: recordings()
+            .flat_map(|recording| recording.files.iter().cloned())
+            .collect(),
+        warnings,
+    }))
+}
+
+/// Inputs that tell less than they should.
+fn channels(recording: &Recording) -> Vec<String> {
+    let name = |channel: usize| recording.inputs[channel].name.clone();
+    channel_remarks(&recording.set)
+        .iter()
+        .map(|remark| remark.sentence(name))
+        .collect()
+}

@@ -1,0 +1,32 @@
+//! The Own data view: recordings out of files, what their columns mean, and networks trained on them.
+//!
+//! [`opening`] reads files in the background; a [`draft`] says what is to be made of them, which [`checking`] tries out
+//! whenever it changes; [`training`] makes networks of it.
+
+mod charts;
+mod checking;
+mod column_cells;
+mod columns_table;
+mod draft;
+mod error_table;
+mod exports;
+mod form;
+mod histogram;
+mod import_form;
+mod keeping;
+mod layout_form;
+mod model;
+mod news;
+mod opening;
+mod remarks;
+mod report;
+mod results;
+mod runs;
+mod runs_table;
+mod state;
+mod status;
+mod tools;
+mod training;
+mod view;
+
+pub use state::OwnDataView;

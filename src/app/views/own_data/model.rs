@@ -1,0 +1,171 @@
+use std::{sync::Arc, time::Duration};
+
+use ndarray::Array2;
+
+use crate::{
+    app::shared::Phase,
+    dataset::Dataset,
+    evaluation::{TargetErrors, TargetRow},
+    export::{MeasuredCheckpointFile, MeasuredNetworkFile},
+    import::Channel,
+};
+
+/// A network trained on recordings, as far as the window knows it.
+#[derive(Clone, Debug)]
+pub(super) struct Trained {
+    /// Name in the list of runs.
+    pub(super) name: String,
+    /// Settings, plan, network, record and errors.
+    pub(super) file: Arc<MeasuredNetworkFile>,
+    /// Test samples and the network's answers, if they are at hand.
+    pub(super) tested: Option<Arc<Tested>>,
+    /// State of its training.
+    pub(super) phase: Phase,
+    /// Epochs run by the start that is furthest.
+    pub(super) epochs_run: usize,
+    /// Time of the training by the clock, if it is known.
+    pub(super) wall_time: Option<Duration>,
+    /// Defect of the training, once that has ended.
+    pub(super) flaw: Option<String>,
+    /// What the user should know beside the errors.
+    pub(super) remarks: Vec<String>,
+    /// The training as it stands, while it is paused or has ended.
+    pub(super) checkpoint: Option<Arc<MeasuredCheckpointFile>>,
+}
+
+/// Test samples and the answers to them.
+#[derive(Debug)]
+pub(super) struct Tested {
+    set: Arc<Dataset>,
+    /// Samples × targets.
+    pub(super) answers: Array2<f64>,
+}
+
+impl Tested {
+    pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>) -> Self {
+        Self {
+            set: set.into(),
+            answers,
+        }
+    }
+
+    /// The test samples.
+    pub(super) fn set(&self) -> &Dataset {
+        &self.set
+    }
+
+    /// Errors of the answers, target by target.
+    pub(super) fn errors(&self) -> Vec<TargetErrors> {
+        TargetErrors::measure(self.set.targets(), self.answers.view())
+    }
+
+    /// Actual and decoded values of a target.
+    pub(super) fn pairs(&self, target: usize) -> Vec<(f64, f64)> {
+        let (targets, answers) = (self.set.targets(), self.answers.column(target));
+        targets
+            .column(target)
+            .iter()
+            .copied()
+            .zip(answers.iter().copied())
+            .collect()
+    }
+}
+
+impl Trained {
+    /// The network of a file, without test samples.
+    pub(super) fn of_file(file: Arc<MeasuredNetworkFile>) -> Self {
+        Self {
+            name: String::new(),
+            epochs_run: file.training.history.last().map_or(0, |record| record.epoch),
+            phase: file.training.stop_reason.map_or(Phase::Idle, Phase::Ended),
+            tested: None,
+            wall_time: None,
+            flaw: None,
+            remarks: Vec::new(),
+            checkpoint: None,
+            file,
+        }
+    }
+
+    /// Errors of the mean, of ridge and of the network, in this order.
+    pub(super) fn rows(&self) -> [(&'static str, &[TargetErrors]); 3] {
+        [
+            ("training mean", &self.file.mean),
+            ("ridge", &self.file.ridge),
+            ("network", &self.file.errors),
+        ]
+    }
+}
+
+/// Result of a cross-validation.
+#[derive(Clone, Debug)]
+pub(super) struct Validated {
+    /// Number of folds, and the rule by which they were made.
+    pub(super) folds: String,
+    /// Number of samples, each tested once.
+    pub(super) samples: usize,
+    /// Names and units of the targets.
+    pub(super) targets: Vec<Channel>,
+    /// Errors of the mean, of ridge and of the networks.
+    pub(super) table: Vec<TargetRow>,
+    /// What the readings tell, target by target, and where a network is no better than ridge.
+    pub(super) remarks: Vec<String>,
+}
+
+/// Two targets that are positions in one unit, for a map: lengths, or without units coordinates by their names. Columns
+/// without names may be anything, and so coordinates too.
+pub(super) fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
+    const LENGTHS: [&str; 6] = ["m", "cm", "mm", "µm", "um", "nm"];
+    let may_be = |channel: &Channel| match &channel.unit {
+        None => is_coordinate(&channel.name),
+        Some(unit) => LENGTHS.contains(&unit.trim()),
+    };
+    let pairs = (0..targets.len()).flat_map(|one| (one + 1..targets.len()).map(move |other| [one, other]));
+    let mut pairs = pairs.filter(|[one, other]| {
+        may_be(&targets[*one]) && targets[*one].unit == targets[*other].unit && may_be(&targets[*other])
+    });
+    pairs.next()
+}
+
+/// Tells whether a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.
+fn is_coordinate(name: &str) -> bool {
+    let own = name.rsplit('.').next().unwrap_or(name).to_lowercase();
+    let has_no_header = own
+        .strip_prefix('c')
+        .is_some_and(|number| number.parse::<usize>().is_ok());
+    let last = own
+        .rsplit(|letter: char| !letter.is_alphanumeric())
+        .next()
+        .unwrap_or_default();
+    has_no_header || ["x", "y", "z", "px", "py", "pz"].contains(&last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_needs_two_coordinates_in_one_unit() {
+        let pair = |titles: &str| {
+            let channel = |title: &str| {
+                let (name, unit) = title.split_once('/').unwrap_or((title, ""));
+                Channel {
+                    name: name.to_owned(),
+                    unit: (!unit.is_empty()).then(|| unit.to_owned()),
+                }
+            };
+            position_pair(&Vec::from_iter(titles.split(' ').map(channel)))
+        };
+        for (titles, expected) in [
+            ("x/mm y/mm", Some([0, 1])),
+            ("force/N a/mm b/mm", Some([1, 2])),
+            ("x/mm y/cm", None),
+            ("fx/N fy/N", None),
+            ("states.c2 states.c3", Some([0, 1])),
+            ("probe_x probe.y", Some([0, 1])),
+            ("weight waist", None),
+        ] {
+            assert_eq!(pair(titles), expected, "{titles}");
+        }
+    }
+}

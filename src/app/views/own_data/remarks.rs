@@ -1,0 +1,145 @@
+//! Sentences about errors, splits and imports, in the words of the terminal.
+
+use crate::{
+    app::widgets::fields::capitalised, dataset::SplitBy, evaluation::TargetErrors, export::format_number,
+    import::Channel,
+};
+
+/// R² on the test samples below which readings hardly tell a target.
+const HARDLY: f64 = 0.4;
+
+/// Tells of targets that the readings hardly tell, and of networks that are worse than ridge.
+pub(super) fn judgements(channels: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    for ((channel, network), ridge) in channels.iter().zip(network).zip(ridge) {
+        let name = &channel.name;
+        match network.r2 {
+            None => remarks.push(format!(
+                "the target {name} is constant in the test samples: nothing can be judged"
+            )),
+            Some(r2) if r2 < HARDLY => remarks.push(format!(
+                "the readings hardly tell {name}: R² {r2:.2} on the test samples, where always answering their mean has 0"
+            )),
+            Some(_) => {}
+        }
+        if network.rmse > ridge.rmse {
+            remarks.push(format!(
+                "for {name} the network is worse than ridge regression (RMSE {} against {}): record more samples, or use \
+                 fewer hidden nodes or Bayesian regularisation",
+                format_number(network.rmse),
+                format_number(ridge.rmse)
+            ));
+        }
+    }
+    remarks
+}
+
+/// What a rule of division does to the errors.
+pub(super) fn flattery(by: SplitBy) -> &'static str {
+    match by {
+        SplitBy::Time => "The last part of the recording tests: nothing of its time was trained on.",
+        SplitBy::Group => "Whole groups test: nothing of their press or session was trained on.",
+        SplitBy::Random => {
+            "A random split flatters where neighbouring rows are alike: the test has neighbours of what was trained. \
+             Compare with a split by time."
+        }
+    }
+}
+
+/// An error of the import in words for the window, which has fields where the terminal has arguments.
+pub(super) fn in_window(error: &str) -> String {
+    const WORDS: [(&str, &str); 5] = [
+        (
+            "name the columns of their times with --time and --join-time",
+            "make the columns of their times “time” in both",
+        ),
+        ("name it with --join-time", "make the column of its times “time”"),
+        (
+            "give the limit with --join-limit",
+            "give the limit under “Joined files”",
+        ),
+        (
+            "say that it means missing with --missing",
+            "say under “Rows” that it means missing:",
+        ),
+        (
+            "give one --test-join for each --join",
+            "open the joined files of the test too",
+        ),
+    ];
+    let mut text = error.to_owned();
+    for (argument, field) in WORDS {
+        text = text.replace(argument, field);
+    }
+    text
+}
+
+/// The text with a full stop, and with a capital unless it begins with the name of a column or file.
+pub(super) fn sentence(text: &str) -> String {
+    const WORDS: [&str; 10] = [
+        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too",
+    ];
+    let first = text.split_whitespace().next().unwrap_or_default();
+    let mut sentence = text.to_owned();
+    if WORDS.contains(&first) {
+        sentence = capitalised(&sentence);
+    }
+    if !sentence.ends_with(['.', '!', '?']) {
+        sentence.push('.');
+    }
+    sentence
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::import::{ImportError, Joined, Recipe};
+
+    fn recipe() -> Recipe {
+        Recipe {
+            data: "one.csv".into(),
+            inputs: vec!["a".to_owned()],
+            targets: vec!["b".to_owned()],
+            ..Recipe::default()
+        }
+    }
+
+    fn error(one: &str, other: Option<&str>, recipe: Recipe) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("one.csv"), one).unwrap();
+        std::fs::write(folder.path().join("two.csv"), other.unwrap_or_default()).unwrap();
+        let watch = &mut |_| std::ops::ControlFlow::Continue(());
+        let imported: Result<_, ImportError> = recipe.import(Path::new(folder.path()), watch);
+        in_window(&imported.unwrap_err().to_string())
+    }
+
+    #[test]
+    fn errors_of_the_import_name_no_argument_of_the_terminal() {
+        let joined = |time: Option<&str>| Recipe {
+            join: vec![Joined {
+                file: "two.csv".into(),
+                time: time.map(str::to_owned),
+                ..Joined::default()
+            }],
+            ..recipe()
+        };
+        let timed = |time| Recipe {
+            time: Some("t".to_owned()),
+            ..joined(time)
+        };
+        let cases = [
+            error("a,b\n1,bad\n2,3\n", None, recipe()),
+            error("a,b\n1,2\n2,3\n", Some("c\n1\n"), joined(None)),
+            error("t,a,b\n1,1,2\n2,2,3\n", Some("c\n1\n"), timed(Some("s"))),
+            error("t,a,b\n1,1,2\n2,2,3\n", Some("s,c\n1,1\n1,2\n"), timed(Some("s"))),
+        ];
+        for text in cases {
+            assert!(
+                !text.contains("--") && (text.contains("“") || text.contains("“Rows”")),
+                "{text}"
+            );
+        }
+    }
+}

@@ -1,0 +1,67 @@
+use eframe::egui::{ComboBox, Ui};
+
+use super::{
+    charts::{Chart, ChartTab},
+    state::OwnDataView,
+};
+use crate::app::{
+    plotting::{Pointer, cells_ui, legend_ui, plots_ui},
+    shared::Phase,
+    theme::{Theme, space},
+    widgets::{placeholder_ui, tabs_ui},
+};
+
+/// Charts of the network on show.
+pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
+    let Some(shown) = &view.shown else {
+        placeholder_ui(
+            ui,
+            match view.phase {
+                Phase::Preparing => "The files are being read; the first epochs follow.",
+                _ => "Press Train: the error of each epoch and what the network tells of each target appear here.",
+            },
+        );
+        return;
+    };
+    let before = (view.chart.tab, view.chart.target);
+    ui.horizontal(|ui| {
+        if let Some(tab) = tabs_ui(ui, "Charts", &ChartTab::ALL, view.chart.tab) {
+            view.chart.tab = tab;
+        }
+        let targets = &shown.file.targets;
+        if before.0 == ChartTab::Regression && targets.len() > 1 {
+            ui.add_space(space(2));
+            let label = ui.label("Target");
+            let selected = targets
+                .get(view.chart.target)
+                .map_or(String::new(), |target| target.title());
+            let combo = ComboBox::from_id_salt("target").selected_text(selected);
+            let picked = combo.show_ui(ui, |ui| {
+                for (index, target) in targets.iter().enumerate() {
+                    ui.selectable_value(&mut view.chart.target, index, target.title());
+                }
+            });
+            picked.response.labelled_by(label.id);
+        }
+    });
+    match view.chart.chart(shown) {
+        Chart::Plots(figure) => {
+            legend_ui(ui, &figure.keys);
+            plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
+        }
+        Chart::Map(map) => {
+            if let Some(([row, column], response)) = cells_ui(
+                ui,
+                "Error over the position",
+                &map,
+                (&[], &[], Theme::of(ui).palette.warning),
+            ) {
+                response.on_hover_text_at_pointer(&map.notes[[row, column]]);
+            }
+        }
+        Chart::None(reason) => placeholder_ui(ui, reason),
+    }
+    if (view.chart.tab, view.chart.target) != before {
+        ui.request_repaint();
+    }
+}

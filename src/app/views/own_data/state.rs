@@ -1,0 +1,300 @@
+use std::{
+    path::PathBuf,
+    sync::{
+        Arc,
+        mpsc::{Receiver, Sender, channel},
+    },
+};
+
+use super::{
+    charts::ChartChoice,
+    checking::Checking,
+    draft::{Draft, file_name},
+    keeping::Keeping,
+    model::{Trained, Validated},
+    opening::{Files, Opening, ToOpen},
+    runs::Runs,
+    training::{Command, Task, Trainer, ValidationChoice},
+};
+use crate::{
+    app::{job::Wake, shared::Phase},
+    evaluation::{Measured, RunSettings},
+    import::{Meaning, Progress},
+    scene::RowModel,
+};
+
+/// The Own data view.
+#[derive(Debug)]
+pub struct OwnDataView {
+    /// The import, once files are open.
+    pub(super) draft: Option<Draft>,
+    pub(super) opening: Opening,
+    pub(super) checking: Checking,
+    /// Settings of the next training.
+    pub(super) settings: RunSettings,
+    /// Extent of the next cross-validation.
+    pub(super) validation: ValidationChoice,
+    pub(super) trainer: Trainer,
+    /// State of the trainer.
+    pub(super) phase: Phase,
+    /// True until the first news of a training.
+    pub(super) is_beginning: bool,
+    /// How far a file is read before a training.
+    pub(super) reading: Option<Progress>,
+    /// The network on show: in training, ended, or opened.
+    pub(super) shown: Option<Trained>,
+    /// Settings with which it was begun or last continued; the epochs are those asked for from where it stood.
+    pub(super) asked: Option<RunSettings>,
+    /// The last cross-validation.
+    pub(super) validated: Option<Validated>,
+    /// True while a cross-validation is under way.
+    pub(super) is_validating: bool,
+    /// Networks trained and opened.
+    pub(super) runs: Runs,
+    pub(super) keeping: Keeping,
+    /// Card in the middle.
+    pub(super) tab: Tab,
+    pub(super) chart: ChartChoice,
+    /// Paths that the user chooses, in dialogs or by typing.
+    pub(super) choices: Sender<PathBuf>,
+    pub(super) chosen: Receiver<PathBuf>,
+    /// As [`Self::choices`], for files of test samples.
+    pub(super) test_choices: Sender<PathBuf>,
+    pub(super) chosen_for_test: Receiver<PathBuf>,
+}
+
+/// Cards in the middle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Tab {
+    /// The columns of the files, and what they mean.
+    #[default]
+    Columns,
+    /// Charts of the network on show.
+    Results,
+    /// The networks of this session.
+    Runs,
+}
+
+impl OwnDataView {
+    /// Nothing open yet. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        let (choices, chosen) = channel();
+        let (test_choices, chosen_for_test) = channel();
+        Self {
+            draft: None,
+            opening: Opening::new(Arc::clone(&wake)),
+            checking: Checking::new(Arc::clone(&wake)),
+            settings: RunSettings::from(Measured { rows: RowModel::Shared }),
+            validation: ValidationChoice {
+                folds: 5,
+                compares_random: false,
+            },
+            trainer: Trainer::new(Arc::clone(&wake)),
+            phase: Phase::Idle,
+            is_beginning: false,
+            reading: None,
+            shown: None,
+            asked: None,
+            validated: None,
+            is_validating: false,
+            runs: Runs::default(),
+            keeping: Keeping::new(wake),
+            tab: Tab::default(),
+            chart: ChartChoice::default(),
+            choices,
+            chosen,
+            test_choices,
+            chosen_for_test,
+        }
+    }
+
+    /// Opens files: recordings are added to those that are open already.
+    pub(super) fn open(&mut self, paths: Vec<PathBuf>) {
+        if !self.phase.is_busy() {
+            let open = self.draft.as_ref().map(Draft::paths).unwrap_or_default();
+            self.open_with(paths, open);
+        }
+    }
+
+    /// Closes a file; without the last one there is no import.
+    pub(super) fn close(&mut self, file: usize) {
+        let Some(draft) = &mut self.draft else { return };
+        let mut paths = draft.paths();
+        if file >= paths.len() {
+            draft.plan.test = None;
+            return;
+        }
+        paths.remove(file);
+        if paths.is_empty() {
+            self.draft = None;
+            self.opening.cancel();
+        } else {
+            self.open_with(Vec::new(), paths);
+        }
+    }
+
+    /// Looks at the files anew, with the layout and the missing cells of the draft.
+    pub(super) fn look_again(&mut self) {
+        if let Some(draft) = &self.draft {
+            self.open_with(Vec::new(), draft.paths());
+        }
+    }
+
+    fn open_with(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
+        let import = self.draft.as_ref().map(|draft| &draft.plan.import);
+        self.opening.start(ToOpen::Files(Files {
+            new,
+            open,
+            dialect: import.map(|import| import.dialect).unwrap_or_default(),
+            missing: import.map(|import| import.missing.clone()).unwrap_or_default(),
+        }));
+    }
+
+    /// Reason for which no training can begin, with what to do.
+    pub(super) fn obstacle(&self) -> Option<String> {
+        match &self.draft {
+            None => Some("Open a recording first: drop files on the window.".to_owned()),
+            Some(_) if self.opening.under_way.is_some() => Some("Files are being opened.".to_owned()),
+            Some(draft) => draft.obstacle(),
+        }
+    }
+
+    /// Begins a training.
+    pub(super) fn train(&mut self) {
+        if self.phase.is_busy() || self.obstacle().is_some() {
+            return;
+        }
+        let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) else {
+            return;
+        };
+        self.asked = Some(self.settings);
+        self.begin(Task::Train(Box::new(plan), self.settings));
+    }
+
+    /// Begins a cross-validation.
+    pub(super) fn validate(&mut self) {
+        if self.phase.is_busy() || self.obstacle().is_some() {
+            return;
+        }
+        if let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) {
+            self.is_validating = true;
+            // The thread that could go on is gone.
+            self.asked = None;
+            self.begin(Task::Validate(Box::new(plan), self.settings, self.validation));
+        }
+    }
+
+    pub(super) fn begin(&mut self, task: Task) {
+        self.reading = None;
+        self.is_beginning = true;
+        self.phase = Phase::Preparing;
+        self.trainer.start(task);
+    }
+
+    /// Holds the training, or goes on with it.
+    pub(super) fn toggle_pause(&mut self) {
+        if self.phase == Phase::Paused {
+            self.trainer.command(Command::Resume);
+        } else {
+            self.trainer.command(Command::Pause);
+        }
+    }
+
+    /// Ends the training; what is still being prepared does not begin.
+    pub(super) fn stop(&mut self) {
+        if self.phase == Phase::Preparing {
+            self.trainer.cancel();
+            self.is_validating = false;
+            self.phase = self.phase_at_rest();
+        } else {
+            self.trainer.command(Command::Stop);
+        }
+    }
+
+    /// Tells whether the training on show can go on with the settings as they are now.
+    pub(super) fn can_continue(&self) -> bool {
+        let (Some(shown), Some(asked)) = (&self.shown, self.asked) else {
+            return false;
+        };
+        let is_there = match self.phase {
+            Phase::Paused => self.settings.training != asked.training,
+            Phase::Ended(reason) => reason != crate::training::StopReason::Diverged,
+            _ => false,
+        };
+        let is_same_plan = || {
+            self.draft
+                .as_ref()
+                .and_then(|draft| draft.plan().ok())
+                .map(|plan| plan.absolute())
+        };
+        let fixed = RunSettings {
+            training: asked.training,
+            ..self.settings
+        };
+        is_there && fixed == asked && shown.checkpoint.is_some() && is_same_plan().as_ref() == Some(&shown.file.plan)
+    }
+
+    /// Goes on from the present weights.
+    pub(super) fn go_on(&mut self) {
+        if self.can_continue() {
+            self.asked = Some(self.settings);
+            self.trainer.command(Command::Continue(self.settings.training));
+        }
+    }
+
+    pub(super) fn phase_at_rest(&self) -> Phase {
+        self.shown.as_ref().map_or(Phase::Idle, |shown| match shown.phase {
+            ended @ Phase::Ended(_) => ended,
+            _ => Phase::Idle,
+        })
+    }
+
+    /// Shows a network of the list; its settings and plan become those of the form.
+    pub(super) fn show_run(&mut self, place: usize) {
+        let Some((trained, path)) = self.runs.get(place).filter(|_| !self.phase.is_busy()) else {
+            return;
+        };
+        match (&trained.tested, path) {
+            // Its test samples are read again.
+            (None, Some(path)) => {
+                let new = vec![path.clone()];
+                self.opening.start(ToOpen::Files(Files {
+                    new,
+                    ..Files::default()
+                }));
+            }
+            _ => {
+                let trained = trained.clone();
+                self.settings = trained.file.settings.into();
+                self.opening.start(ToOpen::Plan(Box::new(trained.file.plan.clone())));
+                self.show(trained, None);
+                self.tab = Tab::Results;
+            }
+        }
+    }
+
+    pub(super) fn show(&mut self, trained: Trained, asked: Option<RunSettings>) {
+        self.trainer.cancel();
+        self.phase = trained.phase;
+        self.asked = asked;
+        self.chart.fit(&trained.file.targets);
+        self.shown = Some(trained);
+    }
+
+    /// Name of the recording, for names of files.
+    pub(super) fn stem(&self) -> String {
+        let draft = self.draft.as_ref();
+        let name = draft
+            .map(|draft| file_name(&draft.plan.import.data))
+            .unwrap_or_default();
+        match name.rsplit_once('.') {
+            Some((stem, _)) => stem.to_owned(),
+            None => name,
+        }
+    }
+
+    /// Tells whether there is a column of row-wires.
+    pub(super) fn has_row_wires(&self) -> bool {
+        self.draft.as_ref().is_some_and(|draft| draft.has(Meaning::RowWire))
+    }
+}

@@ -1,0 +1,53 @@
+use std::path::PathBuf;
+
+use eframe::egui::{Align2, Context, FontId, Id, LayerId, Order, Stroke, StrokeKind, Ui};
+
+use super::DecouplerWindow;
+use crate::app::{
+    shared::Effect,
+    theme::{Theme, radius, space, type_size},
+};
+
+impl DecouplerWindow {
+    /// Gives files dropped on the window to the view that takes them, and shows it.
+    pub(super) fn take_dropped(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
+        let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
+        let paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
+        // A question is to be answered first.
+        if paths.is_empty() || self.is_asked() {
+            return;
+        }
+        let place = self
+            .views
+            .all()
+            .into_iter()
+            .position(|view| view.take_files(&paths, effects));
+        if let Some(place) = place {
+            self.show(place);
+            ctx.request_repaint();
+        }
+    }
+
+    /// Says over the window what dropping the files under the pointer does.
+    pub(super) fn dropping_ui(&self, ui: &Ui) {
+        let is_hovered = ui.input(|input| !input.raw.hovered_files.is_empty());
+        if !is_hovered || self.is_asked() {
+            return;
+        }
+        let palette = Theme::of(ui).palette;
+        let painter = ui
+            .ctx()
+            .layer_painter(LayerId::new(Order::Foreground, Id::unique("dropping")));
+        let whole = ui.ctx().content_rect().shrink(space(2));
+        painter.rect_filled(whole, f32::from(radius()), palette.background.gamma_multiply(0.85));
+        painter.rect_stroke(
+            whole,
+            f32::from(radius()),
+            Stroke::new(2.0, palette.accent),
+            StrokeKind::Inside,
+        );
+        let font = FontId::proportional(type_size().title);
+        let text = "Drop to open in the Own data view";
+        painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
+    }
+}

@@ -1,0 +1,503 @@
+//! Recordings out of files, in the window: dropped, looked at, trained on, saved and opened again.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use decoupler::{
+    app::Notice,
+    dataset::{Division, Folds, Seed, SplitBy, Stream},
+    evaluation::{CrossValidated, Measured, Run, RunSettings},
+    export::{MeasuredNetworkFile, RecipeFile, format_number},
+    import::{Plan, Recipe},
+    scene::RowModel,
+};
+use eframe::egui::{self, accesskit::Role, vec2};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+use tempfile::TempDir;
+
+use crate::{closing::close, driver::Driver};
+
+/// A file dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+impl Driver {
+    /// Drops files on the window and waits until their columns are shown.
+    #[track_caller]
+    fn drop_files(&mut self, paths: &[&Path]) {
+        for path in paths {
+            let file = std::sync::Arc::new(Dropped((*path).to_owned()));
+            self.harness().input_mut().dropped_files.push(file);
+        }
+        self.harness().step();
+    }
+
+    /// As [`Self::drop_files`]; waits until the window has tried the import out.
+    #[track_caller]
+    fn open_recordings(&mut self, paths: &[&Path]) {
+        self.drop_files(paths);
+        self.wait("the samples", |driver| driver.says("Test: "));
+    }
+
+    /// Gives a column another meaning by its list.
+    #[track_caller]
+    fn mean(&mut self, column: &str, meaning: &str) {
+        self.click(&format!("Meaning of {column}"));
+        self.click_button(meaning);
+        self.settle();
+    }
+
+    /// Limits the training to so many epochs.
+    #[track_caller]
+    fn limit_epochs(&mut self, epochs: &str) {
+        // What is unfolded in one view is in the others too.
+        if !self.has("Epochs") {
+            self.click("When to stop");
+        }
+        self.enter("Epochs", epochs);
+    }
+
+    /// Presses Train and waits for the end.
+    #[track_caller]
+    fn train_own_data(&mut self) {
+        self.click("▶ Train");
+        self.wait("the end of the training", |driver| driver.says("Finished: "));
+        self.settle();
+    }
+}
+
+/// Readings of two channels and a target that is nearly linear in them, in the order of time.
+fn recording(rows: usize) -> String {
+    let mut text = "time (s),u1 (V),u2 (V),x (mm),y (mm)\n".to_owned();
+    for row in 0..rows {
+        let t = row as f64;
+        let (x, y) = (10.0 + 5.0 * (0.37 * t).sin(), 4.0 * (0.23 * t).cos());
+        let (u1, u2) = (0.2 * x + 0.05 * y + 0.01 * x * y / 40.0, 0.3 * y - 0.02 * x);
+        writeln!(text, "{},{u1:.6},{u2:.6},{x:.6},{y:.6}", 0.1 * t).unwrap();
+    }
+    text
+}
+
+fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// The plan that the window makes of [`recording`].
+fn plan(path: &Path) -> Plan {
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    Plan {
+        import: Recipe {
+            data: path.to_owned(),
+            inputs: names(&["u1", "u2"]),
+            targets: names(&["x", "y"]),
+            time: Some("time".to_owned()),
+            ..Recipe::default()
+        },
+        division: Division::default(),
+        ..Plan::default()
+    }
+}
+
+/// The library's settings for measured samples, with five epochs.
+fn settings() -> RunSettings {
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    settings.training.stopping.epochs = 5;
+    settings
+}
+
+/// What the library makes of the plan with these settings.
+fn trained(plan: &Plan) -> Run {
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
+    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
+    while run.step().is_none() {}
+    run
+}
+
+/// Cells of the error tables on show: `x (mm), network, RMSE: 0.1`.
+fn cells(driver: &Driver) -> Vec<String> {
+    let is_cell = |text: &String| text.contains(", RMSE: ") || text.contains(", MAE: ") || text.contains(", worst: ");
+    driver.texts().into_iter().filter(is_cell).collect()
+}
+
+#[test]
+fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(120));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    assert_eq!(driver.shown(), "Own data");
+    for (column, meaning) in [
+        ("time", "time"),
+        ("u1", "input"),
+        ("u2", "input"),
+        ("x", "target"),
+        ("y", "target"),
+    ] {
+        let value = driver.get(&format!("Meaning of {column}")).accesskit_node().value();
+        assert_eq!(value.as_deref(), Some(meaning), "{column}");
+    }
+    assert!(driver.has("Training: 96") && driver.has("Test: 24"));
+    driver.limit_epochs("5");
+    // From here on one click is enough.
+    driver.train_own_data();
+    let run = trained(&plan(&path));
+    let mut expected = Vec::new();
+    for (index, target) in ["x (mm)", "y (mm)"].into_iter().enumerate() {
+        for (name, row) in ["training mean", "ridge", "network"]
+            .into_iter()
+            .zip(run.target_table())
+        {
+            let errors = &row.targets[index];
+            for (figure, value) in [("RMSE", errors.rmse), ("MAE", errors.mae), ("worst", errors.worst)] {
+                expected.push(format!("{target}, {name}, {figure}: {}", format_number(value)));
+            }
+        }
+    }
+    assert_eq!(cells(&driver), expected);
+    // Both targets are positions in millimetres.
+    assert!(driver.has("Error over the position"));
+    driver.click("Regression");
+    driver.settle();
+    assert!(driver.says("decoupled x (mm) against actual x (mm)"));
+}
+
+#[test]
+fn a_network_is_saved_and_opened_again_with_its_charts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    let shown = cells(&driver);
+    let saved = folder.path().join("network.json");
+    driver.save("Network, JSON", &saved);
+    assert!(
+        matches!(driver.notice(), Some(Notice::Done(_))),
+        "{:?}",
+        driver.notice()
+    );
+    let file = MeasuredNetworkFile::load(&saved).unwrap();
+    assert_eq!(
+        (file.inputs.len(), file.targets.len(), file.settings.hidden),
+        (2, 2, 12)
+    );
+
+    let mut other = Driver::open();
+    other.drop_files(&[&saved]);
+    other.wait("the network", |driver| !cells(driver).is_empty());
+    other.settle();
+    assert_eq!(cells(&other), shown);
+    assert!(other.has("Error over the position"), "its recording is still there");
+
+    // Without the recording the errors stay, and the reason for which there are no charts is told.
+    fs::remove_file(&path).unwrap();
+    let mut without = Driver::open();
+    without.drop_files(&[&saved]);
+    without.wait("the network", |driver| !cells(driver).is_empty());
+    without.settle();
+    assert_eq!(cells(&without), shown);
+    assert!(without.says("press.csv") && without.says("There are no test samples at hand"));
+}
+
+#[test]
+fn two_files_are_joined_by_time_and_filtered() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut sensor, mut states) = (String::new(), String::new());
+    for row in 0..80 {
+        let t = 1000.0 + 0.05 * f64::from(row);
+        let (x, z) = (f64::from(row % 20), f64::from(row % 4));
+        writeln!(
+            sensor,
+            "{t:.3},{:.3},{:.3},{:.3}",
+            0.5 * x,
+            x * x / 20.0,
+            f64::from(row % 7)
+        )
+        .unwrap();
+        // The last rows have no partner.
+        if row < 70 {
+            writeln!(states, "{:.3},{x},{z}", t + 0.004).unwrap();
+        }
+    }
+    let sensor = written(&folder, "sensor.csv", &sensor);
+    let states = written(&folder, "states.csv", &states);
+    let mut driver = Driver::open();
+    // In any order: the readings are found by the name of their file.
+    driver.open_recordings(&[&states, &sensor]);
+    for (column, meaning) in [
+        ("c1", "time"),
+        ("c2", "input"),
+        ("states.c1", "time"),
+        ("states.c2", "target"),
+        ("states.c3", "target"),
+    ] {
+        let value = driver.get(&format!("Meaning of {column}")).accesskit_node().value();
+        assert_eq!(value.as_deref(), Some(meaning), "{column}");
+    }
+    assert!(
+        driver.says("10 rows without partner, 0 of its rows unused"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.mean("states.c3", "unused");
+    driver.click("Rows");
+    // The field is not left when what is typed so far cannot be understood.
+    driver.type_into("Only rows with", "s");
+    driver.settle();
+    driver.harness().event(egui::Event::Text("tates.c3 < 3".to_owned()));
+    driver.settle();
+    driver.press(egui::Key::Enter);
+    driver.wait("the filtered samples", |driver| driver.says("states.c3<3 is not met"));
+    driver.wait("the samples", |driver| driver.has("Test: 11"));
+    assert!(driver.has("Training: 42"), "53 of 70 rows are left");
+
+    // The import is saved as a recipe, which the terminal reads too, and opened again.
+    let recipe = folder.path().join("recipe.json");
+    driver.save("Recipe of the import, JSON", &recipe);
+    let plan = RecipeFile::load(&recipe).unwrap();
+    assert_eq!(plan.import.targets, ["states.c2"]);
+    assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
+    let mut other = Driver::open();
+    other.open_recordings(&[&recipe]);
+    assert!(other.has("Training: 42") && other.has("Test: 11"));
+    let value = other.get("Meaning of states.c3").accesskit_node().value();
+    assert_eq!(value.as_deref(), Some("unused"));
+}
+
+#[test]
+fn bad_cells_are_told_by_line_and_column_and_can_be_called_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(
+        &folder,
+        "bad.csv",
+        "u,v,force (N)\n1,5,2\n2,n.d.,3\n3,7,5\n4,8,6\n5,9,9\n",
+    );
+    let mut driver = Driver::open();
+    driver.drop_files(&[&path]);
+    driver.wait("the columns", |driver| driver.has("Meaning of v"));
+    driver.settle();
+    assert!(
+        driver.says("line 3, column 2: 'n.d.' is no number"),
+        "{:#?}",
+        driver.texts()
+    );
+    // A column of which a cell cannot be read is not used unasked.
+    driver.wait("the samples", |driver| driver.has("Training: 4"));
+    driver.mean("v", "input");
+    driver.wait("the reason", |driver| driver.says("is not a finite number"));
+    assert!(
+        !driver.says("--missing"),
+        "the window names no argument of the terminal"
+    );
+    driver.click("Rows");
+    driver.enter("Missing cells", "n.d.");
+    driver.wait("the rest", |driver| driver.has("Training: 3"));
+    assert!(driver.says("v is missing") && driver.has("Missing in v: 1"));
+}
+
+#[test]
+fn a_random_split_is_said_to_flatter() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(40));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    assert!(!driver.says("flatters"));
+    driver.click("Split");
+    driver.click_button("random");
+    driver.settle();
+    assert!(driver.says("A random split flatters"));
+    assert!(!driver.has("group"), "without groups there is no such split");
+}
+
+#[test]
+fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    let saved = folder.path().join("half.checkpoint");
+    driver.save("Checkpoint, resumable", &saved);
+    let mut other = Driver::open();
+    other.drop_files(&[&saved]);
+    other.wait("the training", |driver| driver.says("Epoch 3 of 3"));
+    other.settle();
+    other.limit_epochs("2");
+    other.click_button("Continue");
+    other.wait("the end", |driver| driver.says("Epoch 5 of 5"));
+    other.settle();
+    let run = trained(&plan(&path));
+    let rmse = run.target_table()[2].targets[0].rmse;
+    assert!(
+        other.has(&format!("x (mm), network, RMSE: {}", format_number(rmse))),
+        "{:#?}",
+        cells(&other)
+    );
+}
+
+#[test]
+fn everything_lies_within_narrow_windows_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(40));
+    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {
+        let mut driver = Driver::open_sized(size);
+        driver.open_recordings(&[&path]);
+        driver.settle();
+        for (text, place) in driver.places() {
+            let is_beside = place.left() < -0.5 || place.right() > size.x + 0.5;
+            assert!(!is_beside, "at {size}, {text} is at {place:?}");
+        }
+        let tools = ["Own data", "Export", "▶ Train", "■ Stop"].map(|label| {
+            let nodes: Vec<_> = driver.places().into_iter().filter(|(text, _)| text == label).collect();
+            nodes[0].1
+        });
+        for (one, other) in tools.iter().zip(&tools[1..]) {
+            assert!(!one.intersects(*other), "at {size}: {one:?} and {other:?}");
+        }
+    }
+}
+
+/// Clicks the row of this name in the list of networks.
+#[track_caller]
+fn click_row(driver: &mut Driver, name: &str) {
+    let row = By::new().role(Role::Row).label(name);
+    driver.harness().get(row).click();
+    driver.settle();
+}
+
+#[test]
+fn networks_are_listed_compared_and_kept_from_session_to_session() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let runs = folder.path().join("runs");
+    let mut driver = Driver::open_keeping(&runs);
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("2");
+    driver.train_own_data();
+    let first = cells(&driver);
+    driver.enter("Hidden nodes", "3");
+    driver.train_own_data();
+    driver.click("Runs");
+    driver.settle();
+    click_row(&mut driver, "press h12 br");
+    let of_first = |name: &str| {
+        let all = first
+            .iter()
+            .find(|cell| cell.starts_with("x (mm), network, RMSE"))
+            .unwrap();
+        all.replace("network", name)
+    };
+    assert!(driver.has(&of_first("A")), "{:#?}", cells(&driver));
+    assert!(driver.says("x (mm), B, RMSE") && !driver.says("do not compare directly"));
+    driver.wait("both files", |_| {
+        fs::read_dir(folder.path().join("own-data")).is_ok_and(|files| files.count() == 2)
+    });
+    drop(driver);
+
+    let mut other = Driver::open_keeping(&runs);
+    other.click_button("Own data");
+    other.click("Runs");
+    let row = || By::new().role(Role::Row).label("press h12 br");
+    let latest = std::time::Instant::now() + crate::driver::PATIENCE;
+    while other.harness().query(row()).is_none() {
+        other.wait_for_frame("the list", latest);
+    }
+    click_row(&mut other, "press h12 br");
+    other.click_button("Show");
+    other.wait("the network", |driver| !cells(driver).is_empty());
+    other.settle();
+    assert_eq!(cells(&other), first);
+    assert!(other.has("Error over the position"), "its recording is read again");
+}
+
+#[test]
+fn a_cross_validation_has_the_errors_of_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("5");
+    driver.click("Cross-validation");
+    driver.enter("Folds", "3");
+    driver.click_button("Cross-validate");
+    driver.wait("the folds", |driver| driver.says("3 folds by time"));
+    driver.settle();
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let recording = plan(&path).recording(Path::new(""), watch).unwrap();
+    let mut rng = Seed::default().rng(Stream::Split);
+    let folds = Folds::by(&recording.set, 3, SplitBy::Time, &mut rng).unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &recording.set, folds, || false)
+        .unwrap()
+        .unwrap();
+    let errors = validated.target_table(&recording.set)[2].targets[1];
+    let cell = format!("y (mm), network, RMSE: {}", format_number(errors.rmse));
+    assert!(driver.has(&cell), "{cell} is not among {:#?}", cells(&driver));
+    assert!(
+        driver.says("the readings") || driver.says("The readings"),
+        "what they tell is said"
+    );
+}
+
+#[test]
+fn a_column_of_groups_divides_the_samples_by_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "session,u,v,force (N)\n".to_owned();
+    for row in 0..50 {
+        let (u, v) = (f64::from(row % 7), f64::from(row % 5));
+        writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
+    }
+    let path = written(&folder, "sessions.csv", &text);
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
+    // Another group takes its place, and without one the samples are divided in time.
+    driver.mean("u", "group");
+    assert_eq!(
+        driver.get("Meaning of session").accesskit_node().value().as_deref(),
+        Some("unused")
+    );
+    driver.mean("u", "input");
+    assert!(driver.says("time, 20 % test"));
+}
+
+#[test]
+fn closing_asks_about_a_training_on_own_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("100000");
+    driver.click("▶ Train");
+    driver.wait("an epoch", |driver| !cells(driver).is_empty());
+    driver.click("⏸ Pause");
+    driver.wait("the hold", |driver| driver.has("Paused"));
+    assert!(!close(&mut driver), "the training is not lost unasked");
+    driver.harness().run_steps(2);
+    assert!(
+        driver.says("The training of the Own data view has not ended"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button("Stay");
+    driver.click("■ Stop");
+    driver.wait("the end", |driver| driver.says("Ended: "));
+}
