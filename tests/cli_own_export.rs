@@ -32,12 +32,7 @@ fn trained(rows: &str) -> TempDir {
         );
     }
     fs::write(folder.path().join("own.csv"), text).unwrap();
-    let columns = format!(
-        "train --data own.csv --inputs c1..c3 --targets force,torque --row-wire row {rows} --hidden 4 --epochs 20 --out n.json"
-    );
-    // Ranges go over all columns; the first two have names that the shell of a test cannot pass.
-    let output = decoupler(&columns.replace("c1..c3", "NAMES"), folder.path());
-    assert!(!output.status.success());
+    // A recipe, because the terminal of a test splits arguments at spaces.
     let recipe = r#"{"format": "decoupler import", "version": 1, "program": "a test", "plan": {"import": {"data": "own.csv",
         "inputs": ["hall, a", "b */ x", "c"], "targets": ["force", "torque"], "row_wire": "row"}}}"#;
     fs::write(folder.path().join("recipe.json"), recipe).unwrap();

@@ -47,8 +47,10 @@ fn each_target_and_channel_is_judged_with_an_interval() {
     // Of x, the readings miss 0.05²/3 of (1 + 0.3² + 0.05²)/3.
     let r2 = &target(0)["r2"];
     let expected = 1.0 - 0.0025 / 1.0925;
+    let value = r2["value"].as_f64().unwrap();
+    assert!((value - expected).abs() < 1e-3, "{r2}");
     assert!(
-        r2["low"].as_f64().unwrap() < expected && expected < r2["high"].as_f64().unwrap(),
+        r2["low"].as_f64().unwrap() < value && value < r2["high"].as_f64().unwrap(),
         "{r2}"
     );
     assert_eq!(target(1)["standing"], "not told");
@@ -61,7 +63,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
     let channel = |index: usize| &report["channels"][index];
     // Without b the error of x is √(0.3² + 0.05²)/0.05 times as large; without a nothing is lost, because d repeats it.
     let growth = channel(1)["growth"][0]["value"].as_f64().unwrap();
-    assert!((growth / 6.08 - 1.0).abs() < 0.1, "{growth}");
+    assert!((growth / 6.08 - 1.0).abs() < 0.15, "{growth}");
     assert_eq!(
         (&channel(0)["is_dispensable"], &channel(1)["is_dispensable"]),
         (&true.into(), &false.into())
@@ -104,12 +106,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
             .contains("do not support more than a linear map")
     );
     assert_eq!(target["splits"]["by"], "time");
-    assert!(
-        target["splits"]["sentence"]
-            .as_str()
-            .unwrap()
-            .contains("does not flatter here")
-    );
+    assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));
 }
 
 #[test]
