@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn strokes_near_rounding_have_no_limit() {
         let model = SensorModel::new("4x3_2x9".parse().unwrap());
-        let mut flat = model.clone();
+        let mut flat = model;
         flat.geometry.height_mm = 3e-6;
         for (model, largest_compression) in [(&model, 1e-12), (&model, 1e-11), (&flat, 0.2)] {
             let scene = Scene {

@@ -82,7 +82,7 @@ fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<
     let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
     card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
-        readings_ui(ui, view, shared.look.colours)
+        readings_ui(ui, view, shared.look.colours);
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, shared, effects));
