@@ -161,6 +161,32 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     }
 }
 
+/// The spline rises above the axis around a node; a plateau there would be no height of it.
+#[test]
+fn between_nodes_too_the_surface_ends_at_the_axis_but_a_map_has_no_holes() {
+    let peak = |mode| Surface {
+        mode,
+        ..surface(
+            "",
+            Quantity::Height,
+            |x, y| {
+                if (x, y) == (1.0, 2.0) { 5.4 } else { 4.4 }
+            },
+        )
+    };
+    let too_high = |mode| {
+        let surface = peak(mode);
+        let drawing = lay_out(&surface, OrbitCamera::default());
+        let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
+        let corners = cells.flat_map(|cell| drawing.mesh.corners(*cell));
+        // Corners beyond the grid are those of cut cells.
+        let heights = corners.filter_map(|corner| surface.values.get(corner));
+        heights.filter(|height| **height > 5.08 + 1e-12).count()
+    };
+    assert_eq!(too_high(ViewMode::ThreeD), 0);
+    assert!(too_high(ViewMode::Top) > 20);
+}
+
 #[test]
 fn from_above_x_runs_to_the_right_and_y_upwards_at_one_scale() {
     let drawing = lay_out(&from_above(dent("")), OrbitCamera::default());

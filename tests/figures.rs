@@ -244,7 +244,23 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         microseconds: 0.0,
     };
     let level = TradeOffLevel { noise: 0.0, points };
-    let picture = Figure::from(trade_off_figure(&level, &limits)).draw();
+    let figure = trade_off_figure(&level, &limits);
+    for plot in &figure.plots {
+        let marked = plot.series.iter().filter(|series| series.look.marker.is_some());
+        let points: Vec<_> = marked.flat_map(|series| &series.points).collect();
+        for point in &points {
+            let is_beaten = points.iter().any(|other| {
+                let is_as_good = other.x <= point.x && other.y <= point.y;
+                is_as_good && (other.x < point.x || other.y < point.y)
+            });
+            assert_eq!(
+                point.label.is_some(),
+                !is_beaten,
+                "points of the front are named: {point:?}"
+            );
+        }
+    }
+    let picture = Figure::from(figure).draw();
     let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
     let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();
     let is_closed = |line: Node<'_, '_>| {
@@ -256,12 +272,12 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         .filter(|is_closed| *is_closed);
     let frames = 2;
     let hollow_diamonds = closed.count() - frames;
-    // Each in both plots and once in the legend.
-    assert_eq!((hollow_discs, hollow_diamonds), (2 + 1, 2 + 1));
+    // Each in both plots, and one in the legend for both.
+    assert_eq!((hollow_discs, hollow_diamonds), (2 + 1, 2));
     let filled_marks = (rings.len() - hollow_discs) + elements(&picture, "polygon", |_| ()).len();
     // In the legend each decoder and each preset has one.
     assert_eq!(filled_marks, 2 * filled + 2 + 2);
-    for name in ["Ridge", "Network", "paper preset, 32 bits", "best preset, 32 bits"] {
+    for name in ["Ridge", "Network", "paper preset", "best preset", "hollow: 32 bits"] {
         assert!(
             texts(&picture).iter().any(|text| text == name),
             "{name}: {:?}",

@@ -8,8 +8,9 @@ use std::{
 };
 
 /// The rooms of `src/app`, each of which uses only those before it.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 12] = [
     "theme",
+    "glossary",
     "widgets",
     "plotting",
     "surface_view",

@@ -3,6 +3,7 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`theme`] | colours, sizes, fonts |
+//! | `glossary` | every term of the field with its definition and equation |
 //! | `widgets` | the few components that egui lacks |
 //! | `plotting` | what all charts have in common |
 //! | [`surface_view`] | the surface plot |
@@ -13,6 +14,7 @@
 //! | `views` | one room each, none knows another |
 //! | `window` | lays the views out and applies what they ask for |
 
+mod glossary;
 mod job;
 mod plotting;
 mod preview;

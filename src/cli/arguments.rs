@@ -8,8 +8,9 @@ use std::{
 use clap::{Parser, Subcommand, error::ErrorKind};
 
 use super::{
-    decode::Decode, export::Export, failure::Failure, inspect::Inspect, interruption, parse_error::one_line,
-    reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade, train::Train,
+    calibrate::Calibrate, decode::Decode, export::Export, failure::Failure, fine_tune::FineTune, inspect::Inspect,
+    interruption, parse_error::one_line, reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade,
+    train::Train,
 };
 use crate::export::exit_leaving_nothing;
 
@@ -29,9 +30,11 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Train(Box<Train>),
-    Inspect(Inspect),
+    Inspect(Box<Inspect>),
     Decode(Decode),
     Export(Export),
+    Calibrate(Box<Calibrate>),
+    FineTune(Box<FineTune>),
     Simulate(Box<Simulate>),
     Reproduce(Reproduce),
     Trade(Box<Trade>),
@@ -78,6 +81,8 @@ impl Arguments {
             Some(Command::Inspect(inspect)) => inspect.run(),
             Some(Command::Decode(decode)) => decode.run(),
             Some(Command::Export(export)) => export.run(),
+            Some(Command::Calibrate(calibrate)) => calibrate.run(),
+            Some(Command::FineTune(fine_tune)) => fine_tune.run(),
             Some(Command::Simulate(simulate)) => simulate.run(),
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),

@@ -11,15 +11,16 @@ use super::{
     same_file::is_same,
 };
 use crate::export::{
-    NetworkFile,
-    bundle::{BundleFormat, BundlePrecision, export_bundle},
+    DocumentError, MeasuredNetworkFile, NetworkFile,
+    bundle::{BundleFormat, BundlePrecision, ExportedNetwork, export_bundle},
 };
 
 /// Write a network for other programs, and verify what was written
 ///
-/// The exported network takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
+/// The exported network of a simulated sensor takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
 /// the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; scaling, conductances or logarithms, and
-/// constant coordinates are part of it. Networks of known rows leave as one, which also takes the number of the row-wire,
+/// constant coordinates are part of it. A network of own data (train --data) takes its inputs and gives its targets, in their
+/// units. Networks of known rows leave as one, which also takes the number of the row-wire,
 /// from 1.
 ///
 /// What was written is read back, evaluated, and compared with the network on readings of its scene and on the extremes of
@@ -54,12 +55,21 @@ impl Export {
             let message = "--network and --out name the same file: give --out another name";
             return Err(Failure::Arguments(message.to_owned()));
         }
+        match MeasuredNetworkFile::load(&self.network) {
+            // It is of another kind.
+            Err(DocumentError::Other { .. }) => {}
+            file => return self.export(&file?),
+        }
         let file = NetworkFile::load(&self.network)?;
         if let Some(warning) = file.old_version_warning() {
             // Nobody is left to tell if this fails.
             let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
         }
-        let report = export_bundle(&file, self.format, self.precision, &self.out)?;
+        self.export(&file)
+    }
+
+    fn export<'a>(&self, network: impl Into<ExportedNetwork<'a>>) -> Result<(), Failure> {
+        let report = export_bundle(network, self.format, self.precision, &self.out)?;
         if self.json {
             print_json(&report)
         } else {

@@ -18,10 +18,11 @@ struct Report<'a> {
     verified_vectors: usize,
     golden_vectors: usize,
     checks: Vec<Check>,
-    /// Largest of all checks; like these relative to `output_range_mm`.
+    /// Largest of all checks; like these relative to `output_range_mm`, or for own data to the range of each target.
     deviation: f64,
     limit: f64,
-    output_range_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    output_range_mm: Option<f64>,
     deviation_of_decode: f64,
     error_bound_mm: Option<f64>,
     remarks: &'a [String],
@@ -68,15 +69,23 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
 
 /// Prints what was written, and how far it is from the network.
 pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
-    let range = format_number(report.output_range_mm);
+    let (inputs, relative) = match report.output_range_mm {
+        Some(range) => (
+            "readings of a row-wire",
+            format!(
+                "coordinate, relative to the widest range of one in training ({} mm)",
+                format_number(range)
+            ),
+        ),
+        None => ("readings", "target, relative to its range in training".to_owned()),
+    };
     let mut text = format!("{} ({}, {})\n", report.path.display(), report.format, report.precision);
     for (name, bytes) in &report.files {
         text += &format!("  {name:<30} {bytes:>9} bytes\n");
     }
     if report.vectors.verified > 0 {
         text += &format!(
-            "Verified on {} readings of a row-wire, {} of them in the bundle as golden vectors. Largest deviation of a \
-             coordinate, relative to the widest range of one in training ({range} mm):\n",
+            "Verified on {} {inputs}, {} of them in the bundle as golden vectors. Largest deviation of a {relative}:\n",
             report.vectors.verified, report.vectors.golden
         );
     }

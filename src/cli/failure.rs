@@ -15,7 +15,7 @@ use crate::{
     import::ImportError,
     live::{LineError, Source, SourceError},
     scene::Rows,
-    sensor::SensorError,
+    sensor::{CalibrationError, SensorError},
     training::SettingError,
 };
 
@@ -38,6 +38,8 @@ pub(super) enum Failure {
     Bundle(#[from] BundleError),
     #[error("'{}': {source}", .path.display())]
     Resume { path: PathBuf, source: RunError },
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     #[error(transparent)]
     Import(#[from] ImportError),
     #[error("'{}': the samples of '{}' are not those of the checkpoint; restore the file, or start a new training", .path.display(), .data.display())]
@@ -201,5 +203,7 @@ fn comes_of_arguments(error: &RunError) -> bool {
             | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
             | RunError::Training(_)
             | RunError::Memory { .. }
+            | RunError::Folds(_)
+            | RunError::Division(_)
     )
 }

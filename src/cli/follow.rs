@@ -21,7 +21,7 @@ use super::{
 use crate::{
     dataset::SimulationError,
     export::{MeasuredNetworkFile, NetworkFile},
-    live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
+    live::{Keeping, Line, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
 };
 
 // Decoding of frames as they come.
@@ -74,16 +74,40 @@ impl Follow {
                 "a network of own data knows no sensor whose faults could be judged; leave it out",
             ));
         }
-        let source = self.source(input)?;
         let mut answers = MeasuredAnswers::new(file, self.format.unwrap_or_default());
-        let keeping = source.keeping();
+        self.follow(self.source(input)?, 1, |Line { number, text, read_at }, report| {
+            match text.map(|text| answers.write(number, text)) {
+                Some(Ok(Answered::Yes)) => report.good(read_at.elapsed()),
+                Some(Ok(Answered::Heading)) => {}
+                Some(Ok(Answered::Bad(reason))) => report.bad(&format_args!("line {number}: {reason}")),
+                Some(Err(error)) => return Err(Failure::Output(error)),
+                None => report_too_long(number, report),
+            }
+            Ok(Kept::AsBefore)
+        })
+    }
+
+    /// Gives every line of `source` to `take`, until it ends or fails, or until Ctrl-C; of a device, `kept` lines are kept at
+    /// first. Reports as asked, on SIGUSR1, and at the end.
+    fn follow(
+        &self,
+        source: Source,
+        kept: usize,
+        mut take: impl FnMut(Line<'_>, &mut Report) -> Result<Kept, Failure>,
+    ) -> Result<(), Failure> {
+        let asked = Arc::new(AtomicBool::new(false));
+        // Without the signal there are still reports every so often and at the end.
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
         let opened = source.open().map_err(Failure::Source)?;
-        let mut lines = Lines::spawn(opened, keeping, source.begins_anywhere()).map_err(Failure::Reader)?;
+        let spawned = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
+        let mut lines = spawned.map_err(Failure::Reader)?;
+        lines.set_kept(kept);
         let graceful = Graceful::begin();
         let mut report = Report::new(source);
         let every = self.report.map(Duration::from_secs_f64);
         let end = loop {
-            if every.is_some_and(|every| report.is_due(every)) {
+            if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
                 report.tell(lines.dropped());
             }
             if graceful.is_end_requested() {
@@ -98,16 +122,10 @@ impl Follow {
                 }
                 NextLine::End(None) => break Ok(()),
             };
-            let (number, read_at) = (line.number, line.read_at);
-            match line.text.map(|text| answers.write(number, text)) {
-                Some(Ok(Answered::Yes)) => report.good(read_at.elapsed()),
-                Some(Ok(Answered::Heading)) => {}
-                Some(Ok(Answered::Bad(reason))) => report.bad(&format_args!("line {number}: {reason}")),
-                Some(Err(error)) => break Err(Failure::Output(error)),
-                None => report.bad(&format_args!(
-                    "line {number}: it is longer than {} bytes",
-                    Lines::LONGEST
-                )),
+            match take(line, &mut report) {
+                Ok(Kept::AsBefore) => {}
+                Ok(Kept::Latest) => lines.set_kept(1),
+                Err(failure) => break Err(failure),
             }
         };
         report.tell(lines.dropped());
@@ -134,49 +152,21 @@ impl Follow {
         let mut parser = LineParser::new(scale, scene.rows, keeping == Keeping::All).map_err(SimulationError::from)?;
         let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
         let mut faults = Faults::new(&file.settings.source, self.noise)?;
-        let asked = Arc::new(AtomicBool::new(false));
-        // Without the signal there are still reports every so often and at the end.
-        #[cfg(unix)]
-        let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
-        let opened = source.open().map_err(Failure::Source)?;
-        let mut lines = Lines::spawn(opened, keeping, source.begins_anywhere()).map_err(Failure::Reader)?;
-        lines.set_kept(answers.rows());
-        let graceful = Graceful::begin();
-        let mut report = Report::new(source);
-        let every = self.report.map(Duration::from_secs_f64);
         let mut checked: Option<Instant> = None;
-        let end = loop {
-            if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
-                report.tell(lines.dropped());
-            }
-            if graceful.is_end_requested() {
-                break Err(Failure::InterruptedFollow);
-            }
-            let line = match lines.next(WAIT) {
-                NextLine::Line(line) => line,
-                NextLine::None => continue,
-                NextLine::End(Some(error)) => {
-                    let input = report.source().clone();
-                    break Err(Failure::Lost { input, source: error });
-                }
-                NextLine::End(None) => break Ok(()),
-            };
-            let (number, read_at) = (line.number, line.read_at);
-            let Some(text) = line.text else {
+        let input = source.clone();
+        let end = self.follow(source, answers.rows(), |Line { number, text, read_at }, report| {
+            let Some(text) = text else {
                 parser.count_bad();
-                report.bad(&format_args!(
-                    "line {number}: it is longer than {} bytes",
-                    Lines::LONGEST
-                ));
-                continue;
+                report_too_long(number, report);
+                return Ok(Kept::AsBefore);
             };
             let parsed = match parser.parse(number, text) {
-                Ok(ParsedLine::NoReadings) => continue,
+                Ok(ParsedLine::NoReadings) => return Ok(Kept::AsBefore),
                 Ok(parsed) => parsed,
-                Err(error @ LineError::NoRow(_)) => break Err(Failure::Line(report.source().clone(), error)),
+                Err(error @ LineError::NoRow(_)) => return Err(Failure::Line(input.clone(), error)),
                 Err(error) => {
                     report.bad(&error);
-                    continue;
+                    return Ok(Kept::AsBefore);
                 }
             };
             match answers.write(number, parsed, faults.left_out()) {
@@ -185,9 +175,9 @@ impl Follow {
                     report.bad(&format_args!(
                         "line {number}: resistances so far from the training range that the network has no answer"
                     ));
-                    continue;
+                    return Ok(Kept::AsBefore);
                 }
-                Err(error) => break Err(Failure::Output(error)),
+                Err(error) => return Err(Failure::Output(error)),
             }
             let is_snapshot = matches!(parsed, ParsedLine::Snapshot(_));
             let is_due = checked.is_none_or(|checked| checked.elapsed() >= BETWEEN_CHECKS);
@@ -195,14 +185,26 @@ impl Follow {
                 faults.check(number);
                 checked = Some(Instant::now());
             }
-            if is_snapshot {
-                lines.set_kept(1);
-            }
-        };
-        report.tell(lines.dropped());
+            Ok(if is_snapshot { Kept::Latest } else { Kept::AsBefore })
+        });
         answers.warn();
         end
     }
+}
+
+/// Lines of a device that are kept while others come.
+enum Kept {
+    /// As many as before.
+    AsBefore,
+    /// Only the latest.
+    Latest,
+}
+
+fn report_too_long(number: u64, report: &mut Report) {
+    report.bad(&format_args!(
+        "line {number}: it is longer than {} bytes",
+        Lines::LONGEST
+    ));
 }
 
 fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {

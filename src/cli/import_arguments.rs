@@ -57,7 +57,7 @@ pub(super) struct ImportArguments {
     targets: Vec<String>,
     /// Column of the times
     #[arg(long, value_name = "COLUMN", requires = "data")]
-    time: Option<String>,
+    pub(super) time: Option<String>,
     /// Column whose equal values belong together, such as one press or session
     #[arg(long, value_name = "COLUMN", requires = "data")]
     group: Option<String>,
@@ -99,7 +99,7 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "K", conflicts_with_all = ["test_fraction", "test_data"])]
     pub(super) folds: Option<usize>,
     #[command(flatten)]
-    dialect: DialectArguments,
+    pub(super) dialect: DialectArguments,
 }
 
 fn yes_or_no(text: &str) -> Result<bool, String> {
@@ -148,6 +148,39 @@ impl ImportArguments {
         self.data.is_some() || self.recipe.is_some()
     }
 
+    /// Returns `true` if columns have meanings, so that there are samples.
+    pub(super) fn has_meanings(&self) -> bool {
+        !self.targets.is_empty() || self.recipe.is_some()
+    }
+
+    /// The file, where nothing is asked of its columns.
+    ///
+    /// # Errors
+    /// There is none, or an argument needs targets.
+    pub(super) fn only_file(&self) -> Result<&Path, Failure> {
+        let given = [
+            (!self.join.is_empty(), "--join"),
+            (self.group.is_some(), "--group"),
+            (self.row_wire.is_some(), "--row-wire"),
+            (!self.conditions.is_empty(), "--where"),
+            (!self.missing.is_empty(), "--missing"),
+            (!self.unit.is_empty(), "--unit"),
+            (self.save_recipe.is_some(), "--save-recipe"),
+            (self.split.is_some(), "--split"),
+            (self.test_fraction.is_some(), "--test-fraction"),
+            (self.validation_fraction.is_some(), "--validation-fraction"),
+            (self.test_data.is_some(), "--test-data"),
+            (self.folds.is_some(), "--folds"),
+        ];
+        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
+            return Err(Failure::Arguments(format!("{argument} needs --inputs and --targets")));
+        }
+        let message = "--data: name the file to inspect";
+        self.data
+            .as_deref()
+            .ok_or_else(|| Failure::Arguments(message.to_owned()))
+    }
+
     /// Returns `true` if the share for validation is given, in an argument or a recipe.
     pub(super) fn holds_out(&self) -> bool {
         self.validation_fraction.is_some() || self.recipe.is_some()
@@ -172,6 +205,11 @@ impl ImportArguments {
 
     /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
     pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
+        self.plan_of(inputs, &self.targets)
+    }
+
+    /// As [`Self::plan`], with these columns as the targets.
+    pub(super) fn plan_of(&self, inputs: &[String], targets: &[String]) -> Result<Plan, Failure> {
         let mut plan = match &self.recipe {
             Some(path) => {
                 if !inputs.is_empty() {
@@ -181,7 +219,7 @@ impl ImportArguments {
                 RecipeFile::load(path)?
             }
             None => Plan {
-                import: self.import(inputs)?,
+                import: self.import(inputs, targets)?,
                 ..Plan::default()
             },
         };
@@ -208,8 +246,8 @@ impl ImportArguments {
         Ok(plan)
     }
 
-    fn import(&self, inputs: &[String]) -> Result<Recipe, Failure> {
-        for (argument, columns) in [("--inputs", inputs), ("--targets", &self.targets)] {
+    fn import(&self, inputs: &[String], targets: &[String]) -> Result<Recipe, Failure> {
+        for (argument, columns) in [("--inputs", inputs), ("--targets", targets)] {
             if columns.is_empty() {
                 let message = format!("{argument}: name the columns; decoupler inspect --data FILE lists them");
                 return Err(Failure::Arguments(message));
@@ -230,7 +268,7 @@ impl ImportArguments {
             join: self.join.iter().enumerate().map(joined).collect(),
             dialect: self.dialect.choice(),
             inputs: inputs.to_vec(),
-            targets: self.targets.clone(),
+            targets: targets.to_vec(),
             time: self.time.clone(),
             group: self.group.clone(),
             row_wire: self.row_wire.clone(),

@@ -1,17 +1,22 @@
-use std::{collections::BTreeMap, io, io::Write, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, io::Write, time::Duration};
 
 use serde::Serialize;
 
 use super::{
     failure::Failure,
-    measured_table::{Target, judgements, targets, write_table, write_warnings},
+    measured_files::{FileFound, files, write_files},
+    measured_table::{Target, standings, targets, worse_than_ridge, write_table, write_warnings},
     output::{print as print_with, print_object},
 };
 use crate::{
-    dataset::{Dataset, SplitBy},
-    evaluation::{RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow},
-    export::{MeasuredNetworkFile, format_duration, format_number},
-    import::{Channel, Dropped, FileReport, Format, JoinReport, Plan, PlannedSets, Recording},
+    dataset::{Dataset, Stream},
+    evaluation::{
+        CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
+        recorded::{Determination, NonlinearGain},
+    },
+    export::{MeasuredNetworkFile, format_duration},
+    import::{Channel, Dropped, Plan, PlannedSets, Recording},
+    sensor::counted,
     training::StopReason,
 };
 
@@ -32,16 +37,6 @@ pub(super) struct Report {
     dropped: Vec<Dropped>,
     #[serde(skip)]
     warnings: Vec<String>,
-}
-
-/// A file as it was found.
-#[derive(Serialize)]
-struct FileFound {
-    path: PathBuf,
-    format: String,
-    rows: usize,
-    columns: usize,
-    join: Option<JoinReport>,
 }
 
 /// The object printed by `train --data --json`.
@@ -80,39 +75,31 @@ pub(super) struct Folds<'a> {
     seed: u64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
+    /// Of mean, ridge and network the one with the lowest error, target by target.
+    better: Vec<&'static str>,
     warnings: Vec<String>,
+    #[serde(skip)]
+    table: Vec<TargetRow>,
 }
 
-impl FileFound {
-    fn of(report: &FileReport) -> Self {
-        Self {
-            path: report.path.clone(),
-            format: format_words(&report.format),
-            rows: report.rows,
-            columns: report.columns,
-            join: report.join,
-        }
-    }
-}
+const NETWORK: &str = "network";
 
-/// Says what kind of file it is, and its layout.
-pub(super) fn format_words(format: &Format) -> String {
-    match format {
-        Format::Text(dialect) => format!("text: {dialect}"),
-        Format::Npy => "NumPy array".to_owned(),
-        Format::Npz => "archive of NumPy arrays".to_owned(),
-        Format::Matlab => "MATLAB file".to_owned(),
-    }
+/// Name of the row of `table` with the lowest error for a target.
+fn best(table: &[TargetRow], target: usize) -> &'static str {
+    let rows = table.iter().min_by(|one, other| {
+        let rmse = |row: &TargetRow| row.targets[target].rmse;
+        rmse(one).total_cmp(&rmse(other))
+    });
+    rows.map_or(NETWORK, |row| row.name)
 }
 
 impl Report {
     pub(super) fn new(plan: &Plan, sets: &PlannedSets) -> Self {
         let by = plan.division.by;
         let recordings = || std::iter::once(&sets.recording).chain(&sets.test_recording);
-        let mut warnings: Vec<String> = recordings()
+        let warnings: Vec<String> = recordings()
             .flat_map(|recording| recording.warnings.iter().cloned())
             .collect();
-        warnings.extend(flattery(by, sets.test_recording.is_some()));
         let samples = sets.split.training.samples();
         let validation_samples = sets.split.validation.as_ref().map_or(0, Dataset::samples);
         let test_samples = sets.test.samples();
@@ -136,37 +123,39 @@ impl Report {
     }
 }
 
-fn files<'a>(recordings: impl Iterator<Item = &'a Recording>) -> Vec<FileFound> {
-    recordings
-        .flat_map(|recording| recording.files.iter().map(FileFound::of))
-        .collect()
-}
-
-/// Says that a random split flatters.
-fn flattery(by: SplitBy, has_test_file: bool) -> Option<String> {
-    (by == SplitBy::Random && !has_test_file).then(|| {
-        "a random split flatters where neighbouring rows are alike: the test has neighbours of what was trained; compare \
-         with --split time"
-            .to_owned()
-    })
+/// What is found once a network is trained.
+pub(super) struct Judged<'a> {
+    pub(super) flaw: Option<&'a RunFlaw>,
+    pub(super) wall_time: Option<Duration>,
+    /// R² of each target on the test samples, with its interval.
+    pub(super) told: Vec<Option<Determination>>,
+    /// What a random split hides.
+    pub(super) flattery: Vec<String>,
 }
 
 /// Prints the report of a trained network.
 pub(super) fn print(
     report: &Report,
     file: &MeasuredNetworkFile,
-    flaw: Option<&RunFlaw>,
-    wall_time: Option<Duration>,
+    judged: &Judged<'_>,
     is_json: bool,
 ) -> Result<(), Failure> {
+    let Judged {
+        flaw,
+        wall_time,
+        told,
+        flattery,
+    } = judged;
     let (settings, training) = (&file.settings, &file.training);
     let epochs = training.history.last().map_or(0, |record| record.epoch);
     let warnings: Vec<String> = report
         .warnings
         .iter()
         .cloned()
+        .chain(flattery.iter().cloned())
         .chain(flaw.map(ToString::to_string))
-        .chain(judgements(&file.targets, &file.errors, &file.ridge))
+        .chain(standings(&file.targets, told))
+        .chain(worse_than_ridge(&file.targets, &file.errors, &file.ridge))
         .collect();
     if is_json {
         return print_object(&Trained {
@@ -181,10 +170,10 @@ pub(super) fn print(
             seconds: wall_time.map(|time| time.as_secs_f64()),
             networks: file.network.values().len(),
             weights: file.network.weights(),
-            targets: targets(&file.targets, &file.errors),
+            targets: targets(&file.targets, &file.errors, told),
             baselines: BTreeMap::from([
-                ("mean", targets(&file.targets, &file.mean)),
-                ("ridge", targets(&file.targets, &file.ridge)),
+                ("mean", targets(&file.targets, &file.mean, &[])),
+                ("ridge", targets(&file.targets, &file.ridge, &[])),
             ]),
             warnings,
         });
@@ -193,23 +182,26 @@ pub(super) fn print(
         write_files(&report.files, report.rows, &report.dropped, out)?;
         writeln!(
             out,
-            "{} samples for training, {} for validation, {} for the test (split by {})",
-            report.samples, report.validation_samples, report.test_samples, report.split
+            "{} for training, {} for validation, {} for the test (split by {})",
+            counted(report.samples, "sample"),
+            report.validation_samples,
+            report.test_samples,
+            report.split
         )?;
         writeln!(
             out,
-            "{} inputs, {} hidden nodes, {}, {} starts, seed {}",
-            file.inputs.len(),
-            settings.hidden,
+            "{}, {}, {}, {}, seed {}",
+            counted(file.inputs.len(), "input"),
+            counted(settings.hidden, "hidden node"),
             settings.training.method,
-            settings.starts,
+            counted(settings.starts, "start"),
             settings.seed
         )?;
         let reason = training
             .stop_reason
             .map_or("not ended".to_owned(), |reason| reason.to_string());
         let time = wall_time.map_or_else(String::new, |time| format!(", {}", format_duration(time)));
-        writeln!(out, "Ended after {epochs} epochs{time}: {reason}")?;
+        writeln!(out, "Ended after {}{time}: {reason}", counted(epochs, "epoch"))?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         let rows = [
             ("mean", &file.mean[..]),
@@ -222,23 +214,38 @@ pub(super) fn print(
 }
 
 impl<'a> Folds<'a> {
+    /// Reports a cross-validation; `flattery` is what random folds hide.
     pub(super) fn new(
         plan: &Plan,
         recording: &'a Recording,
         settings: &RunSettings,
-        folds: usize,
-        table: &[TargetRow],
+        validated: &CrossValidated,
+        flattery: Vec<String>,
     ) -> Self {
-        let of = |row: usize| targets(&recording.targets, table.get(row).map_or(&[], |row| &row.targets));
-        let errors = |row: usize| table.get(row).map_or(&[][..], |row| &row.targets);
+        let (set, channels, by) = (&recording.set, &recording.targets, plan.division.by);
+        let table = validated.target_table(set);
+        let mut rng = settings.seed.rng(Stream::Resampling);
+        let told = Determination::measure(set, validated.network.view(), by, &mut rng);
+        let gains = NonlinearGain::of_validated(set, validated, by, &mut rng);
+        let better: Vec<&'static str> = (0..channels.len()).map(|target| best(&table, target)).collect();
         let mut warnings = recording.warnings.clone();
-        warnings.extend(flattery(plan.division.by, false));
-        warnings.extend(judgements(&recording.targets, errors(2), errors(1)));
+        warnings.extend(flattery);
+        warnings.extend(standings(channels, &told));
+        let remarks = channels.iter().zip(gains);
+        warnings.extend(remarks.filter_map(|(channel, gain)| gain?.remark(&channel.name)));
+        let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
+        warnings.extend(fallbacks.map(|(channel, better)| {
+            format!(
+                "the better answer for {} is the {better}: its held-out error is the lowest",
+                channel.name
+            )
+        }));
+        let of = |row: usize, told: &[Option<Determination>]| targets(channels, &table[row].targets, told);
         Self {
             files: files(std::iter::once(recording)),
             inputs: &recording.inputs,
             split: plan.division.by.to_string(),
-            folds,
+            folds: validated.folds.count(),
             rows: recording.rows,
             samples: recording.set.samples(),
             test_samples: recording.set.samples(),
@@ -246,20 +253,17 @@ impl<'a> Folds<'a> {
             hidden: settings.hidden,
             method: settings.training.method.short_name(),
             seed: settings.seed.0,
-            targets: of(2),
-            baselines: BTreeMap::from([("mean", of(0)), ("ridge", of(1))]),
+            targets: of(2, &told),
+            baselines: BTreeMap::from([("mean", of(0, &[])), ("ridge", of(1, &[]))]),
+            better,
             warnings,
+            table,
         }
     }
 }
 
-/// Prints the report of a cross-validation; `table` has the errors of the mean, of ridge and of the networks.
-pub(super) fn print_folds(
-    folds: &Folds<'_>,
-    channels: &[Channel],
-    table: &[TargetRow],
-    is_json: bool,
-) -> Result<(), Failure> {
+/// Prints the report of a cross-validation.
+pub(super) fn print_folds(folds: &Folds<'_>, channels: &[Channel], is_json: bool) -> Result<(), Failure> {
     if is_json {
         return print_object(folds);
     }
@@ -272,46 +276,9 @@ pub(super) fn print_folds(
         )?;
         let rows: Vec<(&str, &[TargetErrors])> = ["mean", "ridge", "network"]
             .into_iter()
-            .zip(table.iter().map(|row| &row.targets[..]))
+            .zip(folds.table.iter().map(|row| &row.targets[..]))
             .collect();
         write_table(channels, &rows, out)?;
         write_warnings(&folds.warnings, out)
     })
-}
-
-fn write_files(files: &[FileFound], rows: usize, dropped: &[Dropped], out: &mut impl Write) -> io::Result<()> {
-    for file in files {
-        writeln!(
-            out,
-            "{}: {} rows × {} columns, {}",
-            file.path.display(),
-            file.rows,
-            file.columns,
-            file.format
-        )?;
-        if let Some(join) = file.join {
-            let offset = join.median_offset.map_or_else(String::new, |offset| {
-                format!(", median {} apart", format_number(offset.abs()))
-            });
-            writeln!(
-                out,
-                "  joined by time within {}{offset}; {} rows without partner, {} of its rows unused",
-                format_number(join.limit),
-                join.without_partner,
-                join.unused
-            )?;
-        }
-    }
-    for Dropped {
-        reason,
-        rows: count,
-        first_line,
-    } in dropped
-    {
-        writeln!(
-            out,
-            "{count} of {rows} rows dropped: {reason} (first on line {first_line})"
-        )?;
-    }
-    Ok(())
 }

@@ -2,10 +2,14 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use crate::{evaluation::TargetErrors, export::format_number, import::Channel};
-
-/// R² on the test samples below which readings hardly tell a target.
-const HARDLY: f64 = 0.4;
+use crate::{
+    evaluation::{
+        TargetErrors,
+        recorded::{Determination, Standing},
+    },
+    export::format_number,
+    import::Channel,
+};
 
 /// Errors for one target.
 #[derive(Serialize)]
@@ -15,26 +19,34 @@ pub(super) struct Target<'a> {
     rmse: f64,
     mae: f64,
     r2: Option<f64>,
+    /// 95 % confidence interval of R², of the network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    r2_interval: Option<[f64; 2]>,
     worst: f64,
     percent_of_range: Option<f64>,
 }
 
-/// Warns of targets that the readings hardly tell, and of networks that are worse than ridge.
-pub(super) fn judgements(channels: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
+/// Warns of targets that the readings do not tell, or hardly.
+pub(super) fn standings(channels: &[Channel], told: &[Option<Determination>]) -> Vec<String> {
+    let of = |(channel, told): (&Channel, &Option<Determination>)| match told {
+        None => Some(format!(
+            "{} is constant in the test samples, or they are a single stretch: nothing can be judged",
+            channel.name
+        )),
+        Some(told) => (told.standing() != Standing::Told).then(|| told.sentence(&channel.name)),
+    };
+    channels.iter().zip(told).filter_map(of).collect()
+}
+
+/// Warns of networks that are worse than ridge.
+pub(super) fn worse_than_ridge(channels: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
     let mut words = Vec::new();
     for ((channel, network), ridge) in channels.iter().zip(network).zip(ridge) {
         let name = &channel.name;
-        match network.r2 {
-            None => words.push(format!("{name} is constant in the test samples: nothing can be judged")),
-            Some(r2) if r2 < HARDLY => words.push(format!(
-                "the readings hardly tell {name}: R² {r2:.2} on the test samples, where always answering their mean has 0"
-            )),
-            Some(_) => {}
-        }
         if network.rmse > ridge.rmse {
             words.push(format!(
-                "for {name} the network is worse than ridge regression (RMSE {} against {}): record more samples, or use \
-                 fewer hidden nodes or --method br",
+                "for {name} the network is worse than ridge regression (RMSE {} against {}): take ridge, record more samples, \
+                 or use fewer hidden nodes or --method br",
                 format_number(network.rmse),
                 format_number(ridge.rmse)
             ));
@@ -43,17 +55,26 @@ pub(super) fn judgements(channels: &[Channel], network: &[TargetErrors], ridge: 
     words
 }
 
-pub(super) fn targets<'a>(channels: &'a [Channel], errors: &[TargetErrors]) -> Vec<Target<'a>> {
-    let target = |(channel, errors): (&'a Channel, &TargetErrors)| Target {
+pub(super) fn targets<'a>(
+    channels: &'a [Channel],
+    errors: &[TargetErrors],
+    told: &[Option<Determination>],
+) -> Vec<Target<'a>> {
+    let target = |(index, (channel, errors)): (usize, (&'a Channel, &TargetErrors))| Target {
         name: &channel.name,
         unit: channel.unit.as_deref(),
         rmse: errors.rmse,
         mae: errors.mae,
         r2: errors.r2,
+        r2_interval: told
+            .get(index)
+            .copied()
+            .flatten()
+            .map(|told| [told.r2.low, told.r2.high]),
         worst: errors.worst,
         percent_of_range: errors.percent_of_range,
     };
-    channels.iter().zip(errors).map(target).collect()
+    channels.iter().zip(errors).enumerate().map(target).collect()
 }
 
 /// Writes the errors of each target, one line for each of `rows`.

@@ -1,24 +1,30 @@
-//! The work in a terminal: `decoupler train`, `inspect`, `decode`, `export`, `simulate`, `reproduce`, `trade` and
-//! `sweep`.
+//! The work in a terminal: `decoupler train`, `inspect`, `decode`, `export`, `calibrate`, `fine-tune`, `simulate`,
+//! `reproduce`, `trade` and `sweep`.
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
 mod announcement;
 mod arguments;
+mod calibrate;
 mod checkpointing;
 mod decode;
 mod export;
 mod export_report;
 mod failure;
+mod findings;
+mod findings_report;
+mod fine_tune;
 mod follow;
 mod follow_answers;
 mod follow_faults;
 mod follow_report;
+mod frames;
 mod import_arguments;
 mod inspect;
 mod interruption;
 mod measured_decode;
+mod measured_files;
 mod measured_report;
 mod measured_table;
 mod measured_train;

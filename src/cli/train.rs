@@ -22,7 +22,7 @@ use crate::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
     export::{
-        CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, check_writable, format_number,
+        CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, SensorFile, check_writable, format_number,
         report::RunReport,
     },
     training::TrainingSettings,
@@ -44,6 +44,9 @@ pub(super) struct Train {
     pub(super) import: ImportArguments,
     #[command(flatten)]
     pub(super) checkpoint: CheckpointArguments,
+    /// Sensor model written by calibrate, in the place of --array
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["array", "resume", "data", "recipe"])]
+    sensor: Option<PathBuf>,
     /// File for the network, to be opened in the window or given to decode
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
@@ -82,7 +85,10 @@ impl Train {
         let mut run = match &self.checkpoint.checkpoint {
             Some(path) if self.checkpoint.resume => self.resume(path)?,
             _ => {
-                let settings = self.training.settings()?;
+                let mut settings = self.training.settings()?;
+                if let Some(path) = &self.sensor {
+                    settings.source.sensor = SensorFile::load(path)?;
+                }
                 announce(&settings)?;
                 Run::prepare(settings)?
             }

@@ -15,7 +15,7 @@ use crate::{
     export::{NetworkFile, TrainingRecord, format_duration, format_number},
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
-    sensor::{ArrayScale, Geometry},
+    sensor::{ArrayScale, Geometry, counted},
     training::{Stage, StopReason},
 };
 
@@ -214,8 +214,9 @@ fn write_text(
     let method = first.map_or(settings.training.method, |stage| stage.method);
     writeln!(
         out,
-        "{scale}, {} hidden nodes, {method}, seed {}",
-        settings.hidden, settings.seed
+        "{scale}, {}, {method}, seed {}",
+        counted(settings.hidden, "hidden node"),
+        settings.seed
     )?;
     for stage in training.stages.iter().skip(1) {
         writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
@@ -225,8 +226,8 @@ fn write_text(
     let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,
-        "{} samples for training, {} for validation, {} for test",
-        whole(settings.source.samples),
+        "{} for training, {} for validation, {} for test",
+        counted(whole(settings.source.samples), "sample"),
         whole(settings.source.validation_samples),
         whole(settings.source.test_samples)
     )?;
@@ -236,8 +237,8 @@ fn write_text(
     let time = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
     writeln!(
         out,
-        "Ended after {} epochs, {} on one thread ({} an epoch): {reason}",
-        epochs(training),
+        "Ended after {}, {} on one thread ({} an epoch): {reason}",
+        counted(epochs(training), "epoch"),
         time(training.seconds),
         time(epoch_seconds(training))
     )?;
@@ -303,14 +304,13 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     }
     writeln!(out)?;
     if let Ok(size) = file.settings.source.model_size() {
-        let networks = if size.networks == 1 { "network" } else { "networks" };
         write!(
             out,
-            "A frame has {} unknowns and {} equations; {} {networks} with {} weights",
-            size.unknowns,
-            size.equations,
-            size.networks,
-            file.network.weights()
+            "A frame has {} and {}; {} with {}",
+            counted(size.unknowns, "unknown"),
+            counted(size.equations, "equation"),
+            counted(size.networks, "network"),
+            counted(file.network.weights(), "weight")
         )?;
     }
     let outlook = Outlook::of(source).ok();

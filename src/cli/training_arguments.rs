@@ -14,7 +14,7 @@ use crate::{
     export::MeasuredSettings,
     network::{InputChoice, LARGEST_HIDDEN},
     sensor::{ArrayScale, SensorModel},
-    training::{Damping, Method, StoppingRules, TrainingSettings},
+    training::{Method, StoppingRules, TrainingSettings},
 };
 
 // The run to train. Arguments that are not given have their default or the checkpoint's value.
@@ -31,12 +31,12 @@ pub(super) struct TrainingArguments {
     /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
     starts: Option<usize>,
-    /// Training method [default: lm]
+    /// Training method [default: lm; of own data br]
     #[arg(long, value_parser = method())]
     method: Option<Method>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
-    /// Maximum number of epochs [default: 1000]
+    /// Maximum number of epochs [default: 1000; of own data 300]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     epochs: Option<usize>,
     /// Training error (mse, scaled) at which training ends [default: 0]
@@ -85,17 +85,7 @@ impl TrainingArguments {
     }
 
     /// Settings of a new run on own data.
-    ///
-    /// The defaults are those that fit noisy recordings: Bayesian regularisation, which needs no validation samples, so that the
-    /// samples nearest to the test in time train too; of three starts the best.
     pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
-        const STARTS: usize = 3;
-        const STOPPING: StoppingRules = StoppingRules {
-            epochs: 150,
-            goal_mse: 0.0,
-            min_gradient: 1e-7,
-            max_fail: 30,
-        };
         let (rows, scaling) = self.scene.measured(has_row_wires)?;
         let given = [
             (
@@ -129,11 +119,8 @@ impl TrainingArguments {
                 ..default.inputs
             },
             hidden: self.hidden.unwrap_or(default.hidden),
-            starts: self.starts.unwrap_or(STARTS),
-            training: self.training(TrainingSettings {
-                method: Method::BayesianRegularization(Damping::default()),
-                stopping: STOPPING,
-            })?,
+            starts: self.starts.unwrap_or(default.starts),
+            training: self.training(default.training)?,
             seed: self.seed.map_or(default.seed, Seed),
             ..default
         })
@@ -197,7 +184,9 @@ impl TrainingArguments {
 
     /// The given method and stopping rules; those not given are as in `present`.
     pub(super) fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
-        let mut method = self.method.unwrap_or(present.method);
+        // The present settings of the method are those that suit the samples.
+        let same = |method: &Method| method.short_name() == present.method.short_name();
+        let mut method = self.method.filter(|method| !same(method)).unwrap_or(present.method);
         for (name, value) in &self.set {
             let short_name = method.short_name();
             let mut settings = method.settings();
@@ -263,7 +252,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use crate::export::report::train_command;
+    use crate::{export::report::train_command, scene::RowModel};
 
     fn parsed(line: &str) -> TrainingArguments {
         let command = TrainingArguments::augment_args(Command::new("train"));
@@ -279,6 +268,21 @@ mod tests {
                     --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
                     200 --seed 0";
         assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
+    }
+
+    #[test]
+    fn own_data_have_the_defaults_of_the_library() {
+        let measured = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(parsed("train").measured(false).unwrap(), measured);
+        // Naming the default method keeps what suits recordings.
+        assert_eq!(parsed("train --method br").measured(false).unwrap(), measured);
+        let told = "train --method br --set correlation-epoch=0 --epochs 7 --starts 2 --hidden 3 --seed 4";
+        let told = parsed(told).measured(false).unwrap();
+        assert_eq!(
+            (told.training.stopping.epochs, told.starts, told.hidden, told.seed),
+            (7, 2, 3, Seed(4))
+        );
+        assert_eq!(told.training.method, Method::bayesian_regularization());
     }
 
     #[test]

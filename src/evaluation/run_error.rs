@@ -2,7 +2,7 @@ use thiserror::Error;
 
 use super::CountError;
 use crate::{
-    dataset::{FoldsError, SimulationError},
+    dataset::{DivisionError, FoldsError, SimulationError},
     decoupling::DecodeError,
     network::ScalingError,
     scene::SceneError,
@@ -46,6 +46,9 @@ pub enum RunError {
     /// Folds cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
+    /// Samples cannot be divided.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
     /// Samples cannot be scaled.
     #[error(transparent)]
     Scaling(#[from] ScalingError),

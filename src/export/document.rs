@@ -29,6 +29,8 @@ pub enum DocumentKind {
     MeasuredCheckpoint,
     /// How measured samples are made of files: [`super::RecipeFile`].
     Recipe,
+    /// A sensor model: [`super::SensorFile`].
+    Sensor,
     /// A name or choice of the run list: [`super::RunFolder`].
     RunList,
     /// A finished trial of `decoupler sweep`.
@@ -46,6 +48,7 @@ impl DocumentKind {
             Self::MeasuredNetwork => "decoupler measured network",
             Self::MeasuredCheckpoint => "decoupler measured checkpoint",
             Self::Recipe => "decoupler import",
+            Self::Sensor => "decoupler sensor",
             Self::RunList => "decoupler run list",
             Self::Trial => "decoupler trial",
             Self::SweepPlan => "decoupler sweep plan",
@@ -60,7 +63,7 @@ impl DocumentKind {
             Self::Network => 1..=3,
             // Version 1 had the paper's scene only, version 3 has the wall time.
             Self::Checkpoint => 1..=3,
-            Self::MeasuredNetwork | Self::MeasuredCheckpoint | Self::Recipe => 1..=1,
+            Self::MeasuredNetwork | Self::MeasuredCheckpoint | Self::Recipe | Self::Sensor => 1..=1,
             Self::RunList | Self::Trial | Self::SweepPlan => 1..=1,
         }
     }
@@ -69,6 +72,7 @@ impl DocumentKind {
         match self {
             Self::Network | Self::MeasuredNetwork => "copy or save it again",
             Self::Recipe => "correct it, or write it again with --save-recipe",
+            Self::Sensor => "correct it, or calibrate again",
             Self::Checkpoint | Self::MeasuredCheckpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",
             Self::Trial | Self::SweepPlan => "delete it and run the sweep again",
@@ -138,6 +142,7 @@ impl fmt::Display for DocumentKind {
             Self::MeasuredNetwork => "network file of measured samples",
             Self::MeasuredCheckpoint => "checkpoint of measured samples",
             Self::Recipe => "recipe of an import",
+            Self::Sensor => "sensor file",
             Self::RunList => "part of a run list",
             Self::Trial => "trial",
             Self::SweepPlan => "sweep plan",

@@ -6,6 +6,7 @@ use crate::{
         experiments::{Axis, CellResults, Experiment, ExperimentResults, Trial},
     },
     network::HiddenSuggestions,
+    sensor::counted,
 };
 
 /// Describes the conditions of an experiment in one or two sentences.
@@ -16,9 +17,9 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
         said.push(base.source.sensor.scale.to_string());
     }
     if !matches!(experiment.axis, Axis::Hidden(_)) {
-        said.push(format!("{} hidden nodes", base.hidden));
+        said.push(counted(base.hidden, "hidden node"));
     }
-    said.push(format!("{} epochs", base.training.stopping.epochs));
+    said.push(counted(base.training.stopping.epochs, "epoch"));
     said.push(match base.starts {
         1 => "one start".to_owned(),
         starts => format!("best of {starts} starts by validation error"),
@@ -29,15 +30,17 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     });
     said.push(match experiment.cross_validation {
         None => format!(
-            "{} training samples, {} more for validation, {} for test",
-            base.source.samples, base.source.validation_samples, base.source.test_samples
+            "{}, {} more for validation, {} for test",
+            counted(base.source.samples, "training sample"),
+            base.source.validation_samples,
+            base.source.test_samples
         ),
         Some(CrossValidation { folds, repeats, unit }) => {
             let validation = match folds {
                 2 => "nothing held out for validation",
                 _ => "of the folds not tested one is held out for validation",
             };
-            format!("{folds} folds by {unit}, {validation}, {repeats} repeats")
+            format!("{folds} folds by {unit}, {validation}, {}", counted(repeats, "repeat"))
         }
     });
     let mut conditions = said.join(", ");

@@ -24,6 +24,7 @@ pub mod report;
 mod run_folder;
 mod samples;
 mod sealed;
+mod sensor_file;
 mod soundness;
 #[cfg(feature = "cli")]
 mod sweep;
@@ -50,6 +51,7 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
+pub use sensor_file::SensorFile;
 #[cfg(feature = "cli")]
 pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
 pub use table::{Cell, Table, TableColumn, TableForm};

@@ -1,6 +1,7 @@
 use super::format_duration;
 use crate::{
     evaluation::{Workload, WorkloadTime},
+    sensor::counted,
     training::MachineMemory,
 };
 
@@ -20,12 +21,12 @@ pub fn describe_workload(workload: &Workload) -> String {
         all_epochs,
     } = workload.time();
     format!(
-        "about {}{machine} of memory; on one thread about {} to draw the samples and {} an epoch, {} for {} epochs; the \
+        "about {}{machine} of memory; on one thread about {} to draw the samples and {} an epoch, {} for {}; the \
          figures of the decoders take further time",
         gigabytes(workload.bytes),
         format_duration(drawing),
         format_duration(epoch),
         format_duration(all_epochs),
-        workload.epochs
+        counted(workload.epochs, "epoch")
     )
 }

@@ -19,6 +19,7 @@ mod of_section;
 mod of_trade_off;
 mod plot;
 mod plot_figure;
+mod point_labels;
 mod summary;
 pub mod surface;
 pub(crate) mod ticks;
@@ -39,6 +40,7 @@ pub use of_section::{SectionNodes, section_figure};
 pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;
+pub(crate) use point_labels::{PointLabel, along, place_labels};
 
 use surface::SurfaceFigure;
 

@@ -5,7 +5,7 @@ use super::{
     look::{Hue, Key, LineStyle, Look, Marker},
     plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
     plot_figure::PlotFigure,
-    trade_words::{frame_time, point_facts, point_name},
+    trade_words::{frame_time, point_facts, point_label, point_name},
 };
 use crate::{
     decoupling::{DecoderKind, Precision},
@@ -34,8 +34,8 @@ const ANSWER: Look = Look {
 };
 
 /// The points at one level of noise, one plot for each cost: colours tell the decoder, discs and diamonds the preset,
-/// hollow marks 32 bits. With the Pareto front, the Bayesian reference, and the answers to the two questions with their
-/// limits.
+/// hollow marks 32 bits. With the Pareto front, whose points are named, the Bayesian reference, and the answers to the two
+/// questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
     let mut keys = Vec::new();
@@ -45,14 +45,13 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
         keys.extend(is_there.then(|| Key::new(kind.name(Precision::Double), look)));
     }
     for preset in Preset::ALL {
-        let of_preset = |precision: Precision| {
-            let mut points = level.points.iter();
-            points.any(|point| (point.preset, point.report.precision) == (preset, precision))
-        };
-        for (precision, bits) in [(Precision::Double, ""), (Precision::Single, ", 32 bits")] {
-            let look = Look::marker(Hue::Ink, marker(preset, precision));
-            keys.extend(of_preset(precision).then(|| Key::new(format!("{preset} preset{bits}"), look)));
-        }
+        let look = Look::marker(Hue::Ink, marker(preset, Precision::Double));
+        let is_there = level.points.iter().any(|point| point.preset == preset);
+        keys.extend(is_there.then(|| Key::new(format!("{preset} preset"), look)));
+    }
+    let mut points = level.points.iter();
+    if points.any(|point| point.report.precision == Precision::Single) {
+        keys.push(Key::new("hollow: 32 bits", Look::marker(Hue::Ink, Marker::Ring)));
     }
     let has = |look: Look| {
         let mut series = plots.iter().flat_map(|plot| &plot.series);
@@ -60,16 +59,10 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
         series.any(|series| series.look == look && !series.points.is_empty())
             || lines.any(|line| (line.hue, Some(line.style)) == (look.hue, look.line))
     };
-    let questions = format!(
-        "fastest under {}, most accurate under {}",
-        format_percent(limits.percent),
-        frame_time(limits.microseconds)
-    );
     let marks = [
         ("Pareto front", FRONT),
         ("Bayesian reference", REFERENCE),
-        (&*questions, ANSWER),
-        ("their limits", LIMIT),
+        ("limits asked for", LIMIT),
     ];
     keys.extend(
         marks
@@ -99,14 +92,17 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         [x, y]
     };
     let mut series = vec![Series::new("Pareto front", FRONT, front(level, cost))];
+    let is_on_front = level.front(cost);
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL {
-                let is_of = |point: &&TradeOffPoint| {
+                let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
                     (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
                 };
-                let points = level.points.iter().filter(is_of).map(|point| PlotPoint {
+                let points = level.points.iter().zip(&is_on_front).filter(is_of);
+                let points = points.map(|(point, is_on_front)| PlotPoint {
                     note: Some(format!("{}\n{}", point_name(point), point_facts(point).join("\n"))),
+                    label: is_on_front.then(|| point_label(point)),
                     ..PlotPoint::from(at(point))
                 });
                 let look = Look::marker(kind.colour().into(), marker(preset, precision));
@@ -118,9 +114,24 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
             }
         }
     }
-    let answers = level.answers(limits).into_iter().zip(["fastest", "most accurate"]);
-    for (answer, name) in answers.filter_map(|(answer, name)| Some((level.points.get(answer?)?, name))) {
-        series.push(Series::new(name, ANSWER, [at(answer)]));
+    let questions = [
+        format!("fastest under {}", format_percent(limits.percent)),
+        format!("most accurate under {}", frame_time(limits.microseconds)),
+    ];
+    for (answer, name) in level.answers(limits).into_iter().zip(questions) {
+        let Some(answer) = answer.and_then(|answer| level.points.get(answer)) else {
+            continue;
+        };
+        // The questions are about decoding.
+        let label = (cost == TradeOffCost::Decoding).then(|| name.clone());
+        let point = PlotPoint {
+            label,
+            ..PlotPoint::from(at(answer))
+        };
+        series.push(Series {
+            points: vec![point],
+            ..Series::new(name, ANSWER, [])
+        });
     }
     series.retain(|series| !series.points.is_empty());
     let mut plot = Plot::new(

@@ -46,6 +46,8 @@ pub struct PlotPoint {
     pub bar: Option<[f64; 2]>,
     /// Words about the point in place of its coordinates.
     pub note: Option<String>,
+    /// Words beside it, where there is room.
+    pub label: Option<String>,
     /// Number of what it stands for, by which other figures know it too: a node, a bar.
     pub item: Option<usize>,
 }
@@ -136,6 +138,12 @@ impl Plot {
     /// Returns the place of a point on both axes; `None` if one of them has none for it.
     pub fn place(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         Some([self.x.place(x)?, self.y.place(y)?])
+    }
+
+    /// Returns true if words stand beside any point.
+    pub(crate) fn has_point_labels(&self) -> bool {
+        let mut points = self.series.iter().flat_map(|series| &series.points);
+        points.any(|point| point.label.is_some())
     }
 
     /// Returns the points of a series that have a place, with their places.

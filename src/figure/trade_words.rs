@@ -17,6 +17,15 @@ pub fn point_name(point: &TradeOffPoint) -> String {
     name
 }
 
+/// `Network f32, 12 hidden`, beside a point whose mark tells the preset.
+pub fn point_label(point: &TradeOffPoint) -> String {
+    let name = point.report.kind.name(point.report.precision).to_owned();
+    match point.hidden() {
+        Some(hidden) => format!("{name}, {hidden} hidden"),
+        None => name,
+    }
+}
+
 /// `3.59 µs`, `1.94 ms`.
 pub fn frame_time(microseconds: f64) -> String {
     match microseconds {

@@ -5,8 +5,57 @@ use serde::{Deserialize, Serialize};
 use super::{
     Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
+    correlation_time::correlation_time,
+    setting::settings,
 };
 use crate::network::{Mlp, Shape};
+
+settings! {
+    /// Settings of Bayesian regularisation: the damping mu, as in [`Damping`], and the correlation of errors.
+    #[serde(default)]
+    pub struct RegularizationSettings {
+        mu: "mu" = 0.005, in 1e-20..=1e300,
+            "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.";
+        mu_decrease: "mu decrease" = 0.1, in 1e-6..=0.999,
+            "Factor on mu after a step that lowers the error.";
+        mu_increase: "mu increase" = 10.0, in 1.001..=1e6,
+            "Factor on mu after a step that does not lower the error.";
+        mu_max: "largest mu" = 1e10, in 1e-20..=1e300,
+            "Training ends when mu exceeds this: no step lowers the error any more.";
+        correlation_epoch: "correlation epoch" = 0.0, in 0.0..=1e6,
+            "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
+             errors count as independent, and weights are smaller. 0: never.";
+    }
+}
+
+impl RegularizationSettings {
+    /// Before it, what is not yet learnt makes errors look more correlated than they are.
+    const EPOCH_OF_RECORDINGS: f64 = 200.0;
+
+    /// Settings for samples in the order in which they were recorded.
+    pub fn recorded() -> Self {
+        Self {
+            correlation_epoch: Self::EPOCH_OF_RECORDINGS,
+            ..Self::default()
+        }
+    }
+
+    fn damping(&self) -> Damping {
+        let &Self {
+            mu,
+            mu_decrease,
+            mu_increase,
+            mu_max,
+            correlation_epoch: _,
+        } = self;
+        Damping {
+            mu,
+            mu_decrease,
+            mu_increase,
+            mu_max,
+        }
+    }
+}
 
 /// Levenberg-Marquardt on `F = β Σe² + α Σw²`, with α and β estimated from the data (MacKay 1992; Foresee and Hagan
 /// 1997; `trainbr`). After every accepted step, with N weights and n errors,
@@ -16,10 +65,16 @@ use crate::network::{Mlp, Shape};
 /// α = γ / (2 Σw²)                     β = (n − γ) / (2 Σe²)
 /// ```
 ///
+/// Errors of neighbouring frames of a recording are correlated, and n of them tell only as much as n/τ independent ones, τ
+/// being their [`correlation_time`]. From [`RegularizationSettings::correlation_epoch`] on, where it is measured once, α/β is
+/// therefore that of n/τ errors of the same size: a posterior that takes every frame for new evidence fits the noise.
+///
 /// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox switches the
 /// stopping rules on the validation error off for this method; here they hold as for every other method.
 pub(super) struct BayesianRegularization {
     damping: Damping,
+    /// Epoch after which the correlation of errors is measured; 0 for never.
+    correlation_epoch: usize,
     state: BayesianState,
     equations: FactoredEquations,
     /// Number of errors n.
@@ -40,7 +95,16 @@ pub struct BayesianState {
     beta: f64,
     /// γ, the effective number of parameters.
     effective_parameters: f64,
+    /// Number of epochs so far.
+    #[serde(default)]
+    epochs: usize,
+    /// τ, once it is measured.
+    #[serde(default)]
+    correlation_time: Option<f64>,
 }
+
+/// Most samples over which errors may be correlated; the sum of the correlations ends at the first that is not positive.
+const LARGEST_LAG: usize = 50;
 
 impl Checked for BayesianState {
     fn vectors(&self) -> Vec<&[f64]> {
@@ -60,6 +124,15 @@ impl BayesianRegularization {
     /// ratio overflows.
     fn update_weighting(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
+        let determined = match self.state.correlation_time {
+            None => self.errors - gamma,
+            Some(time) => {
+                /// Least part of the errors that is left to tell the noise.
+                const LEAST_FREE: f64 = 0.1;
+                let independent = self.errors / time;
+                (independent - gamma).max(LEAST_FREE * independent)
+            }
+        };
         let bounded = |value: f64| {
             if value > 0.0 && value.is_finite() {
                 value.clamp(1e-150, 1e150)
@@ -68,7 +141,7 @@ impl BayesianRegularization {
             }
         };
         self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(mlp)));
-        self.state.beta = bounded((self.errors - gamma) / (2.0 * self.mse * self.errors));
+        self.state.beta = bounded(determined / (2.0 * self.mse * self.errors));
     }
 
     /// The present error with the gradient of F / (β n).
@@ -82,7 +155,7 @@ impl BayesianRegularization {
 }
 
 impl Algorithm for BayesianRegularization {
-    type Settings = Damping;
+    type Settings = RegularizationSettings;
     type State = BayesianState;
 
     const DESCRIPTION: Description = Description {
@@ -94,15 +167,8 @@ impl Algorithm for BayesianRegularization {
         cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
-    fn default_settings() -> Damping {
-        Damping {
-            mu: 0.005,
-            ..Damping::default()
-        }
-    }
-
-    fn check(settings: &Damping) -> Result<(), SettingError> {
-        settings.check()
+    fn check(settings: &RegularizationSettings) -> Result<(), SettingError> {
+        settings.damping().check()
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {
@@ -114,17 +180,20 @@ impl Algorithm for BayesianRegularization {
     }
 
     /// Starts with γ = N, as if the data determined all weights.
-    fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut equations = FactoredEquations::factored(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let weights = mlp.weights().len();
         let mut method = Self {
-            damping,
+            damping: settings.damping(),
+            correlation_epoch: settings.correlation_epoch as usize,
             state: BayesianState {
-                mu: damping.mu,
+                mu: settings.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
+                epochs: 0,
+                correlation_time: None,
             },
             equations,
             errors: examples.errors(),
@@ -161,6 +230,10 @@ impl Algorithm for BayesianRegularization {
             let weights = self.step.len() as f64;
             self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
         }
+        self.state.epochs += 1;
+        if self.state.epochs == self.correlation_epoch {
+            self.state.correlation_time = Some(correlation_time(mlp, examples, LARGEST_LAG));
+        }
         self.update_weighting(mlp);
         Ok(self.regularized(mlp))
     }
@@ -181,4 +254,58 @@ impl Algorithm for BayesianRegularization {
 /// Σw².
 fn sum_of_squares(mlp: &Mlp) -> f64 {
     mlp.weights().iter().map(|weight| weight * weight).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::{
+        network::nguyen_widrow,
+        training::{Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    };
+
+    /// Weights that the data determine after 60 epochs on a curve with noise that follows an autoregression.
+    fn effective_parameters(memory: f64, correlation_epoch: f64) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let inputs = Array2::from_shape_fn((300, 1), |(sample, _)| (sample as f64 / 150.0) - 1.0);
+        let mut noise = 0.0;
+        let targets = inputs.mapv(|x: f64| {
+            noise = memory * noise + (1.0_f64 - memory * memory).sqrt() * rng.random_range(-0.5..0.5);
+            (3.0 * x).sin() + noise
+        });
+        let shape = Shape {
+            inputs: 1,
+            hidden: 10,
+            outputs: 1,
+        };
+        let problem = Problem {
+            training: Examples::new(inputs.view(), targets.view()),
+            validation: None,
+            test: None,
+        };
+        let settings = TrainingSettings {
+            method: Method::BayesianRegularization(RegularizationSettings {
+                correlation_epoch,
+                ..RegularizationSettings::default()
+            }),
+            stopping: StoppingRules {
+                epochs: 60,
+                ..StoppingRules::default()
+            },
+        };
+        let mut trainer = Trainer::new(nguyen_widrow(shape, &mut rng), problem, settings).unwrap();
+        while trainer.step().is_none() {}
+        trainer.latest().effective_parameters.unwrap()
+    }
+
+    #[test]
+    fn correlated_errors_determine_fewer_weights_once_that_is_measured() {
+        let (never, measured) = (effective_parameters(0.9, 0.0), effective_parameters(0.9, 20.0));
+        assert!(measured < 0.9 * never, "{measured} {never}");
+        let (never, measured) = (effective_parameters(0.0, 0.0), effective_parameters(0.0, 20.0));
+        assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
+    }
 }

@@ -12,7 +12,7 @@ use super::{
     ResilientSettings, ScaledConjugateGradientSettings, Setting, SettingError, StepMomentumSettings, StopReason,
     adaptive_descent::{AdaptiveDescent, AdaptiveState},
     algorithm::{Algorithm, Checked, Description},
-    bayesian_regularization::{BayesianRegularization, BayesianState},
+    bayesian_regularization::{BayesianRegularization, BayesianState, RegularizationSettings},
     gradient_descent::GradientDescent,
     levenberg_marquardt::{DampedState, LevenbergMarquardt},
     momentum::Momentum,
@@ -164,7 +164,7 @@ methods! {
     LevenbergMarquardt(Damping) with state: DampedState,
     /// Levenberg-Marquardt that keeps the weights as small as the data permit (`trainbr`). The normal equations are
     /// always factored, since the method needs the trace of their inverse.
-    BayesianRegularization(Damping) with state: BayesianState,
+    BayesianRegularization(RegularizationSettings) with state: BayesianState,
     /// The output layer solved exactly, Gauss-Newton steps on the hidden layer. The normal equations are always
     /// factored: the damping falls so low that conjugate gradients would need thousands of iterations.
     VariableProjection(Damping) with state: ProjectionState,
@@ -192,6 +192,11 @@ impl Method {
     /// Bayesian regularisation with its defaults.
     pub fn bayesian_regularization() -> Self {
         Self::BayesianRegularization(BayesianRegularization::default_settings())
+    }
+
+    /// Bayesian regularisation for samples in the order in which they were recorded, whose errors are correlated.
+    pub fn recorded_regularization() -> Self {
+        Self::BayesianRegularization(RegularizationSettings::recorded())
     }
 
     /// Returns `false` for Bayesian regularisation, which weighs fit against size of the weights by itself: samples held

@@ -11,6 +11,7 @@ mod bayesian_regularization;
 mod certified;
 mod checkpoint;
 mod continuation;
+mod correlation_time;
 mod damping;
 mod elementwise;
 mod epoch_columns;
@@ -36,6 +37,7 @@ mod trainer;
 mod variable_projection;
 
 pub use adaptive_descent::AdaptiveDescentSettings;
+pub use bayesian_regularization::RegularizationSettings;
 pub use checkpoint::{ResumeError, TrainerState};
 pub use damping::Damping;
 pub(crate) use epoch_columns::History;

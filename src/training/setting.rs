@@ -36,9 +36,9 @@ macro_rules! settings {
             $($field:ident: $name:literal = $default:expr, in $range:expr, $meaning:literal;)*
         }
     ) => {
-        $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
+        $(#[$doc])*
         pub struct $Settings {
             $(#[doc = $meaning] pub $field: f64,)*
         }

@@ -33,6 +33,9 @@ const FOLDED: [&str; 7] = [
     "Figures of the paper",
 ];
 
+/// Label of the button that ends the tour.
+pub(crate) const SKIP: &str = "Skip the tour";
+
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
 
@@ -49,19 +52,36 @@ impl Driver {
         Self::open_sized(vec2(1440.0, 900.0))
     }
 
-    /// The window of `size` points, with the first surface drawn.
+    /// The window of `size` points on the paper's scene, with the first surface drawn and everything unfolded.
     pub(crate) fn open_sized(size: Vec2) -> Self {
+        Self::open_as(size, None, |window| window).on_the_papers_scene()
+    }
+
+    /// The window of `size` points as it opens for the first time.
+    pub(crate) fn open_first(size: Vec2) -> Self {
         Self::open_as(size, None, |window| window)
     }
 
-    /// The window that keeps its runs in a file.
+    /// The window that keeps its runs in a file, on the paper's scene.
     pub(crate) fn open_keeping(path: &Path) -> Self {
         let path = path.to_owned();
-        Self::open_as(vec2(1440.0, 900.0), None, |window| window.keeping_runs(path))
+        Self::open_as(vec2(1440.0, 900.0), None, |window| window.keeping_runs(path)).on_the_papers_scene()
     }
 
-    /// The window that remembers in a file what it shows.
+    /// The window that remembers in a file what it shows; the tour has ended.
     pub(crate) fn open_remembering(path: &Path) -> Self {
+        let mut driver = Self::open_on_tour(path);
+        if driver.has(SKIP) {
+            driver.click(SKIP);
+        }
+        if driver.shown() == "Train" {
+            driver.unfold();
+        }
+        driver
+    }
+
+    /// The window that remembers in a file what it shows, with the tour unless it remembers its end.
+    pub(crate) fn open_on_tour(path: &Path) -> Self {
         let file = WindowFile::read(path.to_owned());
         Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window)
     }
@@ -97,10 +117,23 @@ impl Driver {
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
         driver.wait("the first surface", |driver| driver.state().test().is_some());
-        if driver.shown() == "Train" {
-            driver.unfold();
-        }
         driver
+    }
+
+    fn on_the_papers_scene(mut self) -> Self {
+        self.unfold();
+        self.choose_papers_scene();
+        self
+    }
+
+    /// Chooses the paper's scene and waits for its surface.
+    pub(crate) fn choose_papers_scene(&mut self) {
+        self.click("Paper's scene");
+        self.get("Hidden nodes").scroll_to_me();
+        self.wait("the paper's surface", |driver| {
+            let preview = driver.state().preview.as_ref();
+            preview.is_some_and(|preview| preview.settings.source.scene == driver.state().draft.source.scene)
+        });
     }
 
     /// Unfolds every part of the configuration.
@@ -371,6 +404,7 @@ impl Driver {
 
     /// A small network on the smallest array of the paper, trained in a moment.
     pub(crate) fn configure_small(&mut self) {
+        self.click("Paper's scene");
         self.click("10×6");
         self.enter("Hidden nodes", "6");
         self.enter("Training samples", "200");

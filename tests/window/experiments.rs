@@ -138,7 +138,7 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     let mut driver = open();
     assert!(driver.has("12, Z % publ.: 2.28"), "{:#?}", driver.texts());
     assert!(driver.has("12, Z % median: –"), "{:#?}", driver.texts());
-    assert!(driver.says("Press Run"));
+    assert!(driver.says("Our figures appear beside"));
     assert!(!driver.is_enabled(OPEN));
     driver.open_menu();
     assert!(!driver.is_enabled("Figure, SVG") && driver.says("No trial has finished yet"));
@@ -174,7 +174,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     driver.settle();
     // The other experiments have nothing to show, and this one still has.
     driver.click("Table 3");
-    assert!(driver.says("Press Run"));
+    assert!(driver.says("Our figures appear beside"));
     driver.click("Table 1");
     assert_eq!(driver.views().experiments.outcome().unwrap().trials().0, done);
 }

@@ -304,7 +304,6 @@ fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
     }
     driver.click_button("Compare");
     let name = driver.state().runs.workspace.runs[0].name.clone();
-    driver.click(&format!("{name} as A"));
     driver.wait("the run", |driver| driver.state().runs.pinned(0).is_some());
     let [network, of_kept] = ["network.json", "kept.html"].map(|name| folder.path().join(name));
     driver.save("A: Network file, JSON", &network);

@@ -1,7 +1,7 @@
 //! What the hands learn: taking changes back, the list of all actions, keys, the size of the interface.
 
 use decoupler::app::Phase;
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{Key, Modifiers, vec2};
 
 use crate::{driver::Driver, training::start_endless};
 
@@ -18,7 +18,7 @@ fn pause(driver: &mut Driver) {
 
 #[test]
 fn a_change_of_settings_is_taken_back_and_made_again() {
-    let mut driver = Driver::open();
+    let mut driver = Driver::open_first(vec2(1440.0, 900.0));
     pause(&mut driver);
     let before = driver.state().draft;
     assert!(!driver.is_enabled("Undo change of settings"));

@@ -16,6 +16,7 @@ mod habits;
 mod identifying;
 mod live;
 mod looking;
+mod newcomer;
 mod pictures;
 mod pressing;
 mod reading_errors;

@@ -10,11 +10,12 @@ use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
+use glam::DVec2;
 
 use super::{colours::hue_colour, per_pixel::per_pixel, plot_figure::Pointer};
 use crate::{
     app::theme::{Palette, Theme, space, type_size},
-    figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, Series},
+    figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels},
 };
 
 /// Opacity of the tint of a span of an axis.
@@ -87,6 +88,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
     ui.ctx()
         .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
     labels_ui(ui, plot, &shown.transform, id);
+    point_labels_ui(ui, plot, &shown.transform);
     (shown.transform, shown.response)
 }
 
@@ -236,6 +238,44 @@ fn draw_series(
         .shape(shape)
         .filled(is_filled);
     plot_ui.points(points.radius(radius).color(colour));
+}
+
+/// The words beside points.
+fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
+    let palette = Theme::of(ui).palette;
+    let frame = *transform.frame();
+    let painter = ui.painter().with_clip_rect(frame);
+    // Most plots have none.
+    if !plot.has_point_labels() {
+        return;
+    }
+    let (mut labels, mut galleys, mut marks) = (Vec::new(), Vec::new(), Vec::new());
+    let position = |[x, y]: [f64; 2]| {
+        let at = transform.position_from_point(&Place::new(x, y));
+        DVec2::new(f64::from(at.x), f64::from(at.y))
+    };
+    for series in &plot.series {
+        if series.look.line.is_some() {
+            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| position(place)).collect();
+            marks.extend(along(&line));
+        }
+        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
+            let at = position(place);
+            marks.push(at);
+            let Some(label) = &point.label else { continue };
+            let font = FontId::proportional(type_size().small);
+            let galley = painter.layout_no_wrap(label.clone(), font, palette.text);
+            let size = DVec2::new(f64::from(galley.size().x), f64::from(galley.size().y));
+            labels.push(PointLabel { at, size });
+            galleys.push(galley);
+        }
+    }
+    let [low, high] = [frame.min, frame.max].map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
+    for (corner, galley) in place_labels(&labels, &marks, (low, high)).into_iter().zip(galleys) {
+        if let Some(corner) = corner {
+            painter.galley(pos2(corner.x as f32, corner.y as f32), galley, palette.text);
+        }
+    }
 }
 
 /// The words at upright reference lines.

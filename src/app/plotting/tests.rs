@@ -197,7 +197,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
         microseconds: 1e9,
     };
     let trade_off = same("trade-off", trade_off_figure(&level, &limits));
-    for word in ["Network", "best preset, 32 bits", "Pareto front"] {
+    for word in ["Network", "best preset", "hollow: 32 bits", "Pareto front"] {
         assert!(trade_off.words.contains(word), "{word}: {trade_off:?}");
     }
     let settings = small(Preset::Paper);

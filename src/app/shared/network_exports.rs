@@ -140,7 +140,7 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
     }
     source.task(words, &format!("{format}-{precision}"), move |file, _| {
         Contents::telling(move |path| {
-            let report = export_bundle(&file, format, precision, path).map_err(|error| error.to_string())?;
+            let report = export_bundle(&*file, format, precision, path).map_err(|error| error.to_string())?;
             Ok(told(&report))
         })
     })
@@ -148,7 +148,7 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
 
 /// Sentence that tells of a bundle that was written.
 fn told(report: &BundleReport) -> String {
-    let deviation_mm = report.deviation() * report.output_range_mm;
+    let deviation_mm = report.deviation() * report.output_range_mm.unwrap_or_default();
     let mut text = format!(
         "{} written and read back: largest deviation {} mm. Saved {}",
         bundle_name(report.format),

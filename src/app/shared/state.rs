@@ -1,4 +1,4 @@
-use super::{Look, RunList, RunResult, RunView};
+use super::{Look, RunList, RunResult, RunView, opening_settings};
 use crate::{
     app::test_view::{HeightScale, TestView},
     evaluation::{Baselines, SimulatedSettings},
@@ -67,7 +67,7 @@ impl Shared {
     /// As the window opens.
     pub fn new(is_dark: bool) -> Self {
         Self {
-            draft: SimulatedSettings::default(),
+            draft: opening_settings(),
             phase: Phase::Idle,
             preview: None,
             run: None,

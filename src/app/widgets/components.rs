@@ -320,3 +320,19 @@ pub fn placeholder_ui(ui: &mut Ui, text: &str) {
         ui.label(text);
     });
 }
+
+/// A sentence in the middle of an empty card: what would be there, and the one click that brings it. Returns true if the
+/// user wants that.
+pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -> bool {
+    let dim = Theme::of(ui).palette.dim;
+    let width = ui.available_width().min(space(80));
+    let height = 3.0 * type_size().body + space(10);
+    let invited = ui.vertical_centered(|ui| {
+        ui.add_space((0.5 * (ui.available_height() - height)).max(0.0));
+        ui.set_max_width(width);
+        ui.label(RichText::new(text).color(dim));
+        ui.add_space(space(2));
+        ui.add_enabled(is_possible, ghost_button(button)).clicked()
+    });
+    invited.inner
+}

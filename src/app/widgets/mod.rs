@@ -4,6 +4,7 @@ mod components;
 mod fact;
 pub mod fields;
 mod fold;
+mod landmark;
 mod number_field;
 mod quantity_text;
 mod scrolled_table;
@@ -12,11 +13,12 @@ mod table;
 mod value_under;
 
 pub use components::{
-    card_ui, dim_ui, explained_options_ui, ghost_button, note_ui, placeholder_ui, primary_button, progress_bar_ui,
-    scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
+    card_ui, dim_ui, explained_options_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
+    progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, slider_style, state_ui, tabs_ui,
 };
 pub use fact::{coloured_fact_ui, fact_ui};
 pub use fold::{focus_ring_ui, fold_ui};
+pub use landmark::Landmark;
 pub use number_field::{number_ui, refusal_ui, usually};
 pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use snapshot::snapshot_ui;

@@ -1,8 +1,8 @@
 //! A small table of numbers: names on the left, columns as wide as their widest cell, digits aligned on the right.
 
 use eframe::egui::{
-    Align, Color32, FontId, Label, Layout, Rect, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
-    accesskit::Role, pos2,
+    Align, Color32, FontId, Label, Layout, Rect, RichText, Sense, Shape, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
+    accesskit::Role, pos2, vec2,
 };
 
 use super::{fields::capitalised, value_under::value_under};
@@ -22,6 +22,8 @@ pub struct Row {
     pub cells: Vec<String>,
     pub colour: Color32,
     pub is_strong: bool,
+    /// Meaning of a warning mark behind the name; empty for none.
+    pub mark: &'static str,
 }
 
 /// Lays out the table over the available width, in smaller type where that is narrow.
@@ -68,6 +70,9 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
             &mut |ui, at, rect| match at.checked_sub(1) {
                 None => {
                     let response = cell_ui(ui, rect, Align::Min, text(&capitalised(row.name)));
+                    if !row.mark.is_empty() {
+                        mark_ui(ui, response.rect, row.mark);
+                    }
                     if !row.meaning.is_empty() {
                         response.on_hover_text(row.meaning);
                     }
@@ -83,6 +88,25 @@ pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
             index + 1 == rows.len(),
         );
     }
+}
+
+/// Width of a mark with the room before it.
+const MARK_WIDTH: f32 = space(4);
+
+/// A small triangle that points up, behind a name.
+fn mark_ui(ui: &mut Ui, name: Rect, meaning: &'static str) {
+    let rect = Rect::from_center_size(
+        pos2(name.right() + 0.5 * MARK_WIDTH + 1.0, name.center().y),
+        Vec2::splat(MARK_WIDTH),
+    );
+    let (centre, half) = (rect.center(), 0.25 * MARK_WIDTH);
+    let corners = [vec2(0.0, -half), vec2(half, 0.8 * half), vec2(-half, 0.8 * half)].map(|corner| centre + corner);
+    let colour = Theme::of(ui).palette.warning;
+    ui.painter()
+        .add(Shape::convex_polygon(corners.into(), colour, Stroke::NONE));
+    let response = ui.interact(rect, ui.scope_id().with(("mark", meaning)), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, meaning));
+    response.on_hover_text(meaning);
 }
 
 /// The type size, the width of the names, and that of each column.
@@ -108,7 +132,7 @@ fn measured(ui: &Ui, columns: &[Column], rows: &[Row], size: f32) -> Measured {
     let heading = |column: &Column| width(column.heading, FontId::proportional(type_size().small));
     let names = rows
         .iter()
-        .map(|row| in_row(row, &capitalised(row.name)))
+        .map(|row| in_row(row, &capitalised(row.name)) + if row.mark.is_empty() { 0.0 } else { MARK_WIDTH })
         .fold(0.0, f32::max);
     let widths = columns.iter().enumerate().map(|(at, column)| {
         let cells = rows.iter().map(|row| in_row(row, &row.cells[at]));

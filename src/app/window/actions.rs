@@ -2,9 +2,10 @@ use eframe::egui::{Context, Key, Modifiers, Ui};
 
 use super::{
     DecouplerWindow,
-    keys_list::keys_list_ui,
-    palette::{Palette, Reply, palette_ui},
+    help::{self, Help, Page, help_ui},
+    palette::{self, Palette, palette_ui},
     top_bar::{DARK, LIGHT},
+    tour::Tour,
 };
 use crate::app::shared::{Action, Effect, Offers};
 
@@ -16,8 +17,8 @@ pub(super) enum Overlay {
     None,
     /// The list of all actions.
     Palette(Palette),
-    /// The list of all keys.
-    Keys,
+    /// The keys, or the glossary.
+    Help(Help),
 }
 
 /// Keys of the views, in the order of the top bar.
@@ -68,7 +69,18 @@ impl DecouplerWindow {
             self.overlay = Overlay::Palette(Palette::default());
         }
         if offers.offer_keys("Keys", Modifiers::NONE, Key::Questionmark, true) {
-            self.overlay = Overlay::Keys;
+            self.overlay = Overlay::Help(Help::default());
+        }
+        if offers.offer("Glossary", true) {
+            self.open_glossary("");
+        }
+        if offers.offer("Take the tour", true) {
+            self.begin_tour();
+        }
+        // Escape lifts the finger first.
+        let may_end = self.tour.is_some() && !self.views.train.press.is_pressing();
+        if offers.offer_keys("End the tour", Modifiers::NONE, Key::Escape, may_end) {
+            self.end_tour();
         }
         offers.into_actions()
     }
@@ -78,23 +90,46 @@ impl DecouplerWindow {
         self.saving.is_some() || self.closing.is_some() || !matches!(self.overlay, Overlay::None)
     }
 
+    /// Shows the terms that contain this.
+    fn open_glossary(&mut self, term: &str) {
+        self.overlay = Overlay::Help(Help {
+            page: Page::Glossary,
+            typed: term.to_owned(),
+        });
+    }
+
+    /// Begins the tour in the view that it is about.
+    fn begin_tour(&mut self) {
+        self.overlay = Overlay::None;
+        self.tour = Some(Tour::default());
+        self.show(0);
+    }
+
+    /// Ends the tour for good.
+    pub(super) fn end_tour(&mut self) {
+        self.tour = None;
+        self.remembered.has_toured = Some(true);
+    }
+
     /// Shows the list that the user asked for.
     pub(super) fn overlay_ui(&mut self, ui: &Ui, actions: &[Action]) {
-        let is_done = match &mut self.overlay {
-            Overlay::None => false,
+        match &mut self.overlay {
+            Overlay::None => return,
             Overlay::Palette(palette) => match palette_ui(ui, palette, actions) {
-                Some(Reply::Pick(name)) => {
+                Some(palette::Reply::Pick(name)) => {
                     self.picked = Some(name);
-                    true
+                    self.overlay = Overlay::None;
                 }
-                Some(Reply::Close) => true,
-                None => false,
+                Some(palette::Reply::Define(term)) => self.open_glossary(term),
+                Some(palette::Reply::Close) => self.overlay = Overlay::None,
+                None => return,
             },
-            Overlay::Keys => keys_list_ui(ui, actions),
-        };
-        if is_done {
-            self.overlay = Overlay::None;
-            ui.request_repaint();
+            Overlay::Help(help) => match help_ui(ui, help, actions) {
+                Some(help::Reply::Tour) => self.begin_tour(),
+                Some(help::Reply::Close) => self.overlay = Overlay::None,
+                None => return,
+            },
         }
+        ui.request_repaint();
     }
 }

@@ -18,12 +18,13 @@ use super::{
     remembered::{Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
     top_bar::{Reach, top_bar_ui},
+    tour::{self, Tour, tour_ui},
     undoing::Undoing,
 };
 use crate::app::{
     job::{Job, Wake},
     preview::PreviewEvent,
-    shared::{Effect, Matter, Notice, Phase, RunsWorker, Shared},
+    shared::{Action, Effect, Matter, Notice, Phase, RunsWorker, Shared},
     theme::{self, Theme, space},
     training_worker::Worker,
     views::Views,
@@ -51,6 +52,8 @@ pub struct DecouplerWindow {
     pub(super) closing: Option<Closing>,
     /// A list that lies over the window.
     pub(super) overlay: Overlay,
+    /// The tour, unless it has ended.
+    pub(super) tour: Option<Tour>,
     /// The name of the action picked from the list, to be done in the next frame.
     pub(super) picked: Option<String>,
     pub(super) undoing: Undoing,
@@ -96,6 +99,8 @@ impl DecouplerWindow {
             dialogs: Dialogs::new(dialogs),
             closing: None,
             overlay: Overlay::None,
+            // A window that cannot remember its end would begin it at every start.
+            tour: (file.is_some() && remembered.has_toured != Some(true)).then(Tour::default),
             picked: None,
             undoing: Undoing::default(),
             memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
@@ -249,6 +254,7 @@ impl DecouplerWindow {
         }
         self.undoing.follow(ui.input(|input| input.time), &self.shared.draft);
         self.overlay_ui(ui, &actions);
+        self.tour_ui(ui, &actions);
         self.ask_for_path(ui);
         self.remember();
         // What was begun in this frame must be finished too.
@@ -261,6 +267,20 @@ impl DecouplerWindow {
         for effect in effects {
             self.apply(effect);
         }
+    }
+
+    /// Shows the tour where nothing lies over the window, and does what the user wants of it.
+    fn tour_ui(&mut self, ui: &Ui, actions: &[Action]) {
+        let Some(tour) = self.tour.filter(|_| !self.is_asked()) else {
+            return;
+        };
+        match tour_ui(ui, tour, actions) {
+            Some(tour::Reply::Show(tour)) => self.tour = Some(tour),
+            Some(tour::Reply::Do(name)) => self.picked = Some(name.to_owned()),
+            Some(tour::Reply::End) => self.end_tour(),
+            None => return,
+        }
+        self.ctx.request_repaint();
     }
 
     fn ask_for_path(&mut self, ui: &mut Ui) {

@@ -8,7 +8,7 @@ use eframe::egui::{
 use crate::app::{
     shared::{Ask, Effect, Export},
     theme::{Theme, space, type_size},
-    widgets::{ghost_button, section_heading_ui},
+    widgets::{Landmark, ghost_button, section_heading_ui},
 };
 
 const WIDTH: f32 = space(88);
@@ -37,6 +37,7 @@ pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Expo
             });
         });
     });
+    Landmark::Export.stands_at(ui, button.rect);
     button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
 }
 

@@ -11,8 +11,8 @@ mod dialogs;
 mod export_menu;
 mod files;
 mod frames;
+mod help;
 mod interface_scale;
-mod keys_list;
 mod memory;
 mod news;
 mod notice;
@@ -24,6 +24,7 @@ mod save_form;
 #[cfg(test)]
 mod tests;
 mod top_bar;
+mod tour;
 mod undoing;
 
 pub use decoupler_window::DecouplerWindow;

@@ -4,6 +4,7 @@ use eframe::egui::{
 };
 
 use crate::app::{
+    glossary::{self, Term},
     shared::Action,
     theme::{Theme, space},
     widgets::dim_ui,
@@ -22,6 +23,8 @@ pub(super) struct Palette {
 pub(super) enum Reply {
     /// Do the action of this name.
     Pick(String),
+    /// Explain this term.
+    Define(&'static str),
     /// Nothing.
     Close,
 }
@@ -33,12 +36,13 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
     let modal = Modal::new(Id::unique("palette")).frame(frame).show(ui.ctx(), |ui| {
         ui.set_width(space(110));
         let found = matching(actions, &palette.typed);
+        let terms = terms(&palette.typed);
         // Before the field, in which arrows and Enter mean something else.
         let (down, up, enter) = ui.input_mut(|input| {
             let mut take = |key| input.consume_key(eframe::egui::Modifiers::NONE, key);
             (take(Key::ArrowDown), take(Key::ArrowUp), take(Key::Enter))
         });
-        let last = found.len().saturating_sub(1);
+        let last = (found.len() + terms.len()).saturating_sub(1);
         palette.marked = palette.marked.min(last);
         if down {
             palette.marked = (palette.marked + 1).min(last);
@@ -68,8 +72,18 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
                     reply = Some(Reply::Pick(action.name.clone()));
                 }
             }
-            if found.is_empty() {
-                dim_ui(ui, "No action is called so.");
+            for (place, term) in terms.iter().enumerate() {
+                let is_marked = found.len() + place == palette.marked;
+                let row = term_ui(ui, term, is_marked);
+                if is_marked && (down || up) {
+                    row.scroll_to_me(None);
+                }
+                if row.clicked() || (is_marked && enter) {
+                    reply = Some(Reply::Define(term.name));
+                }
+            }
+            if found.is_empty() && terms.is_empty() {
+                dim_ui(ui, "No action or term is called so.");
             }
         });
     });
@@ -99,6 +113,29 @@ fn action_ui(ui: &mut Ui, action: &Action, is_marked: bool) -> eframe::egui::Res
     });
     let reason = "There is nothing to do this with now.";
     line.inner.on_disabled_hover_text(reason)
+}
+
+/// A term of the glossary. Returns the response of the whole line.
+fn term_ui(ui: &mut Ui, term: &Term, is_marked: bool) -> eframe::egui::Response {
+    let dim = Theme::of(ui).palette.dim;
+    let button = Button::selectable(is_marked, term.name)
+        .min_size(vec2(ui.available_width(), space(7)))
+        .right_text(RichText::new("Glossary").color(dim));
+    let button = ui.add(button);
+    let label = format!("{} in the glossary", term.name);
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
+    button.on_hover_text(term.hint)
+}
+
+/// The terms in whose names the words of `typed` occur; none while nothing is typed.
+fn terms(typed: &str) -> Vec<Term> {
+    let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
+    let all = glossary::groups().into_iter().flat_map(|group| group.terms);
+    let is_called_so = |term: &Term| {
+        let name = term.name.to_lowercase();
+        !words.is_empty() && words.iter().all(|word| name.contains(word))
+    };
+    all.filter(is_called_so).collect()
 }
 
 /// The actions in whose names the words of `typed` occur in any order, those that can be done first.

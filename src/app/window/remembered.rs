@@ -26,6 +26,9 @@ pub(super) struct Remembered {
     /// The theme, if the user has chosen one.
     #[serde(deserialize_with = "if_readable")]
     pub(super) is_dark: Option<bool>,
+    /// True once the user has ended the tour.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) has_toured: Option<bool>,
     /// Colours of values, if the user has chosen them.
     #[serde(deserialize_with = "if_readable")]
     pub(super) colours: Option<SequentialMap>,

@@ -16,11 +16,12 @@ pub struct Determination {
 /// How well readings tell a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// R² is at least 0.5.
+    /// Neither of the others.
     Told,
-    /// R² is below 0.5.
+    /// R² is below 0.5: more of the target's variance remains than the readings explain.
     HardlyTold,
-    /// R² is below 0.1, or its interval reaches 0.
+    /// The interval of R² reaches 0, so that always answering the mean may be as good; or R² is below 0.1, so that the
+    /// error is within 5 % (√0.9) of that of the mean.
     NotTold,
 }
 

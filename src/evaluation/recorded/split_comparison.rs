@@ -1,6 +1,6 @@
 use crate::{
     dataset::{Dataset, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, RunError, RunSettings, TargetErrors},
+    evaluation::{CrossValidated, RunError, RunSettings, TargetErrors, TargetRow},
 };
 
 /// Held-out errors of the same settings on the same samples, once with folds by time or group, once with random folds:
@@ -43,14 +43,30 @@ impl SplitComparison {
         let Some(random) = validate(SplitBy::Random)? else {
             return Ok(None);
         };
-        let errors = |answers: &ndarray::Array2<f64>| TargetErrors::measure(set.targets(), answers.view());
-        Ok(Some(Self {
+        Ok(Some(Self::of(
             by,
-            network: errors(&honest.network),
-            ridge: errors(&honest.linear),
-            random_network: errors(&random.network),
-            random_ridge: errors(&random.linear),
-        }))
+            [honest, random].map(|validated| validated.target_table(set)),
+        )))
+    }
+
+    /// Compares the tables of errors of two runs or cross-validations, by `by` and at random: [`Run::target_table`](crate::evaluation::Run::target_table) or
+    /// [`CrossValidated::target_table`].
+    ///
+    /// # Panics
+    /// If a table does not have the mean, ridge and the network.
+    pub fn of(by: SplitBy, [honest, random]: [Vec<TargetRow>; 2]) -> Self {
+        let errors = |table: Vec<TargetRow>| -> [Vec<TargetErrors>; 2] {
+            let mut rows = table.into_iter().skip(1).map(|row| row.targets);
+            std::array::from_fn(|_| rows.next().expect("the table has ridge and the network"))
+        };
+        let ([ridge, network], [random_ridge, random_network]) = (errors(honest), errors(random));
+        Self {
+            by,
+            network,
+            ridge,
+            random_network,
+            random_ridge,
+        }
     }
 
     /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds flatter.

@@ -21,6 +21,11 @@ pub enum BundleError {
     /// The readings with which the bundle is verified could not be drawn.
     #[error("no readings to verify the bundle: {0}")]
     Readings(#[from] Box<RunError>),
+    /// The file of own data does not tell the range of the readings.
+    #[error(
+        "the network file does not have the range of the readings in training, without which no bundle can be verified: train again"
+    )]
+    NoRange,
     /// Something is in the place of the bundle.
     #[error("'{}' is there already: give another name, or delete it first", .0.display())]
     Exists(PathBuf),

@@ -4,13 +4,12 @@ use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
     error::BundleError,
+    exported_network::{ExportedNetwork, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
-    matlab,
-    metadata::{Metadata, metadata},
-    numpy, onnx,
+    matlab, numpy, onnx,
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
@@ -18,32 +17,32 @@ use super::{
     vectors::Vectors,
     weights::{Arithmetic, Digits, Weights},
 };
-use crate::export::NetworkFile;
 
-/// Writes the network of `file` as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
+/// Writes a network as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
 /// read back and compared with the network before it is put in its place.
 ///
 /// # Errors
 /// The format lacks the precision, the network cannot be written in it, `path` is taken or cannot be written, or the
 /// bundle deviates from the network. Nothing is left behind.
-pub fn export_bundle(
-    file: &NetworkFile,
+pub fn export_bundle<'a>(
+    network: impl Into<ExportedNetwork<'a>>,
     format: BundleFormat,
     precision: BundlePrecision,
     path: &Path,
 ) -> Result<BundleReport, BundleError> {
+    let exported = network.into();
     format.check(precision)?;
     if format == BundleFormat::Json {
-        return export_network_file(file, path);
+        return export_network_file(exported, path);
     }
     let folder = AtomicFolder::create(path)?;
-    let portable = Portable::of(file)?;
+    let portable = Portable::of(exported)?;
     let bundle = Bundle {
-        file,
+        exported,
         name: identifier(path),
         format,
         precision,
-        metadata: metadata(file, &portable, precision),
+        metadata: exported.metadata(&portable, precision),
         portable,
         folder,
     };
@@ -62,22 +61,21 @@ pub fn export_bundle(
 }
 
 /// Copies the network file.
-fn export_network_file(file: &NetworkFile, path: &Path) -> Result<BundleReport, BundleError> {
+fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<BundleReport, BundleError> {
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
     let trial = tempfile::tempdir().map_err(|error| crate::export::WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    file.save(&copy)?;
-    let read = NetworkFile::load(&copy)?;
-    if read.network != file.network || read.settings != file.settings {
+    exported.save(&copy)?;
+    if !exported.is_saved_at(&copy)? {
         return Err(BundleError::ReadBack {
             file: path.display().to_string(),
             reason: "it is another network".to_owned(),
         });
     }
-    file.save(path)?;
-    let portable = Portable::of(file)?;
+    exported.save(path)?;
+    let portable = Portable::of(exported)?;
     let size = fs::metadata(path).map_or(0, |found| found.len());
     Ok(BundleReport {
         format: BundleFormat::Json,
@@ -90,7 +88,7 @@ fn export_network_file(file: &NetworkFile, path: &Path) -> Result<BundleReport, 
             deviation: 0.0,
         }],
         limit: 0.0,
-        output_range_mm: portable.full_scale_mm,
+        output_range_mm: portable.output_range_mm(),
         program_deviation: 0.0,
         bound_mm: None,
         remarks: Vec::new(),
@@ -102,8 +100,8 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     /// Part of the limit that single precision may use in this evaluation: others add up in another order.
     const PART: f64 = 0.2;
     let single = Weights::of(portable, Arithmetic::SINGLE);
-    let deviation_mm = vectors.deviation_mm(|vector| single.decode(vector.network, &vector.readings_ohm));
-    if deviation_mm <= PART * Tolerance::SINGLE * portable.full_scale_mm {
+    let deviation = vectors.deviation(|vector| single.decode(vector.network, &vector.readings));
+    if deviation <= PART * Tolerance::SINGLE {
         Arithmetic::SINGLE
     } else {
         Arithmetic::MIXED
@@ -112,7 +110,7 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
 
 /// A bundle in the making.
 struct Bundle<'a> {
-    file: &'a NetworkFile,
+    exported: ExportedNetwork<'a>,
     name: String,
     format: BundleFormat,
     precision: BundlePrecision,
@@ -123,7 +121,7 @@ struct Bundle<'a> {
 
 impl Bundle<'_> {
     fn vectors(&self, representable: impl Fn(f64) -> f64) -> Result<Vectors, BundleError> {
-        Vectors::of(self.file, &self.portable, representable)
+        Vectors::of(self.exported, &self.portable, representable)
     }
 
     fn export_floating(
@@ -134,11 +132,9 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| {
-            vectors.deviation_mm(|vector| weights.decode(vector.network, &vector.readings_ohm)) / portable.full_scale_mm
-        };
+        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
         let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights));
-        let mut remarks = tolerance.remarks(arithmetic);
+        let mut remarks = tolerance.remarks(arithmetic, portable);
         let mut checks = Vec::new();
         let mut check = |evaluator, deviation| checks.push(BundleCheck { evaluator, deviation });
         match self.format {
@@ -147,19 +143,20 @@ impl Bundle<'_> {
                     .write("network.onnx", onnx::write(portable, &weights, &self.metadata))?;
                 let damaged = |reason| read_back("network.onnx", reason);
                 let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
-                let mut answers = graph.decode(vectors.all()).map_err(damaged)?.coordinates_mm.into_iter();
-                let deviation_mm = vectors.deviation_mm(|_| answers.next().unwrap_or_default());
-                check(
-                    "ONNX graph, read back and evaluated",
-                    deviation_mm / portable.full_scale_mm,
-                );
+                let answers = graph.decode(vectors.all()).map_err(damaged)?.answers;
+                if answers.len() != vectors.all().len() {
+                    return Err(read_back("network.onnx", "it has another number of answers".to_owned()));
+                }
+                let mut answers = answers.into_iter();
+                let deviation = vectors.deviation(|_| answers.next().unwrap_or_default());
+                check("ONNX graph, read back and evaluated", deviation);
             }
             BundleFormat::NumPy => {
                 self.folder
                     .write("network.npz", numpy::write_weights(portable, &weights))?;
                 self.folder
                     .write("decode.py", numpy::write_program(portable, arithmetic))?;
-                let read = numpy::read_weights(&self.read("network.npz")?, portable.quantity);
+                let read = numpy::read_weights(&self.read("network.npz")?, portable);
                 let read = read.map_err(|reason| read_back("network.npz", reason))?;
                 check("NumPy weights, read back and evaluated", model(&read));
             }
@@ -192,19 +189,19 @@ impl Bundle<'_> {
         let vectors = self.vectors(|ohm| f64::from(fixed.reading(ohm)) * unit_ohm)?;
         // The bound holds for these.
         let vectors = vectors.inside(&self.portable);
-        let limit = fixed.bound_mm / self.portable.full_scale_mm;
+        let limit = fixed.bound_mm / fixed.range_mm;
         let files = c99::write_fixed(&self.name, &self.portable, &fixed, vectors.golden(), limit);
         for (name, text) in files {
             self.folder.write(&name, text)?;
         }
         let in_mm = |nm: Vec<i32>| nm.into_iter().map(|nm| f64::from(nm) * 1e-6).collect();
-        let deviation_mm = vectors.deviation_mm(|vector| {
-            let coordinates_nm = fixed.decode(vector.network, &vector.readings_ohm);
+        let deviation = vectors.deviation(|vector| {
+            let coordinates_nm = fixed.decode(vector.network, &vector.readings);
             coordinates_nm.map(in_mm).unwrap_or_default()
         });
         let mut checks = vec![BundleCheck {
             evaluator: "bit-exact model in whole numbers",
-            deviation: deviation_mm / self.portable.full_scale_mm,
+            deviation,
         }];
         let mut remarks = Vec::new();
         if fixed.hidden_width == HiddenWidth::TwentyFour {
@@ -264,8 +261,8 @@ impl Bundle<'_> {
             },
             checks,
             limit,
-            output_range_mm: portable.full_scale_mm,
-            program_deviation: vectors.program_deviation_mm / portable.full_scale_mm,
+            output_range_mm: portable.output_range_mm(),
+            program_deviation: vectors.program_deviation,
             bound_mm: fixed.map(|fixed| fixed.bound_mm),
             remarks,
         };
@@ -274,9 +271,8 @@ impl Bundle<'_> {
         let metadata = serde_json::to_string_pretty(&self.metadata)
             .map_err(|error| read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
-        let array = self.file.settings.source.sensor.scale.to_string();
         self.folder
-            .write("README.txt", readme(&self.name, &array, portable, fixed, &report))?;
+            .write("README.txt", readme(&self.name, portable, fixed, &report))?;
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)

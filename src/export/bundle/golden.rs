@@ -1,27 +1,25 @@
-use std::fmt::Write;
+use super::{portable::Portable, vectors::Vector};
 
-use super::{
-    metadata::{coordinate_names, reading_names},
-    portable::Portable,
-    vectors::Vector,
-};
-
-/// Writes the golden vectors as CSV: the row-wire from 1 where it is an argument, readings in ohm, coordinates in mm.
+/// Writes the golden vectors as CSV: the row from 1 where it is an argument, readings, outputs.
 pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
-    let mut names = reading_names(portable);
-    names.extend(coordinate_names(portable));
-    if portable.takes_row() {
-        names.insert(0, "row".to_owned());
-    }
-    let mut text = names.join(",") + "\n";
+    let meaning = &portable.meaning;
+    let row = portable.takes_row().then(|| "row".to_owned());
+    let names = row.into_iter().chain(
+        meaning
+            .inputs()
+            .into_iter()
+            .chain(meaning.targets())
+            .map(|channel| channel.name),
+    );
+    // The names of users may have commas.
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut write = |fields: Vec<String>| writer.write_record(fields).expect("memory takes everything");
+    write(names.collect());
     for vector in vectors {
-        let mut fields: Vec<String> = Vec::new();
-        if portable.takes_row() {
-            fields.push((vector.network + 1).to_string());
-        }
-        let numbers = vector.readings_ohm.iter().chain(&vector.coordinates_mm);
-        fields.extend(numbers.map(f64::to_string));
-        let _ = writeln!(text, "{}", fields.join(","));
+        let row = portable.takes_row().then(|| (vector.network + 1).to_string());
+        let numbers = vector.readings.iter().chain(&vector.answers).map(f64::to_string);
+        write(row.into_iter().chain(numbers).collect());
     }
-    text
+    let bytes = writer.into_inner().expect("memory takes everything");
+    String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{
-    metadata::coordinate_names,
+    meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, RoundedNetwork, Weights},
 };
@@ -12,8 +12,11 @@ use crate::network::Quantity;
 /// Matrices of the file: their names and numbers of columns, and the part of each network.
 type Matrix = (&'static str, fn(&RoundedNetwork) -> &Vec<f64>);
 
+/// Stands for [`Meaning::centre`].
+const CENTRE: &str = "";
+
 const MATRICES: [Matrix; 5] = [
-    ("centre_ohm", |network| &network.centre_ohm),
+    (CENTRE, |network| &network.centre),
     ("hidden_weights", |network| &network.hidden_weights),
     ("hidden_biases", |network| &network.hidden_biases),
     ("output_weights", |network| &network.output_weights),
@@ -23,14 +26,15 @@ const MATRICES: [Matrix; 5] = [
 /// Writes the function `name`. The matrices of the rows stand one below the other.
 pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {
     let (channels, rows) = (portable.channels, portable.networks.len());
+    let (input, output) = (portable.meaning.readings(), portable.meaning.outputs());
     let ranges = portable.ranges();
     let (argument, help, check) = if portable.takes_row() {
         (
             ", row",
-            format!("%   ROW has the row-wire of each sample, from 1 to {rows}; one number stands for all.\n"),
+            format!("%   ROW has the row of each sample, from 1 to {rows}; one number stands for all.\n"),
             format!(
                 "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
-                 ~all(ismember(row, 1:{rows}))\n    error('row: give the row-wire of each sample, from 1 to {rows}');\n\
+                 ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\n\
                  end\n"
             ),
         )
@@ -44,67 +48,86 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
         None => "zeros, because the range of the readings in training is not known",
     };
     let (is_reading, readings) = match portable.quantity {
-        Quantity::Raw => ("isfinite(resistances_ohm(:))", "finite numbers"),
+        Quantity::Raw => (format!("isfinite({input}(:))"), "finite numbers"),
         _ => (
-            "isfinite(resistances_ohm(:)) & resistances_ohm(:) > 0",
+            format!("isfinite({input}(:)) & {input}(:) > 0"),
             "finite numbers above 0",
         ),
     };
+    let centre = portable.meaning.centre();
     let change = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => "r - centre_ohm(k, :)",
-        Quantity::Conductance => "(centre_ohm(k, :) - r) ./ r",
-        Quantity::LogResistance => "log1p((r - centre_ohm(k, :)) ./ centre_ohm(k, :))",
+        Quantity::Resistance | Quantity::Raw => format!("r - {centre}(k, :)"),
+        Quantity::Conductance => format!("({centre}(k, :) - r) ./ r"),
+        Quantity::LogResistance => format!("log1p((r - {centre}(k, :)) ./ {centre}(k, :))"),
     };
-    let names = coordinate_names(portable);
+    let outputs = portable.outputs;
+    let (upper, upper_argument) = (name.to_uppercase(), argument.to_uppercase());
+    let (upper_input, upper_output) = (input.to_uppercase(), output.to_uppercase());
+    let purpose = match &portable.meaning {
+        Meaning::Array(_) => format!(
+            "%{upper} Decodes readings of a tactile array into the coordinates of its nodes.\n\
+             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {outputs} coordinates in mm (x_1, y_1, z_1, to {last})\n\
+             %   for each line of {channels} resistances in ohm (r_1 to r_{channels}).\n",
+            last = portable.meaning.targets().last().map_or("", |target| &target.name),
+        ),
+        own @ Meaning::Own { .. } => format!(
+            "%{upper} Decodes readings into targets.\n\
+             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {outputs} targets for each line of {channels} readings.\n\
+             %   {legend}\n",
+            legend = own.legend().join("\n%   "),
+        ),
+    };
     let mut text = format!(
-        "function [coordinates_mm, readings_outside] = {name}(resistances_ohm{argument})\n\
-         %{upper} Decodes readings of a tactile array into the coordinates of its nodes.\n\
-         %   COORDINATES_MM = {upper}(RESISTANCES_OHM{upper_argument}) has a line of {outputs} coordinates in mm (x_1, y_1, z_1, to {last})\n\
-         %   for each line of {channels} resistances in ohm (r_1 to r_{channels}).\n\
+        "function [{output}, readings_outside] = {name}({input}{argument})\n\
+         {purpose}\
          {help}\
-         %   [COORDINATES_MM, READINGS_OUTSIDE] = ... also has {counted}.\n\
+         %   [{upper_output}, READINGS_OUTSIDE] = ... also has {counted}.\n\
          \n\
-         samples = size(resistances_ohm, 1);\n\
-         if size(resistances_ohm, 2) ~= {channels} || ~all({is_reading})\n    \
-         error('resistances_ohm: give {channels} columns of {readings}');\n\
+         samples = size({input}, 1);\n\
+         if size({input}, 2) ~= {channels} || ~all({is_reading})\n    \
+         error('{input}: give {channels} columns of {readings}');\n\
          end\n\
          {check}",
-        upper = name.to_uppercase(),
-        upper_argument = argument.to_uppercase(),
-        outputs = portable.outputs,
-        last = names.last().map_or("", String::as_str),
     );
     for (matrix, of) in MATRICES {
         let columns = match matrix {
-            "centre_ohm" => channels,
+            CENTRE => channels,
             "hidden_weights" | "hidden_biases" => portable.hidden,
             _ => portable.outputs,
         };
         let values = weights.networks.iter().flat_map(|network| of(network).iter().copied());
-        push_matrix(&mut text, matrix, columns, values);
+        push_matrix(&mut text, name_of(matrix, portable), columns, values);
     }
-    let mut outside = "";
+    let mut outside = String::new();
     if let Some(ranges) = &ranges {
         let limits = || ranges.iter().flat_map(|range| &range.limits);
-        push_matrix(&mut text, "lowest_ohm", channels, limits().map(|limits| limits.0));
-        push_matrix(&mut text, "highest_ohm", channels, limits().map(|limits| limits.1));
-        outside = "    readings_outside(mine) = sum(r < lowest_ohm(k, :) | r > highest_ohm(k, :), 2);\n";
+        let [lowest, highest] = portable.meaning.limits();
+        push_matrix(&mut text, lowest, channels, limits().map(|limits| limits.0));
+        push_matrix(&mut text, highest, channels, limits().map(|limits| limits.1));
+        outside = format!("    readings_outside(mine) = sum(r < {lowest}(k, :) | r > {highest}(k, :), 2);\n");
     }
     text + &format!(
-        "coordinates_mm = zeros(samples, {outputs});\n\
+        "{output} = zeros(samples, {outputs});\n\
          readings_outside = zeros(samples, 1);\n\
          for k = 1:{rows}\n    \
          mine = find(row(:) == k);\n    \
-         r = resistances_ohm(mine, :);\n    \
+         r = {input}(mine, :);\n    \
          change = {change};\n    \
          hidden = tanh(change * hidden_weights((k - 1) * {channels} + (1:{channels}), :) + hidden_biases(k, :));\n    \
-         coordinates_mm(mine, :) = hidden * output_weights((k - 1) * {hidden} + (1:{hidden}), :) + output_biases(k, :);\n\
+         {output}(mine, :) = hidden * output_weights((k - 1) * {hidden} + (1:{hidden}), :) + output_biases(k, :);\n\
          {outside}\
          end\n\
          end\n",
-        outputs = portable.outputs,
         hidden = portable.hidden,
     )
+}
+
+fn name_of(matrix: &'static str, portable: &Portable) -> &'static str {
+    if matrix == CENTRE {
+        portable.meaning.centre()
+    } else {
+        matrix
+    }
 }
 
 fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Iterator<Item = f64>) {
@@ -128,6 +151,7 @@ fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Itera
 pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
     let mut of_networks = vec![[const { Vec::new() }; MATRICES.len()]; portable.networks.len()];
     for (index, (name, of)) in MATRICES.iter().enumerate() {
+        let name = name_of(name, portable);
         let missing = || format!("the matrix {name} is missing or damaged");
         let rest = text.split(&format!("\n{name} = [")).nth(1).ok_or_else(missing)?;
         let inside = rest
@@ -151,8 +175,8 @@ pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, S
         }
     }
     let networks = of_networks.into_iter().map(
-        |[centre_ohm, hidden_weights, hidden_biases, output_weights, output_biases]| RoundedNetwork {
-            centre_ohm,
+        |[centre, hidden_weights, hidden_biases, output_weights, output_biases]| RoundedNetwork {
+            centre,
             hidden_weights,
             hidden_biases,
             output_weights,

@@ -1,55 +1,54 @@
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::twofold::Twofold;
-use crate::{
-    export::NetworkFile,
-    network::{DecouplingNetwork, InputScaling, Quantity},
-};
+use super::{exported_network::ExportedNetwork, meaning::Meaning, twofold::Twofold};
+use crate::network::{DecouplingNetwork, InputScaling, Quantity};
 
-/// Everything that a network computes, from readings in ohm to coordinates in mm, with all scaling folded into its
-/// weights. Every writer starts from it.
+/// Everything that a network computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
+/// the targets), with all scaling folded into its weights. Every writer starts from it.
 ///
-/// A hidden node adds up `weight · x + bias`, where x is the change of a reading r from a resistance R₀ in the middle of
-/// its channel. The change is computed from the difference r − R₀, so that a number of few digits loses nothing where
+/// A hidden node adds up `weight · x + bias`, where x is the change of a reading r from a value R₀ in the middle of its
+/// channel. The change is computed from the difference r − R₀, so that a number of few digits loses nothing where
 /// readings differ little:
 ///
 /// | quantity | change x |
 /// |---|---|
-/// | resistance | r − R₀ |
+/// | resistance, raw | r − R₀ |
 /// | conductance | (R₀ − r)/r, the relative change of 1/r |
 /// | logarithm | ln(1 + (r − R₀)/R₀) |
 #[derive(Clone, Debug)]
 pub(super) struct Portable {
     pub(super) quantity: Quantity,
-    /// Number of readings of a row-wire, M4.
+    /// What readings and outputs are.
+    pub(super) meaning: Meaning,
+    /// Number of readings of a row, M4 of an array.
     pub(super) channels: usize,
     pub(super) hidden: usize,
-    /// Number of coordinates of a row-wire, 3·M2.
+    /// Number of outputs, 3·M2 of an array.
     pub(super) outputs: usize,
     /// One for all row-wires, or one for each, from the first.
     pub(super) networks: Vec<PortableNetwork>,
-    /// Widest range of a coordinate in training, in mm: deviations are relative to it.
-    pub(super) full_scale_mm: f64,
+    /// What deviations of each output are relative to: the widest range of any in training for the coordinates of an array,
+    /// and its own range for a target of own data, as units differ.
+    pub(super) scales: Vec<f64>,
 }
 
 /// One network of a [`Portable`].
 #[derive(Clone, Debug)]
 pub(super) struct PortableNetwork {
     /// R₀ of each channel, exact in single precision.
-    pub(super) centre_ohm: Vec<f64>,
+    pub(super) centre: Vec<f64>,
     /// Channels × hidden nodes.
     pub(super) hidden_weights: Array2<Twofold>,
     pub(super) hidden_biases: Vec<Twofold>,
-    /// Hidden nodes × coordinates, in mm; zero for coordinates that were constant in training.
+    /// Hidden nodes × outputs; zero for outputs that were constant in training.
     pub(super) output_weights: Array2<Twofold>,
-    /// In mm.
     pub(super) output_biases: Vec<Twofold>,
     /// Readings in training.
     pub(super) range: Option<ChannelRanges>,
 }
 
-/// Readings of each channel in training, in ohm.
+/// Readings of each channel in training.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ChannelRanges {
     /// Smallest and largest reading.
@@ -76,12 +75,12 @@ pub enum FoldError {
 }
 
 impl Portable {
-    /// Folds the scaling of the networks in `file` into their weights.
+    /// Folds the scaling of the networks of `exported` into their weights.
     ///
     /// # Errors
     /// A folded weight is not a finite number, or the networks read different quantities.
-    pub(super) fn of(file: &NetworkFile) -> Result<Self, FoldError> {
-        let networks = file.network.values();
+    pub(super) fn of(exported: ExportedNetwork<'_>) -> Result<Self, FoldError> {
+        let networks = exported.networks().values();
         let first = &networks[0];
         let quantity = first.inputs().quantity();
         if networks.iter().any(|network| network.inputs().quantity() != quantity) {
@@ -92,21 +91,19 @@ impl Portable {
             return Err(FoldError::NotFinite { network: index + 1 });
         }
         let outputs = first.outputs().channels();
-        let extremes = networks
-            .iter()
-            .flat_map(|network| (0..outputs).map(|output| network.outputs().extremes(output)));
-        let (width_mm, largest_mm) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
-            (width.max(high - low), largest.max(low.abs()).max(high.abs()))
-        });
-        // Networks of which nothing varied answer constants, and deviations are relative to these.
-        let full_scale_mm = [width_mm, largest_mm, 1.0].into_iter().find(|&scale| scale > 0.0);
+        let meaning = exported.meaning();
+        let scales = match &meaning {
+            Meaning::Array(_) => vec![scale(networks, 0..outputs); outputs],
+            Meaning::Own { .. } => (0..outputs).map(|output| scale(networks, output..output + 1)).collect(),
+        };
         Ok(Self {
+            meaning,
             quantity,
             channels: first.inputs().channels(),
             hidden: first.mlp().shape().hidden,
             outputs,
             networks: folded,
-            full_scale_mm: full_scale_mm.unwrap_or(1.0),
+            scales,
         })
     }
 
@@ -115,20 +112,40 @@ impl Portable {
         self.networks.len() > 1
     }
 
+    /// Widest range of a coordinate of an array in training; `None` for own data.
+    pub(super) fn output_range_mm(&self) -> Option<f64> {
+        match self.meaning {
+            Meaning::Array(_) => self.scales.first().copied(),
+            Meaning::Own { .. } => None,
+        }
+    }
+
     /// The ranges of all networks in training, if all are known.
     pub(super) fn ranges(&self) -> Option<Vec<&ChannelRanges>> {
         self.networks.iter().map(|network| network.range.as_ref()).collect()
     }
 }
 
+/// Widest range in training among these outputs.
+fn scale(networks: &[DecouplingNetwork], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = networks
+        .iter()
+        .flat_map(|network| outputs.clone().map(|output| network.outputs().extremes(output)));
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
+        (width.max(high - low), largest.max(low.abs()).max(high.abs()))
+    });
+    // Outputs that did not vary are constants, and deviations are relative to these.
+    [width, largest].into_iter().find(|&scale| scale > 0.0).unwrap_or(1.0)
+}
+
 impl PortableNetwork {
     fn of(network: &DecouplingNetwork) -> Self {
         let (inputs, mlp) = (network.inputs(), network.mlp());
         let (quantity, shape) = (inputs.quantity(), mlp.shape());
-        let (centre, _) = inputs.affine();
+        let (middles, _) = inputs.affine();
         let matrix = scaling_matrix(inputs.scaling());
         // Rounded to single precision, so that r − R₀ is the same number in both; the biases take up the rest.
-        let centre_ohm: Vec<f64> = centre
+        let centre: Vec<f64> = middles
             .iter()
             .map(|&value| f64::from(quantity.resistance_ohm(value) as f32))
             .collect();
@@ -138,7 +155,7 @@ impl PortableNetwork {
             products.fold(Twofold::ZERO, |sum, product| sum + product)
         });
         let hidden_biases = (0..shape.hidden).map(|node| {
-            let rests = centre_ohm.iter().zip(&centre).enumerate();
+            let rests = centre.iter().zip(&middles).enumerate();
             rests.fold(
                 Twofold::from(w[[shape.inputs, node]]),
                 |bias, (channel, (&ohm, &value))| {
@@ -148,7 +165,7 @@ impl PortableNetwork {
         });
         let hidden_biases = hidden_biases.collect();
         let per_change = |channel: usize| match quantity {
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(centre_ohm[channel]),
+            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(centre[channel]),
             Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => Twofold::from(1.0),
         };
         let hidden_weights = Array2::from_shape_fn(of_value.dim(), |(channel, node)| {
@@ -172,7 +189,7 @@ impl PortableNetwork {
                 .collect(),
         });
         Self {
-            centre_ohm,
+            centre,
             hidden_weights,
             hidden_biases,
             output_weights,
@@ -185,8 +202,7 @@ impl PortableNetwork {
         let weights = self.hidden_weights.iter().chain(&self.hidden_biases);
         let mut all = weights.chain(&self.output_weights).chain(&self.output_biases);
         // Single precision has a smaller range.
-        all.all(|weight| (weight.to_f64() as f32).is_finite())
-            && self.centre_ohm.iter().all(|&ohm| quantity.accepts(ohm))
+        all.all(|weight| (weight.to_f64() as f32).is_finite()) && self.centre.iter().all(|&ohm| quantity.accepts(ohm))
     }
 }
 

@@ -4,36 +4,44 @@ use super::{
     c99,
     choice::{BundleFormat, BundlePrecision},
     fixed_point::FixedNetworks,
-    metadata::coordinate_names,
+    meaning::Meaning,
     portable::Portable,
     report::BundleReport,
 };
-use crate::export::format_number;
+use crate::{export::format_number, network::Quantity};
 
 /// Writes the README of a bundle: how to call it, and what it is worth.
-pub(super) fn readme(
-    name: &str,
-    array: &str,
-    portable: &Portable,
-    fixed: Option<&FixedNetworks>,
-    report: &BundleReport,
-) -> String {
-    let names = coordinate_names(portable);
-    let last = names.last().map_or("", String::as_str);
+pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
+    let meaning = &portable.meaning;
+    let subject = match meaning {
+        Meaning::Array(scale) => format!("a tactile array {scale}"),
+        Meaning::Own { .. } => "own data".to_owned(),
+    };
     let mut text = format!(
-        "Network of a tactile array {array}, exported by {program} as {format}, {precision}.\n\n\
-         It turns the {channels} readings of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} coordinates of\n\
-         its nodes (x_1, y_1, z_1, x_2, ... {last}, in mm).",
+        "Network of {subject}, exported by {program} as {format}, {precision}.\n\n",
         program = crate::export::document::PROGRAM,
         format = report.format,
         precision = report.precision,
-        channels = portable.channels,
-        outputs = portable.outputs,
     );
+    text += &match meaning {
+        Meaning::Array(_) => format!(
+            "It turns the {channels} readings of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} coordinates of\n\
+             its nodes (x_1, y_1, z_1, x_2, ... {last}, in mm).",
+            channels = portable.channels,
+            outputs = portable.outputs,
+            last = meaning.targets().last().map_or("", |target| &target.name),
+        ),
+        Meaning::Own { .. } => format!(
+            "It turns {channels} readings into {outputs} targets.\n\n{legend}",
+            channels = portable.channels,
+            outputs = portable.outputs,
+            legend = meaning.legend().join("\n"),
+        ),
+    };
     if portable.takes_row() {
         let _ = write!(
             text,
-            " There is one network for each row-wire, from 1 to {}.",
+            " There is one network for each row, from 1 to {}.",
             portable.networks.len()
         );
     }
@@ -43,10 +51,13 @@ pub(super) fn readme(
     for check in &report.checks {
         let _ = writeln!(
             text,
-            "{}: largest deviation {:.1e} of the widest range of an output ({} mm).",
+            "{}: largest deviation {:.1e} of {}{}.",
             check.evaluator,
             check.deviation,
-            format_number(report.output_range_mm)
+            meaning.scale(),
+            report
+                .output_range_mm
+                .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)))
         );
     }
     if let Some(bound_mm) = report.bound_mm {
@@ -59,14 +70,23 @@ pub(super) fn readme(
     for remark in &report.remarks {
         let _ = writeln!(text, "Note: {remark}.");
     }
-    text + "\ngolden.csv has readings with the coordinates that the network gives to them, for a test of your own.\n\
-           metadata.json has the array, its geometry, the errors of the network, the range of the readings in training,\n\
-           the seed and the version of the program.\n"
+    let subject = match meaning {
+        Meaning::Array(_) => "the array, its geometry",
+        Meaning::Own { .. } => "names and units",
+    };
+    text + &format!(
+        "\ngolden.csv has readings with the {output}s that the network gives to them, for a test of your own.\n\
+         metadata.json has {subject}, the errors of the network, the range of the readings in training,\n\
+         the seed and the version of the program.\n",
+        output = meaning.output()
+    )
 }
 
 fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
     let takes_row = portable.takes_row();
     let (channels, outputs, upper) = (portable.channels, portable.outputs, name.to_uppercase());
+    let meaning = &portable.meaning;
+    let (input, output) = (meaning.readings(), meaning.outputs());
     match report.format {
         BundleFormat::Onnx => {
             let kind = if report.precision == BundlePrecision::Single {
@@ -83,11 +103,17 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                 "    import numpy as np\n    import onnxruntime\n    \
                  session = onnxruntime.InferenceSession(\"network.onnx\")\n    \
                  readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{end}]\n    \
-                 inputs = {{\"resistances_ohm\": readings.astype(np.{kind}){row}}}\n    \
-                 coordinates_mm = session.run([\"coordinates_mm\"], inputs)[0]\n\n\
-                 resistances_ohm is batch x {channels}, coordinates_mm batch x {outputs}; where a reading is not a finite \
-                 number above 0{row_text},\nthe coordinates are NaN. A second output, readings_outside, counts the readings \
+                 inputs = {{\"{input}\": readings.astype(np.{kind}){row}}}\n    \
+                 {output} = session.run([\"{output}\"], inputs)[0]\n\n\
+                 {input} is batch x {channels}, {output} batch x {outputs}; where a reading is not a finite \
+                 number{above}{row_text},\nthe {one}s are NaN. A second output, readings_outside, counts the readings \
                  of each line beyond the range\nseen in training.",
+                above = if portable.quantity == Quantity::Raw {
+                    ""
+                } else {
+                    " above 0"
+                },
+                one = meaning.output(),
                 first = usize::from(takes_row),
                 end = channels + usize::from(takes_row),
                 row_text = if takes_row { ", or the row does not exist" } else { "" },
@@ -97,8 +123,8 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
             let row = if takes_row { "1, " } else { "" };
             let (reading, readings, coordinate, coordinates) = match (fixed, report.precision) {
                 (Some(fixed), _) => ("int32_t", c99::readings(fixed), "int32_t", "coordinates_nm"),
-                (None, BundlePrecision::Single) => ("float", "resistances_ohm", "float", "coordinates_mm"),
-                (None, _) => ("double", "resistances_ohm", "double", "coordinates_mm"),
+                (None, BundlePrecision::Single) => ("float", input, "float", output),
+                (None, _) => ("double", input, "double", output),
             };
             let range = if portable.ranges().is_some() {
                 format!(
@@ -123,11 +149,11 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
         BundleFormat::Matlab => {
             let row = if takes_row { ", row" } else { "" };
             format!(
-                "    [coordinates_mm, readings_outside] = {name}_decode(resistances_ohm{row})\n\n\
-                 in MATLAB (from R2016b) or GNU Octave. resistances_ohm is samples x {channels}, coordinates_mm samples x \
+                "    [{output}, readings_outside] = {name}_decode({input}{row})\n\n\
+                 in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
                  {outputs}{row_text}.",
                 row_text = if takes_row {
-                    ";\nrow has the row-wire of each sample, from 1"
+                    ";\nrow has the row of each sample, from 1"
                 } else {
                     ""
                 },
@@ -137,10 +163,10 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
             let row = if takes_row { ", row" } else { "" };
             format!(
                 "    from decode import decode\n    \
-                 coordinates_mm, readings_outside = decode(resistances_ohm{row})\n\n\
-                 resistances_ohm is samples x {channels}, coordinates_mm samples x {outputs}{row_text}.",
+                 {output}, readings_outside = decode({input}{row})\n\n\
+                 {input} is samples x {channels}, {output} samples x {outputs}{row_text}.",
                 row_text = if takes_row {
-                    ";\nrow has the row-wire of each sample, from 1"
+                    ";\nrow has the row of each sample, from 1"
                 } else {
                     ""
                 },

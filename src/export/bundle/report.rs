@@ -18,11 +18,11 @@ pub struct BundleReport {
     pub vectors: VectorCounts,
     /// Evaluations of the bundle as it was read back.
     pub checks: Vec<BundleCheck>,
-    /// Largest deviation allowed, relative to [`Self::output_range_mm`].
+    /// Largest deviation allowed, relative to [`Self::output_range_mm`], or to the range of each target of own data.
     pub limit: f64,
-    /// Widest range of a coordinate in training, in mm.
-    pub output_range_mm: f64,
-    /// Deviation of `decode` of this program from the same exact answers, relative to [`Self::output_range_mm`].
+    /// Widest range of a coordinate in training, in mm; `None` for own data.
+    pub output_range_mm: Option<f64>,
+    /// Deviation of `decode` of this program from the same exact answers, relative as [`Self::limit`].
     pub program_deviation: f64,
     /// Proven bound on the error in fixed point, in mm.
     pub bound_mm: Option<f64>,
@@ -30,7 +30,7 @@ pub struct BundleReport {
     pub remarks: Vec<String>,
 }
 
-/// Numbers of readings of a row-wire.
+/// Numbers of readings of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VectorCounts {
     /// With which the bundle was verified.
@@ -44,7 +44,7 @@ pub struct VectorCounts {
 pub struct BundleCheck {
     /// Name of the program that evaluated it.
     pub evaluator: &'static str,
-    /// Largest deviation from the network, relative to the widest range of a coordinate.
+    /// Largest deviation from the network, relative as [`BundleReport::limit`].
     pub deviation: f64,
 }
 

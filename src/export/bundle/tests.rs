@@ -8,8 +8,9 @@ use super::{
     BundleError, BundleFormat, BundlePrecision, FoldError,
     exact::decode_exactly,
     export_bundle,
+    exported_network::ExportedNetwork,
     fixed_point::{FixedNetworks, HiddenWidth},
-    matlab, metadata, numpy, onnx,
+    matlab, numpy, onnx,
     portable::Portable,
     vectors::Vectors,
     weights::{Arithmetic, Weights},
@@ -59,21 +60,21 @@ fn networks() -> Vec<(String, NetworkFile)> {
 #[test]
 fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
     for (name, file) in networks() {
-        let portable = Portable::of(&file).unwrap();
-        let vectors = Vectors::of(&file, &portable, |ohm| Arithmetic::SINGLE.rest.round(ohm)).unwrap();
+        let portable = Portable::of((&file).into()).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, |ohm| Arithmetic::SINGLE.rest.round(ohm)).unwrap();
         assert!(
-            vectors.program_deviation_mm < 1e-11,
+            vectors.program_deviation < 1e-11,
             "{name}: {}",
-            vectors.program_deviation_mm
+            vectors.program_deviation
         );
-        for (arithmetic, limit_mm) in [
+        for (arithmetic, limit) in [
             (Arithmetic::DOUBLE, 1e-12),
             (Arithmetic::MIXED, 2e-5),
             (Arithmetic::SINGLE, 2e-3),
         ] {
             let weights = Weights::of(&portable, arithmetic);
-            let deviation_mm = vectors.deviation_mm(|vector| weights.decode(vector.network, &vector.readings_ohm));
-            assert!(deviation_mm < limit_mm, "{name}, {arithmetic:?}: {deviation_mm}");
+            let deviation = vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
+            assert!(deviation < limit, "{name}, {arithmetic:?}: {deviation}");
         }
         assert_eq!(portable.takes_row(), name.ends_with("known"), "{name}");
     }
@@ -82,16 +83,13 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
 #[test]
 fn coordinates_that_did_not_vary_come_out_exactly() {
     for (name, file) in networks() {
-        let portable = Portable::of(&file).unwrap();
-        let vectors = Vectors::of(&file, &portable, |ohm| ohm).unwrap();
+        let portable = Portable::of((&file).into()).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, |ohm| ohm).unwrap();
         for vector in vectors.all() {
             let outputs = file.network.at(vector.network).outputs();
             for coordinate in 0..portable.outputs {
                 let (low, high) = outputs.extremes(coordinate);
-                assert!(
-                    low < high || vector.coordinates_mm[coordinate] == low,
-                    "{name}: {coordinate}"
-                );
+                assert!(low < high || vector.answers[coordinate] == low, "{name}: {coordinate}");
             }
         }
     }
@@ -100,26 +98,26 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
 #[test]
 fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invalid() {
     for (name, file) in networks() {
-        let portable = Portable::of(&file).unwrap();
-        for (precision, arithmetic, limit_mm) in [
+        let portable = Portable::of((&file).into()).unwrap();
+        for (precision, arithmetic, limit) in [
             (BundlePrecision::Double, Arithmetic::DOUBLE, 1e-12),
             (BundlePrecision::Single, Arithmetic::MIXED, 2e-5),
         ] {
-            let vectors = Vectors::of(&file, &portable, |ohm| arithmetic.rest.round(ohm)).unwrap();
-            let metadata = metadata::metadata(&file, &portable, precision);
+            let vectors = Vectors::of((&file).into(), &portable, |ohm| arithmetic.rest.round(ohm)).unwrap();
+            let metadata = ExportedNetwork::from(&file).metadata(&portable, precision);
             let bytes = onnx::write(&portable, &Weights::of(&portable, arithmetic), &metadata);
             let graph = onnx::OnnxGraph::read(&bytes).unwrap();
-            let mut answers = graph.decode(vectors.all()).unwrap().coordinates_mm.into_iter();
-            let deviation_mm = vectors.deviation_mm(|_| answers.next().unwrap());
-            assert!(deviation_mm < limit_mm, "{name}, {precision}: {deviation_mm}");
+            let mut answers = graph.decode(vectors.all()).unwrap().answers.into_iter();
+            let deviation = vectors.deviation(|_| answers.next().unwrap());
+            assert!(deviation < limit, "{name}, {precision}: {deviation}");
 
             let mut odd = vectors.golden()[..4].to_vec();
-            odd[0].readings_ohm[2] = -1.0;
-            odd[1].readings_ohm[2] = f64::INFINITY;
-            odd[2].readings_ohm[2] *= 100.0;
+            odd[0].readings[2] = -1.0;
+            odd[1].readings[2] = f64::INFINITY;
+            odd[2].readings[2] *= 100.0;
             odd[3].network = 7;
             let answers = graph.decode(&odd).unwrap();
-            let are_valid: Vec<_> = (answers.coordinates_mm.iter())
+            let are_valid: Vec<_> = (answers.answers.iter())
                 .map(|row| row.iter().all(|mm| !mm.is_nan()))
                 .collect();
             assert_eq!(are_valid, [false, false, true, !portable.takes_row()], "{name}");
@@ -127,7 +125,7 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
             let outside = inputs
                 .range()
                 .unwrap()
-                .outside(portable.quantity, &odd[2].readings_ohm)
+                .outside(portable.quantity, &odd[2].readings)
                 .count();
             assert_eq!(answers.readings_outside.unwrap()[2], outside as i64, "{name}");
         }
@@ -137,15 +135,11 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
 #[test]
 fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
     for (name, file) in networks() {
-        let portable = Portable::of(&file).unwrap();
+        let portable = Portable::of((&file).into()).unwrap();
         for arithmetic in [Arithmetic::DOUBLE, Arithmetic::MIXED, Arithmetic::SINGLE] {
             let weights = Weights::of(&portable, arithmetic);
             let bytes = numpy::write_weights(&portable, &weights);
-            assert_eq!(
-                numpy::read_weights(&bytes, portable.quantity).unwrap(),
-                weights,
-                "{name}"
-            );
+            assert_eq!(numpy::read_weights(&bytes, &portable).unwrap(), weights, "{name}");
         }
         let weights = Weights::of(&portable, Arithmetic::DOUBLE);
         let text = matlab::write("decode", &portable, &weights);
@@ -159,7 +153,7 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
 fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     for (name, file) in networks() {
-        let portable = Portable::of(&file).unwrap();
+        let portable = Portable::of((&file).into()).unwrap();
         let fixed = FixedNetworks::of(&portable).unwrap();
         assert!(fixed.bound_mm < 0.02, "{name}: {}", fixed.bound_mm);
         for index in 0..portable.networks.len() {
@@ -171,7 +165,7 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
                     .iter()
                     .map(|&(low, high)| fixed.reading(rng.random_range(low..high)));
                 let readings: Vec<f64> = units.map(|units| f64::from(units) * fixed.unit_ohm()).collect();
-                let exact = decode_exactly(&portable, network, &readings).coordinates_mm;
+                let exact = decode_exactly(&portable, network, &readings).answers;
                 let ours = fixed.decode(index, &readings).unwrap();
                 for (nm, mm) in ours.iter().zip(exact) {
                     largest_mm = largest_mm.max((f64::from(*nm) * 1e-6 - mm).abs());
@@ -201,7 +195,7 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
 #[test]
 fn networks_whose_products_cancel_have_wider_hidden_weights() {
     let file = trained(Rows::All, Quantity::LogResistance, ScalingChoice::Whitening, 1e-5);
-    let fixed = FixedNetworks::of(&Portable::of(&file).unwrap()).unwrap();
+    let fixed = FixedNetworks::of(&Portable::of((&file).into()).unwrap()).unwrap();
     assert_eq!(fixed.hidden_width, HiddenWidth::TwentyFour);
 }
 

@@ -1,5 +1,6 @@
 use super::{
     exact::Growth,
+    meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, Digits},
 };
@@ -28,13 +29,12 @@ impl Tolerance {
         const NEAR: f64 = 0.5;
         // Beside the sums: difference, division, logarithm, weight and tangent.
         let operations = (portable.channels + portable.hidden + 10) as f64;
-        let errors_mm =
-            growth.hidden_mm * arithmetic.hidden.unit_roundoff() + growth.rest_mm * arithmetic.rest.unit_roundoff();
+        let errors = growth.hidden * arithmetic.hidden.unit_roundoff() + growth.rest * arithmetic.rest.unit_roundoff();
         let usual = match arithmetic.rest {
             Digits::Double => Self::DOUBLE,
             Digits::Single => Self::SINGLE,
         };
-        let bound = operations * errors_mm / portable.full_scale_mm;
+        let bound = operations * errors;
         Self {
             limit: if deviation <= NEAR * usual {
                 usual
@@ -42,12 +42,12 @@ impl Tolerance {
                 usual.max(bound)
             },
             usual,
-            amplification: growth.hidden_mm / portable.full_scale_mm,
+            amplification: growth.hidden,
         }
     }
 
     /// Remarks on the arithmetic that the network needs.
-    pub(super) fn remarks(self, arithmetic: Arithmetic) -> Vec<String> {
+    pub(super) fn remarks(self, arithmetic: Arithmetic, portable: &Portable) -> Vec<String> {
         let mut remarks = Vec::new();
         if arithmetic == Arithmetic::MIXED {
             remarks.push(
@@ -57,10 +57,13 @@ impl Tolerance {
             );
         }
         if self.limit > self.usual {
+            let cure = match portable.meaning {
+                Meaning::Array(_) => "train with noise (--noise) for a network that amplifies less",
+                Meaning::Own { .. } => "train with fewer hidden nodes or epochs for a network that amplifies less",
+            };
             remarks.push(format!(
                 "this network amplifies rounding errors up to {:.1e} times (relative to the range of its outputs), so two \
-                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; train with noise \
-                 (--noise) for a network that amplifies less",
+                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; {cure}",
                 self.amplification, self.limit, self.usual
             ));
         }

@@ -1,44 +1,41 @@
 use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
+    exported_network::ExportedNetwork,
     portable::Portable,
 };
-use crate::{evaluation::SimulatedSettings, export::NetworkFile};
 
 /// Readings with the answers that the network gives to them.
 #[derive(Clone, Debug)]
 pub(super) struct Vectors {
     /// The golden vectors first: of each network the smallest, middle and largest readings of its training range, and a
-    /// few of the scene.
+    /// few of those drawn.
     all: Vec<Vector>,
     golden: usize,
     /// Growth of rounding errors in the worst of them.
     pub(super) growth: Growth,
-    /// Largest difference of `decode` of this program from the exact answers, in mm.
-    pub(super) program_deviation_mm: f64,
+    /// Largest deviation of `decode` of this program from the exact answers.
+    pub(super) program_deviation: f64,
+    /// [`Portable::scales`].
+    scales: Vec<f64>,
 }
 
-/// Readings of a row-wire with the answer.
+/// Readings of a row with the answer.
 #[derive(Clone, Debug)]
 pub(super) struct Vector {
     /// Index of the network, and so of the row-wire where that is an argument.
     pub(super) network: usize,
-    pub(super) readings_ohm: Vec<f64>,
-    pub(super) coordinates_mm: Vec<f64>,
+    pub(super) readings: Vec<f64>,
+    pub(super) answers: Vec<f64>,
 }
 
-/// Snapshots drawn for the verification.
-const SNAPSHOTS: usize = 20;
-/// Snapshots among them that are golden vectors.
-const GOLDEN_SNAPSHOTS: usize = 1;
-
 impl Vectors {
-    /// Draws readings of the scene and answers them. `representable` gives the nearest reading that the bundle can take.
+    /// Draws readings and answers them. `representable` gives the nearest reading that the bundle can take.
     ///
     /// # Errors
-    /// The scene could not be drawn.
+    /// No readings could be drawn.
     pub(super) fn of(
-        file: &NetworkFile,
+        exported: ExportedNetwork<'_>,
         portable: &Portable,
         representable: impl Fn(f64) -> f64,
     ) -> Result<Self, BundleError> {
@@ -50,40 +47,39 @@ impl Vectors {
                 readings.push((index, range.extremes.iter().map(between).collect::<Vec<_>>()));
             }
         }
-        let rows = file.settings.source.model_size().map_or(1, |size| size.rows);
-        let mut settings = SimulatedSettings { ..file.settings };
-        settings.source.test_samples = SNAPSHOTS * rows;
-        let set = settings.draw_test().map_err(Box::new)?;
-        let golden = readings.len() + GOLDEN_SNAPSHOTS * rows;
-        for sample in 0..set.samples() {
-            let network = if portable.takes_row() { set.row_index(sample) } else { 0 };
-            readings.push((network, set.sample_readings(sample).to_vec()));
-        }
+        let (golden, drawn) = exported.draw(portable)?;
+        let golden = readings.len() + golden;
+        readings.extend(drawn);
         let mut growth = Growth::default();
-        let mut program_deviation_mm = 0.0_f64;
+        let mut program_deviation = 0.0_f64;
         let mut all = Vec::new();
-        for (network, readings_ohm) in readings {
-            let readings_ohm: Vec<f64> = readings_ohm.into_iter().map(&representable).collect();
-            let exact = decode_exactly(portable, &portable.networks[network], &readings_ohm);
+        for (network, readings) in readings {
+            let readings: Vec<f64> = readings.into_iter().map(&representable).collect();
+            let exact = decode_exactly(portable, &portable.networks[network], &readings);
             growth = growth.largest(exact.growth);
-            let row = ndarray::ArrayView2::from_shape((1, readings_ohm.len()), &readings_ohm);
-            let of_program = file.network.at(network).decouple(row.expect("one row of readings"));
-            let differences = of_program
-                .iter()
-                .zip(&exact.coordinates_mm)
-                .map(|(ours, exact)| (ours - exact).abs());
-            program_deviation_mm = differences.fold(program_deviation_mm, f64::max);
+            let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);
+            let of_program = exported
+                .networks()
+                .at(network)
+                .decouple(row.expect("one row of readings"));
+            let of_program = relative(
+                &of_program.into_raw_vec_and_offset().0,
+                &exact.answers,
+                &portable.scales,
+            );
+            program_deviation = program_deviation.max(of_program);
             all.push(Vector {
                 network,
-                readings_ohm,
-                coordinates_mm: exact.coordinates_mm,
+                readings,
+                answers: exact.answers,
             });
         }
         Ok(Self {
             all,
             golden,
             growth,
-            program_deviation_mm,
+            program_deviation,
+            scales: portable.scales.clone(),
         })
     }
 
@@ -91,7 +87,7 @@ impl Vectors {
     pub(super) fn inside(mut self, portable: &Portable) -> Self {
         let is_inside = |vector: &Vector| {
             portable.networks[vector.network].range.as_ref().is_none_or(|range| {
-                let mut readings = vector.readings_ohm.iter().zip(&range.limits);
+                let mut readings = vector.readings.iter().zip(&range.limits);
                 readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
             })
         };
@@ -112,20 +108,26 @@ impl Vectors {
         &self.all[..self.golden]
     }
 
-    /// Largest difference of `decode` from the answers, in mm. NaN if an answer is none.
-    pub(super) fn deviation_mm(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> f64 {
-        let mut largest = 0.0_f64;
-        for vector in &self.all {
-            let answers = decode(vector);
-            assert_eq!(answers.len(), vector.coordinates_mm.len());
-            for (answer, expected) in answers.iter().zip(&vector.coordinates_mm) {
-                let difference = (answer - expected).abs();
-                // Once it is NaN it stays so.
-                if difference.is_nan() || difference > largest {
-                    largest = difference;
-                }
-            }
-        }
-        largest
+    /// Largest difference of `decode` from the answers, relative to the scale of the output. NaN if an answer is none.
+    pub(super) fn deviation(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> f64 {
+        let deviations = self
+            .all
+            .iter()
+            .map(|vector| relative(&decode(vector), &vector.answers, &self.scales));
+        deviations.fold(0.0, larger)
     }
+}
+
+/// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is none.
+fn relative(answers: &[f64], expected: &[f64], scales: &[f64]) -> f64 {
+    assert_eq!(answers.len(), expected.len());
+    let pairs = answers.iter().zip(expected).zip(scales);
+    pairs.fold(0.0, |largest, ((answer, expected), scale)| {
+        larger(largest, (answer - expected).abs() / scale)
+    })
+}
+
+/// The larger of two deviations; once it is NaN it stays so.
+fn larger(one: f64, other: f64) -> f64 {
+    if one.is_nan() || one >= other { one } else { other }
 }

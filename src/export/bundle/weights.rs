@@ -28,11 +28,11 @@ pub(super) struct Weights {
 /// The weights of one network, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RoundedNetwork {
-    pub(super) centre_ohm: Vec<f64>,
+    pub(super) centre: Vec<f64>,
     /// Channels × hidden nodes.
     pub(super) hidden_weights: Vec<f64>,
     pub(super) hidden_biases: Vec<f64>,
-    /// Hidden nodes × coordinates.
+    /// Hidden nodes × outputs.
     pub(super) output_weights: Vec<f64>,
     pub(super) output_biases: Vec<f64>,
 }
@@ -77,7 +77,7 @@ impl Weights {
     pub(super) fn of(portable: &Portable, arithmetic: Arithmetic) -> Self {
         let Arithmetic { hidden, rest } = arithmetic;
         let network = |network: &PortableNetwork| RoundedNetwork {
-            centre_ohm: network.centre_ohm.clone(),
+            centre: network.centre.clone(),
             hidden_weights: network
                 .hidden_weights
                 .iter()
@@ -95,10 +95,10 @@ impl Weights {
     }
 
     /// Decodes a row in the arithmetic of the bundle.
-    pub(super) fn decode(&self, network: usize, readings_ohm: &[f64]) -> Vec<f64> {
+    pub(super) fn decode(&self, network: usize, readings: &[f64]) -> Vec<f64> {
         let Arithmetic { hidden: digits, rest } = self.arithmetic;
         let network = &self.networks[network];
-        let readings = readings_ohm.iter().zip(&network.centre_ohm);
+        let readings = readings.iter().zip(&network.centre);
         let changes: Vec<_> = readings
             .map(|(&ohm, &centre)| change(self.quantity, digits, rest.round(ohm), centre))
             .collect();
@@ -111,12 +111,12 @@ impl Weights {
     }
 }
 
-fn change(quantity: Quantity, digits: Digits, ohm: f64, centre_ohm: f64) -> f64 {
-    let difference = digits.round(ohm - centre_ohm);
+fn change(quantity: Quantity, digits: Digits, ohm: f64, centre: f64) -> f64 {
+    let difference = digits.round(ohm - centre);
     match quantity {
         Quantity::Resistance | Quantity::Raw => difference,
         Quantity::Conductance => digits.round(-difference / ohm),
-        Quantity::LogResistance => digits.round(libm::log1p(digits.round(difference / centre_ohm))),
+        Quantity::LogResistance => digits.round(libm::log1p(digits.round(difference / centre))),
     }
 }
 

@@ -1,11 +1,15 @@
 //! A plot within a frame.
 
+use glam::DVec2;
+
 use super::{
-    canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
+    canvas::{Anchor, Area, At, CHARACTER, Canvas, Stroke, TEXT},
     colours::{DIM, pale, rgb},
     frame::Frame,
 };
-use crate::figure::{Hue, LineAt, LineStyle, Look, Marker, Plot, ReferenceLine, Series};
+use crate::figure::{
+    Hue, LineAt, LineStyle, Look, Marker, Plot, PointLabel, ReferenceLine, Series, along, place_labels,
+};
 
 /// Tint of a span on the ground, 1 being the ground itself.
 const SPAN_PALENESS: f64 = 0.88;
@@ -65,7 +69,38 @@ pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
         for series in others {
             draw_series(plot, series, &frame, canvas);
         }
+        draw_point_labels(plot, &frame, canvas);
     });
+}
+
+/// The words beside points.
+fn draw_point_labels(plot: &Plot, frame: &Frame<'_>, canvas: &mut Canvas) {
+    // Most plots have none.
+    if !plot.has_point_labels() {
+        return;
+    }
+    let (mut labels, mut texts, mut marks) = (Vec::new(), Vec::new(), Vec::new());
+    for series in &plot.series {
+        if series.look.line.is_some() {
+            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| frame.at(place).into()).collect();
+            marks.extend(along(&line));
+        }
+        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
+            let at = DVec2::from(frame.at(place));
+            marks.push(at);
+            let Some(text) = &point.label else { continue };
+            let size = DVec2::new(CHARACTER * text.chars().count() as f64, TEXT);
+            labels.push(PointLabel { at, size });
+            texts.push(text);
+        }
+    }
+    let area = frame.area;
+    let corners = (DVec2::new(area.left, area.top), DVec2::new(area.right(), area.bottom()));
+    for (corner, text) in place_labels(&labels, &marks, corners).into_iter().zip(texts) {
+        if let Some(corner) = corner {
+            canvas.text([corner.x, corner.y + 0.8 * TEXT], Anchor::Start, DIM, text);
+        }
+    }
 }
 
 fn draw_line(line: &ReferenceLine, frame: &Frame<'_>, canvas: &mut Canvas) {

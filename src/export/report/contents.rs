@@ -11,7 +11,7 @@ use crate::{
         Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, document::PROGRAM, error_table,
         figures::dark_style, format_duration, format_percent,
     },
-    sensor::Geometry,
+    sensor::{Geometry, counted},
     training::StopReason,
 };
 
@@ -105,8 +105,10 @@ impl RunReport<'_> {
     fn title(&self) -> String {
         let settings = &self.file.settings;
         let what = format!(
-            "{}, {} hidden nodes, seed {}",
-            settings.source.sensor.scale, settings.hidden, settings.seed
+            "{}, {}, seed {}",
+            settings.source.sensor.scale,
+            counted(settings.hidden, "hidden node"),
+            settings.seed
         );
         match self.name {
             Some(name) => format!("{name}: {what}"),
@@ -122,9 +124,9 @@ impl RunReport<'_> {
             .map_or("not ended".to_owned(), |reason| reason.to_string());
         let time = Duration::try_from_secs_f64(training.seconds).unwrap_or_default();
         format!(
-            "Z error {} on the test set. Trained for {} epochs, {} on one thread ({reason}); weights kept from epoch {}.",
+            "Z error {} on the test set. Trained for {}, {} on one thread ({reason}); weights kept from epoch {}.",
             format_percent(self.file.errors.z_percent),
-            self.last_epoch(),
+            counted(self.last_epoch(), "epoch"),
             format_duration(time),
             training.best_epoch
         )

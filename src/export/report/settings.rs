@@ -4,6 +4,7 @@ use crate::{
     evaluation::SimulatedSettings,
     export::{NetworkFile, format_number},
     scene::{Loading, Movement, Noise, NoisySets},
+    sensor::counted,
 };
 
 /// Names and values of all settings.
@@ -71,8 +72,11 @@ pub(super) fn settings_facts(file: &NetworkFile) -> Vec<(&'static str, String)> 
         (
             "Ends",
             format!(
-                "after {} epochs, at a training error of {:?}, a gradient below {:?}, or {} validation failures",
-                rules.epochs, rules.goal_mse, rules.min_gradient, rules.max_fail
+                "after {}, at a training error of {:?}, a gradient below {:?}, or {}",
+                counted(rules.epochs, "epoch"),
+                rules.goal_mse,
+                rules.min_gradient,
+                counted(rules.max_fail, "validation failure")
             ),
         ),
         (

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use super::surface_figure::Surface;
+use super::surface_figure::{Surface, ViewMode};
 use crate::surface::Grid;
 
 /// Room for overshoots of the surface above and below the range, as a part of it.
@@ -30,6 +30,8 @@ pub(super) struct Field<'a> {
     pub(super) range: RangeInclusive<f64>,
     /// Values that the box has room for.
     shown: RangeInclusive<f64>,
+    /// True for a map of colours, which ends between no nodes; heights in space end at the box.
+    is_map: bool,
 }
 
 impl<'a> Field<'a> {
@@ -42,6 +44,7 @@ impl<'a> Field<'a> {
             values: values.unwrap_or_default(),
             shown: range.start() - headroom..=range.end() + headroom,
             range,
+            is_map: surface.mode == ViewMode::Top,
         }
     }
 
@@ -86,10 +89,9 @@ impl<'a> Field<'a> {
         corners.map(|(ix, iy)| DVec3::new(x_mm[ix], y_mm[iy], self.values[self.grid.index(ix, iy)]))
     }
 
-    /// Returns how much of a cell is drawn: between the nodes all of it, its values cut off at the box; of the extrapolated
-    /// margin what stays in the box.
+    /// Returns how much of a cell is drawn: what stays in the box, and between the nodes of a map all of it.
     pub(super) fn part(&self, ix: usize, iy: usize) -> CellPart {
-        let is_inside = self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
+        let is_inside = self.is_map && self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
         let values = self.corners(ix, iy).map(|corner| self.values[corner]);
         let (low, high) = (*self.shown.start(), *self.shown.end());
         if !values.iter().all(|value| value.is_finite()) {

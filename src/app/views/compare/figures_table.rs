@@ -89,6 +89,7 @@ pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
             .collect(),
         colour,
         is_strong: false,
+        mark: "",
     };
     let rows: Vec<Row> = FIGURES.iter().map(row).collect();
     ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));

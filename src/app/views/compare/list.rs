@@ -5,12 +5,13 @@ use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Ro
 use super::scene_words::unlike_paper;
 use crate::{
     app::{
-        shared::{Effect, PLACES, Shared},
+        shared::{Effect, PLACES, Phase, Shared},
         theme::{space, type_size},
-        widgets::{dim_ui, scrolled_ui, section_heading_ui},
+        widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
     },
     evaluation::SimulatedSettings,
     export::{KeptRun, format_duration, format_percent},
+    sensor::counted,
 };
 
 /// The finished trainings, the newest first.
@@ -20,10 +21,12 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
     scrolled_ui(ui, "runs", |ui| {
         section_heading_ui(ui, "Runs");
         if runs.workspace.runs.is_empty() {
-            dim_ui(
-                ui,
-                "Every finished training is kept here, with its network. Train one to begin.",
-            );
+            dim_ui(ui, "Every finished training is kept here, with its network.");
+            ui.add_space(space(2));
+            let can_train = !shared.phase.is_busy() && shared.phase != Phase::Died;
+            if ui.add_enabled(can_train, ghost_button("Train a network now")).clicked() {
+                effects.extend([Effect::ShowTraining, Effect::Train]);
+            }
         } else {
             dim_ui(ui, "Choose one as A and one as B to see them side by side.");
         }
@@ -123,11 +126,11 @@ fn conditions(settings: &SimulatedSettings) -> String {
         starts => format!(", {starts} starts"),
     };
     let mut text = format!(
-        "{}, {} hidden, {}, {} samples, seed {}{starts}",
+        "{}, {} hidden, {}, {}, seed {}{starts}",
         settings.source.sensor.scale,
         settings.hidden,
         settings.training.method.short_name(),
-        settings.source.samples,
+        counted(settings.source.samples, "sample"),
         settings.seed
     );
     for words in unlike_paper(settings) {

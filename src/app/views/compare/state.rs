@@ -21,6 +21,8 @@ pub struct CompareView {
     pub card: RightCard,
     /// The run that the user is asked about before it is removed.
     pub removing: Option<u64>,
+    /// Number of runs with which its places were last filled, until both are.
+    pub(super) opened_with: Option<usize>,
     /// The node under the pointer, lit on both surfaces.
     pub node: Option<usize>,
     wake: Wake,
@@ -79,6 +81,7 @@ impl CompareView {
             snapshot: 0,
             card: RightCard::default(),
             removing: None,
+            opened_with: None,
             node: None,
             wake,
         }
@@ -99,6 +102,24 @@ impl CompareView {
             .map(|compared| compared.test.snapshots.len())
             .max()
             .unwrap_or(0)
+    }
+
+    /// Fills empty places with the newest runs as the view opens, the older one first, and as runs arrive until both are
+    /// filled.
+    pub(super) fn fill_places(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
+        let count = runs.workspace.runs.len();
+        if self.opened_with.is_none_or(|seen| seen == count) {
+            return;
+        }
+        let pinned = runs.workspace.pinned;
+        let empty: Vec<usize> = (0..pinned.len()).filter(|&place| pinned[place].is_none()).collect();
+        let others = runs.workspace.runs.iter().rev().map(|run| run.id);
+        let others = others.filter(|id| !pinned.contains(&Some(*id)));
+        let mut newest: Vec<u64> = others.take(empty.len()).collect();
+        self.opened_with = (newest.len() < empty.len()).then_some(count);
+        newest.reverse();
+        let filled = empty.into_iter().zip(newest);
+        effects.extend(filled.map(|(place, id)| Effect::PinRun(place, Some(id))));
     }
 
     /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.

@@ -20,6 +20,10 @@ impl View for CompareView {
         "Compare"
     }
 
+    fn enter(&mut self, _shared: &Shared) {
+        self.opened_with = Some(0);
+    }
+
     fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(&shared.runs, effects);
     }
@@ -35,6 +39,7 @@ impl View for CompareView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.fill_places(&shared.runs, effects);
         run_list_ui(ui, shared, &mut self.removing, effects);
     }
 
@@ -143,7 +148,11 @@ impl CompareView {
             Some(surface) => surface_ui(ui, place, surface, look, &mut self.node, effects),
             None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
             None => {
-                let text = format!("Press {} next to a run in the list to show it here.", PLACES[place]);
+                let text = match runs.workspace.runs.len() {
+                    0 => "Two finished trainings stand here side by side.".to_owned(),
+                    1 => "Train a second network to compare it with the first.".to_owned(),
+                    _ => format!("Press {} next to a run in the list to show it here.", PLACES[place]),
+                };
                 placeholder_ui(ui, &text);
             }
         }

@@ -14,6 +14,7 @@ use crate::{
     dataset::FoldUnit,
     evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable},
     export::format_duration,
+    sensor::counted,
     training::StoppingRules,
 };
 
@@ -69,7 +70,7 @@ fn what_it_does(topic: Topic) -> &'static str {
             "Errors of networks with different numbers of hidden nodes on the paper's array."
         }
         Topic::Table(PaperTable::CrossValidation) => {
-            "Cross-validation of a large and a small dataset, shuffled anew in each repeat, and the scatter of Fig. 5."
+            "Cross-validation of a large and a small dataset, shuffled anew in each repeat, and the scatter of the errors over the folds (the paper's Fig. 5)."
         }
         Topic::Table(PaperTable::ArrayScales) => "Errors on arrays of different scales, with 12 hidden nodes.",
         Topic::Sweep => "Any two settings varied against each other, all others fixed.",
@@ -79,11 +80,8 @@ fn what_it_does(topic: Topic) -> &'static str {
 fn size_in_words(form: &Form, trials: usize) -> String {
     let folds = form.template.cross_validation.map_or(1, |validation| validation.folds);
     let networks = trials.saturating_mul(folds).saturating_mul(form.template.base.starts);
-    let plural = if networks == 1 { "" } else { "s" };
-    format!(
-        "{networks} training{plural} of at most {} epochs",
-        form.template.base.training.stopping.epochs
-    )
+    let epochs = counted(form.template.base.training.stopping.epochs, "epoch");
+    format!("{} of at most {epochs}", counted(networks, "training"))
 }
 
 fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettings) {
@@ -179,10 +177,10 @@ fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
 fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
     let base = &form.template.base;
     let text = format!(
-        "{}, {} hidden nodes, {} samples, {}, where no axis says otherwise",
+        "{}, {}, {}, {}, where no axis says otherwise",
         base.source.sensor.scale,
-        base.hidden,
-        base.source.samples,
+        counted(base.hidden, "hidden node"),
+        counted(base.source.samples, "sample"),
         base.training.method.name()
     );
     dim_ui(ui, &text);

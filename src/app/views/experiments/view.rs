@@ -17,7 +17,7 @@ use crate::{
         plotting::{Pointer, legend_ui, plots_ui},
         shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
         theme::space,
-        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui},
+        widgets::{card_ui, invitation_ui, placeholder_ui, scrolled_ui, section_heading_ui},
     },
     figure::Figure,
 };
@@ -95,9 +95,13 @@ impl View for ExperimentsView {
         card_ui(ui, left, |ui| {
             picture_ui(ui, (self.topic, outcome), &mut look, shared, effects);
         });
+        let mut is_wanted = false;
         card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
             if outcome.trials().0 == 0 {
-                placeholder_ui(ui, hint(self));
+                match hint(self) {
+                    Some(hint) => placeholder_ui(ui, hint),
+                    None => is_wanted = invitation_ui(ui, INVITATION, "Run now", self.can_run()),
+                }
                 return;
             }
             section_heading_ui(ui, "Verdicts");
@@ -105,6 +109,9 @@ impl View for ExperimentsView {
         });
         ui.allocate_rect(whole, Sense::hover());
         self.look = look;
+        if is_wanted {
+            self.run(effects);
+        }
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
@@ -112,12 +119,15 @@ impl View for ExperimentsView {
     }
 }
 
-/// Returns the hint shown while there is no figure yet.
-fn hint(experiments: &ExperimentsView) -> &'static str {
+/// What an experiment that was not run yet promises.
+const INVITATION: &str = "Our figures appear beside the published ones as the trials finish.";
+
+/// Returns the hint shown while there is no figure yet, unless that is an invitation to run.
+fn hint(experiments: &ExperimentsView) -> Option<&'static str> {
     match (&experiments.running, experiments.outcome()) {
-        (Some(running), _) if running.topic == experiments.topic => "The figures appear as the trials finish.",
-        (_, Some(_)) => "The experiment ended before its first trial finished.",
-        _ => "Press Run: our figures appear beside the published ones as the trials finish.",
+        (Some(running), _) if running.topic == experiments.topic => Some("The figures appear as the trials finish."),
+        (_, Some(_)) => Some("The experiment ended before its first trial finished."),
+        _ => None,
     }
 }
 

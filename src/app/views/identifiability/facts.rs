@@ -5,6 +5,7 @@ use eframe::egui::{RichText, Ui};
 use super::Analysis;
 use crate::{
     app::{
+        glossary,
         theme::{Theme, space, type_size},
         widgets::{fact_ui, fields::capitalised, note_ui, section_heading_ui},
     },
@@ -73,12 +74,7 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
             "Number of resistances measured for one row-wire, one for each column-wire.",
             worst.equations.to_string(),
         ),
-        (
-            "Condition number",
-            "Largest singular value of the worst row divided by its smallest: how much better the best deformation \
-             pattern is seen than the worst.",
-            condition,
-        ),
+        ("Condition number", glossary::CONDITION_NUMBER.hint, condition),
         (
             "Worst row",
             "The row-wire with the smallest singular value.",

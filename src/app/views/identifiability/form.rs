@@ -5,6 +5,7 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 use super::{IdentifiabilityView, Question};
 use crate::{
     app::{
+        glossary,
         shared::{Effect, Shared},
         theme::space,
         widgets::{
@@ -14,7 +15,7 @@ use crate::{
         },
     },
     scene::{Movement, RowModel, Rows},
-    sensor::{ArrayScale, LARGEST_COUNT},
+    sensor::{ArrayScale, LARGEST_COUNT, counted},
 };
 
 /// Array, geometry and scene to be tried, and the way back to the Train view.
@@ -98,10 +99,9 @@ fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
     if let Ok(changed) = ArrayScale::new(scale.rows(), scale.nodes_per_row(), nodes, columns) {
         *scale = changed;
     }
-    dim_ui(
-        ui,
-        &format!("{scale}: {} row-wires of {} nodes", scale.rows(), scale.nodes_per_row()),
-    );
+    let rows = counted(scale.rows(), "row-wire");
+    let text = format!("{scale}: {rows} of {}", counted(scale.nodes_per_row(), "node"));
+    dim_ui(ui, &text);
 }
 
 fn scene_ui(ui: &mut Ui, question: &mut Question) {
@@ -118,7 +118,7 @@ fn scene_ui(ui: &mut Ui, question: &mut Question) {
     if let Some(is_sideways) = segmented_ui(ui, "Node movement", &movements, is_sideways, true) {
         scene.movement = if is_sideways { Movement::SIDEWAYS } else { Movement::Z };
     }
-    let hint = "Standard deviation of a reading, relative to the reading.";
+    let hint = glossary::RELATIVE_NOISE.hint;
     let noise = &mut scene.noise.relative;
     quantity_ui(ui, "Relative noise", hint, noise, 0.0..=1.0, "");
     let present = *noise;

@@ -17,6 +17,7 @@ use crate::{
         Figure, PlotFigure, singular_values_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
     },
+    sensor::counted,
 };
 
 impl View for IdentifiabilityView {
@@ -255,7 +256,7 @@ fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
         state_ui(ui, colour, &text);
         if let Some(analysis) = &shown.analysis {
             let sensor = &analysis.question.sensor;
-            let text = format!("{}, {} rows read", sensor.scale, analysis.rows.len());
+            let text = format!("{}, {} read", sensor.scale, counted(analysis.rows.len(), "row"));
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         }
     });

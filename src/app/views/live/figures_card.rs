@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     app::{
+        glossary,
         shared::{Effect, Shared},
         theme::{Theme, space, type_size},
         widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
@@ -93,12 +94,13 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
     if let Some(noise) = noise.filter(|noise| *noise > 0.0 && frame.residual.is_finite()) {
         residual += &format!(" ({} × noise)", format_number(frame.residual / noise));
     }
-    let hint = "Relative difference between the readings and those that Eq. (2) gives for the decoded deformation (root \
-                mean square). It needs no ground truth: as small as the noise of a reading if the answer explains \
-                everything.";
-    fact_ui(ui, "Residual of Eq. (2)", hint, &residual);
+    let hint = format!(
+        "{}\n\nIt is as small as the noise of a reading if the answer explains everything.",
+        glossary::RESIDUAL.hint
+    );
+    fact_ui(ui, "Residual of Eq. (2)", &hint, &residual);
     outside_ui(ui, frame);
-    let hint = "A broken, shorted, drifting or stuck wire, named once four frames in a row contradict Eq. (2).";
+    let hint = glossary::WIRE_FAULT.hint;
     match &frame.watched {
         Watched::Off(reason) => {
             dim_ui(ui, &format!("Faults of wires are {reason}."));
@@ -190,7 +192,7 @@ fn gains_in_words(zero: &ZeroGains) -> String {
 fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
         let palette = Theme::of(ui).palette;
-        let text = format!("● {frames} frames, {seconds:.1} s");
+        let text = format!("● {}, {seconds:.1} s", counted(frames, "frame"));
         ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         return;
     }
@@ -202,7 +204,8 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
         return;
     };
     let Recorded { path, frames, seconds } = &recorded;
-    dim_ui(ui, &format!("Recorded {frames} frames, {seconds:.1} s.")).on_hover_text(path.display().to_string());
+    dim_ui(ui, &format!("Recorded {}, {seconds:.1} s.", counted(*frames, "frame")))
+        .on_hover_text(path.display().to_string());
     ui.horizontal(|ui| {
         let replay = ui.add_enabled(*frames > 0, ghost_button("Replay recording"));
         if replay

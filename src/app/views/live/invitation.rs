@@ -4,7 +4,7 @@ use super::{LiveView, engine::SourcePlan, source_form::SourceKind};
 use crate::app::{
     shared::{Effect, Shared},
     theme::{Theme, semibold, space, type_size},
-    widgets::primary_button,
+    widgets::{ghost_button, primary_button},
 };
 
 /// What an empty view says, and the one click that fills it.
@@ -33,6 +33,12 @@ pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects:
         } else if view.obstacle(shared).is_none() && ui.add(primary_button("Start this source")).clicked() {
             view.start(shared, effects);
         }
+        ui.add_space(space(2));
+        let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
+        let sample = ui.add(ghost_button("Play the sample recording"));
+        if sample.on_hover_text(hint).clicked() {
+            view.ask_for_sample(shared);
+        }
     });
 }
 
@@ -45,7 +51,7 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
             SourcePlan::Stream(source) => source.to_string(),
         };
         let text = match &counts.last_bad {
-            Some(reason) => format!("{} lines are no frame. The last: {reason}.", counts.bad),
+            Some(reason) => format!("Lines that are no frame: {}. The last: {reason}.", counts.bad),
             None => "It appears here as soon as it comes.".to_owned(),
         };
         return (format!("Waiting for the first frame from {source}"), text);

@@ -15,6 +15,7 @@ mod invitation;
 mod network_choice;
 mod readings_card;
 mod replay_bar;
+mod sample;
 mod source_form;
 mod state;
 mod tools;

@@ -68,6 +68,13 @@ impl NetworkChoice {
         Some((&run.name, &run.file))
     }
 
+    /// Decodes with this network, which is of no run.
+    pub fn take(&mut self, name: &str, file: Arc<NetworkFile>) {
+        self.problem = file.old_version_warning();
+        self.file = Some((name.to_owned(), file));
+        self.pick = NetworkPick::File;
+    }
+
     /// Takes the file that the user has opened; returns `true` once its network is there.
     pub fn take_news(&mut self) -> bool {
         if let Some(path) = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok()) {
@@ -82,14 +89,8 @@ impl NetworkChoice {
         }
         match self.loading.next_event() {
             Some(Ok((path, file))) => {
-                self.problem = file.old_version_warning();
-                let name = path
-                    .file_name()
-                    .unwrap_or(path.as_os_str())
-                    .to_string_lossy()
-                    .into_owned();
-                self.file = Some((name, Arc::from(file)));
-                self.pick = NetworkPick::File;
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                self.take(&name, Arc::from(file));
                 true
             }
             Some(Err(reason)) => {

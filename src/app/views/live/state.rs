@@ -11,6 +11,7 @@ use super::{
     engine::{Command, LiveEvent, LivePlan, LiveShown, Recorded, SourcePlan, run},
     fault_form::FaultForm,
     network_choice::NetworkChoice,
+    sample::Sample,
     source_form::{SourceForm, SourceKind},
 };
 use crate::{
@@ -37,6 +38,7 @@ pub struct LiveView {
     /// The last recording that is whole.
     pub recorded: Option<Recorded>,
     pub(super) network: NetworkChoice,
+    pub(super) sample: Sample,
     pub(super) source: SourceForm,
     pub(super) fault: FaultForm,
     pub(super) drops: DropScale,
@@ -70,6 +72,7 @@ impl LiveView {
             recording: None,
             recorded: None,
             network: NetworkChoice::new(Arc::clone(&wake)),
+            sample: Sample::new(Arc::clone(&wake)),
             source: SourceForm::default(),
             fault: FaultForm::default(),
             drops: DropScale::default(),
@@ -96,9 +99,6 @@ impl LiveView {
             .fault
             .fault(scale)
             .filter(|_| self.fault.problem(scale, &read).is_none());
-        // Beside the runs, or for this session.
-        let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
-        let folder = beside.map_or_else(std::env::temp_dir, PathBuf::from);
         let plan = LivePlan {
             source: self.source.plan(fault, at_s)?,
             noise: self.source.noise(settings),
@@ -106,7 +106,7 @@ impl LiveView {
                 .zero
                 .clone()
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
-            recordings: folder.join("recordings"),
+            recordings: folder(shared).join("recordings"),
             network: Arc::clone(network),
         };
         Ok((name.to_owned(), plan))
@@ -125,6 +125,25 @@ impl LiveView {
         effects.push(Effect::Settle(Matter::Live));
         self.shown = LiveShown::default();
         self.begin(network, plan);
+    }
+
+    /// Lays out the sample recording and its network, to be played as soon as they are there.
+    pub(super) fn ask_for_sample(&mut self, shared: &Shared) {
+        self.sample.lay_out(folder(shared).join("samples"));
+    }
+
+    /// Plays the sample once it is there.
+    pub(super) fn take_sample(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        match self.sample.next() {
+            Some(Ok(sample)) => {
+                self.network.take(sample.name, Arc::from(sample.network));
+                self.source.kind = SourceKind::Replay;
+                self.source.path = sample.recording.display().to_string();
+                self.start(shared, effects);
+            }
+            Some(Err(reason)) => effects.push(Effect::Tell(Matter::Live, Notice::Failed(reason))),
+            None => {}
+        }
     }
 
     /// Goes on with the network that is chosen now, where a replay stands.
@@ -258,4 +277,10 @@ impl LiveView {
             self.command(Command::Drawn);
         }
     }
+}
+
+/// The folder for files of this view: beside the runs, or for this session.
+fn folder(shared: &Shared) -> PathBuf {
+    let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+    beside.map_or_else(std::env::temp_dir, PathBuf::from)
 }

@@ -2,6 +2,7 @@ use eframe::egui::{Button, Key, Modifiers, Ui};
 
 use super::{LiveView, engine::Command};
 use crate::app::{
+    glossary,
     shared::{Effect, Offers, Shared},
     theme::{Theme, space},
     widgets::{ghost_button, primary_button},
@@ -27,8 +28,7 @@ pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
     ui.add_space(space(2));
     record_ui(ui, view);
     let zero = ui.add_enabled(is_running, ghost_button("Re-zero"));
-    let hint = "Takes the latest half second as the unloaded state and divides readings by its gains, which removes the \
-                drift of amplifiers and temperature. A contact that is held on fewer than half of the rows is kept.";
+    let hint = glossary::UNLOADED_STATE.hint;
     if zero.on_hover_text(hint).clicked() {
         view.re_zero();
     }

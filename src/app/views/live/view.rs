@@ -12,10 +12,13 @@ use super::{
     replay_bar::{REPLAY_BAR_HEIGHT, replay_bar_ui},
     tools,
 };
-use crate::app::{
-    shared::{Effect, Export, Offers, Shared, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+use crate::{
+    app::{
+        shared::{Effect, Export, Offers, Shared, View},
+        theme::{Theme, space, type_size},
+        widgets::{card_ui, scrolled_ui, state_ui},
+    },
+    sensor::counted,
 };
 
 impl View for LiveView {
@@ -29,6 +32,7 @@ impl View for LiveView {
             self.start_again(shared);
         }
         self.source.take_news();
+        self.take_sample(shared, effects);
     }
 
     fn is_working(&self) -> bool {
@@ -96,7 +100,10 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
     let counts = &view.shown.counts;
     let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
     let (colour, text) = match (&view.running, watched) {
-        (None, _) if counts.decoded > 0 => (palette.dim, format!("Stopped after {} frames", counts.decoded)),
+        (None, _) if counts.decoded > 0 => (
+            palette.dim,
+            format!("Stopped after {}", counted(counts.decoded, "frame")),
+        ),
         (None, _) => (palette.dim, "Ready: press Start".to_owned()),
         (Some(_), None) => (palette.accent, "Waiting for the first frame".to_owned()),
         (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
@@ -123,7 +130,7 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
             }
         }
         if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
-            let text = format!("● Recording: {frames} frames, {seconds:.1} s");
+            let text = format!("● Recording: {}, {seconds:.1} s", counted(frames, "frame"));
             ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         }
     });

@@ -11,6 +11,7 @@ use crate::{
     evaluation::{TradeOffLevel, TradeOffPoint},
     export::format_percent,
     figure::trade_words::{frame_time, point_facts, point_name},
+    sensor::counted,
 };
 
 /// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
@@ -99,12 +100,8 @@ fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
         });
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
-    dim_ui(
-        ui,
-        &format!(
-            "{} training samples, at most {} epochs.",
-            point.settings.source.samples, point.settings.training.stopping.epochs
-        ),
-    );
+    let samples = counted(point.settings.source.samples, "training sample");
+    let epochs = counted(point.settings.training.stopping.epochs, "epoch");
+    dim_ui(ui, &format!("{samples}, at most {epochs}."));
     is_loaded
 }

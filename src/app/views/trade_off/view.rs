@@ -11,7 +11,7 @@ use crate::{
         plotting::legend_ui,
         shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
+        widgets::{card_ui, dim_ui, invitation_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_duration,
     figure::trade_off_figure,
@@ -70,7 +70,7 @@ impl View for TradeOffView {
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        trade_ui(ui, self, !shared.phase.is_busy(), effects);
+        trade_ui(ui, self, shared, effects);
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
@@ -79,16 +79,19 @@ impl View for TradeOffView {
 }
 
 /// Both charts above, the table and the choices below.
-fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, can_load: bool, effects: &mut Vec<Effect>) {
+fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let can_load = !shared.phase.is_busy();
     let whole = ui.available_rect_before_wrap();
     let (Some(outcome), Some(level)) = (&trade.outcome, trade.shown()) else {
+        let text = "The error, the time for a frame and the training time of every decoder at several noise levels, measured \
+                    on this machine.";
+        let mut is_wanted = false;
         card_ui(ui, whole, |ui| {
-            placeholder_ui(
-                ui,
-                "Press Measure to see the error, the time for a frame and the training time of every decoder at \
-                 several noise levels.",
-            );
+            is_wanted = invitation_ui(ui, text, "Measure now", trade.can_measure(shared));
         });
+        if is_wanted {
+            trade.measure(shared, effects);
+        }
         return;
     };
     let mut look = trade.look;

@@ -11,9 +11,9 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, legend_behind_ui, legend_ui, plots_ui},
-        shared::{Offers, Shared},
+        shared::{Effect, Offers, Phase, Shared},
         theme::space,
-        widgets::{placeholder_ui, tabs_ui},
+        widgets::{invitation_ui, tabs_ui},
     },
     figure::ErrorBins,
 };
@@ -47,7 +47,13 @@ fn tabs(is_narrow: bool, has_readings: bool) -> Vec<(BottomTab, &'static str)> {
 }
 
 /// The charts below the surfaces; the readings are one of them where they have no card of their own.
-pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
+pub fn charts_card_ui(
+    ui: &mut Ui,
+    view: &mut TrainView,
+    shared: &Shared,
+    has_readings: bool,
+    effects: &mut Vec<Effect>,
+) {
     if view.tab == BottomTab::Readings && !has_readings {
         view.tab = BottomTab::default();
     }
@@ -104,7 +110,12 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
             }
         }
         None if view.tab == BottomTab::Readings => readings_of_view_ui(ui, view, shared),
-        None => placeholder_ui(ui, hint_of_empty_chart(view.tab)),
+        None => {
+            let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
+            if invitation_ui(ui, hint_of_empty_chart(view.tab), "Train now", is_possible) {
+                effects.push(Effect::Train);
+            }
+        }
     }
     if (view.tab, view.has_error_bars) != before {
         ui.request_repaint();

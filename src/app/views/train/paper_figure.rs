@@ -18,13 +18,13 @@ impl PaperFigure {
     /// In the paper's order.
     pub const ALL: [Self; 4] = [Self::Four, Self::Six, Self::Seven, Self::Eight];
 
-    /// The word on its button.
+    /// Its array and the way in which it is seen.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Four => "Fig. 4",
-            Self::Six => "Fig. 6",
-            Self::Seven => "Fig. 7",
-            Self::Eight => "Fig. 8",
+            Self::Four => "10×10, top view",
+            Self::Six => "10×6, nodes",
+            Self::Seven => "10×6, 3-D",
+            Self::Eight => "10×6, top view",
         }
     }
 
@@ -32,18 +32,19 @@ impl PaperFigure {
     pub fn description(self) -> &'static str {
         match self {
             Self::Four => {
-                "Trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
                  paper's spline, ours includes a plane: level nodes give a level surface."
             }
             Self::Six => {
-                "Trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as discs."
+                "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as \
+                 discs."
             }
             Self::Seven => {
-                "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
+                "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
                  paper's spline, ours includes a plane: level nodes give a level surface."
             }
             Self::Eight => {
-                "Trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
                  paper's spline, ours includes a plane: level nodes give a level surface."
             }
         }

@@ -3,7 +3,7 @@ use eframe::egui::{Response, Ui, WidgetInfo, accesskit::Role};
 use crate::app::{
     shared::{Effect, Phase, Shared},
     theme::space,
-    widgets::{ghost_button, primary_button},
+    widgets::{Landmark, ghost_button, primary_button},
 };
 
 /// The buttons that run the training, from right to left.
@@ -37,6 +37,7 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     }
     let can_train = !is_busy && shared.phase != Phase::Died;
     let train = ui.add_enabled(can_train, primary_button("▶ Train"));
+    Landmark::Train.stands_at(ui, train.rect);
     let can_continue = shared.can_continue();
     let hint = if can_continue {
         "Starts again: draws the sets and trains the network (Ctrl+Enter)."

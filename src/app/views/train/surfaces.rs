@@ -14,7 +14,7 @@ use crate::{
         surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
+        widgets::{Landmark, card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
     },
     export::format_number,
     figure::surface::{Section, Surface, SurfaceFigure, ViewMode},
@@ -203,6 +203,7 @@ fn surface_ui(
     };
     if role == Role::Actual {
         view.press.take_target(&shown, surface);
+        Landmark::ActualSurface.stands_at(ui, shown.response.rect);
         let painter = ui.painter();
         view.press
             .outline_ui(painter, &theme.palette, shown.response.hover_pos(), test.stroke_mm);

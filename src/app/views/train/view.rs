@@ -44,6 +44,11 @@ impl View for TrainView {
         if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
             effects.push(Effect::Stop);
         }
+        if offers.offer("Press the middle of the surface", shared.test().is_some())
+            && let Some(test) = shared.test()
+        {
+            self.press.press_middle(test);
+        }
         let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
         let has_next = self.snapshot + 1 < snapshots;
         if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {

@@ -64,6 +64,8 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
             (charts.with_max_x(charts.max.x - gap), true)
         }
     };
-    card_ui(ui, charts, |ui| charts_card_ui(ui, view, shared, has_readings));
+    card_ui(ui, charts, |ui| {
+        charts_card_ui(ui, view, shared, has_readings, effects);
+    });
     ui.allocate_rect(whole, Sense::hover());
 }

@@ -16,9 +16,9 @@ pub(super) fn header<'a>(name: &'a str, portable: &'a Portable, arithmetic: Arit
         name,
         portable,
         reading: type_name(arithmetic.rest),
-        readings: "resistances_ohm",
+        readings: portable.meaning.readings(),
         coordinate: type_name(arithmetic.rest),
-        coordinates: "coordinates_mm",
+        coordinates: portable.meaning.outputs(),
         units: "Resistances are in ohm, coordinates in mm.",
     }
 }
@@ -49,7 +49,9 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
     let channels = (channels.as_str(), portable.channels);
     let outputs = (outputs.as_str(), portable.outputs);
     let nodes = ("HIDDEN", portable.hidden);
-    array("centre_ohm", hidden, &[channels], |network| &network.centre_ohm);
+    array(portable.meaning.centre(), hidden, &[channels], |network| {
+        &network.centre
+    });
     array("hidden_weights", hidden, &[channels, nodes], |network| {
         &network.hidden_weights
     });
@@ -71,23 +73,22 @@ fn push_decode(text: &mut String, header: &Header<'_>, Arithmetic { hidden, rest
     let (upper, quantity) = (header.upper(), header.portable.quantity);
     let (wide, plain) = (type_name(hidden), type_name(rest));
     let largest = if rest == Digits::Single { "FLT_MAX" } else { "DBL_MAX" };
+    let (readings, coordinates) = (header.readings, header.coordinates);
     let is_invalid = match quantity {
-        Quantity::Raw => format!("!(resistances_ohm[i] >= -{largest} && resistances_ohm[i] <= {largest})"),
-        _ => format!("!(resistances_ohm[i] > 0 && resistances_ohm[i] <= {largest})"),
+        Quantity::Raw => format!("!({readings}[i] >= -{largest} && {readings}[i] <= {largest})"),
+        _ => format!("!({readings}[i] > 0 && {readings}[i] <= {largest})"),
     };
     let suffix = |digits: Digits| if digits == Digits::Single { "f" } else { "" };
+    let centre = format!("{}[network][i]", header.portable.meaning.centre());
     let change = match quantity {
-        Quantity::Resistance | Quantity::Raw => "reading - centre_ohm[network][i]".to_owned(),
-        Quantity::Conductance => "(centre_ohm[network][i] - reading) / reading".to_owned(),
-        Quantity::LogResistance => {
-            let centre = "centre_ohm[network][i]";
-            format!("log1p{}((reading - {centre}) / {centre})", suffix(hidden))
-        }
+        Quantity::Resistance | Quantity::Raw => format!("reading - {centre}"),
+        Quantity::Conductance => format!("({centre} - reading) / reading"),
+        Quantity::LogResistance => format!("log1p{}((reading - {centre}) / {centre})", suffix(hidden)),
     };
     let reading = if hidden == rest {
-        "resistances_ohm[i]".to_owned()
+        format!("{readings}[i]")
     } else {
-        format!("({wide})resistances_ohm[i]")
+        format!("({wide}){readings}[i]")
     };
     let sum = if hidden == rest {
         "sums[j]".to_owned()
@@ -115,12 +116,12 @@ fn push_decode(text: &mut String, header: &Header<'_>, Arithmetic { hidden, rest
          }}\n    \
          }}\n    \
          for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        \
-         coordinates_mm[k] = output_biases[network][k];\n    \
+         {coordinates}[k] = output_biases[network][k];\n    \
          }}\n    \
          for (int j = 0; j < HIDDEN; ++j) {{\n        \
          const {plain} activation = tanh{tanh}({sum});\n        \
          for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n            \
-         coordinates_mm[k] += activation * output_weights[network][j][k];\n        \
+         {coordinates}[k] += activation * output_weights[network][j][k];\n        \
          }}\n    \
          }}\n    \
          return {upper}_OK;\n\

@@ -1,7 +1,7 @@
 use std::fmt::Write;
 
 use super::literal::push_array;
-use crate::export::bundle::portable::Portable;
+use crate::export::bundle::{meaning::Meaning, portable::Portable};
 
 /// Names and types that the header, source and self-test of a bundle in C have in common.
 pub(super) struct Header<'a> {
@@ -11,7 +11,7 @@ pub(super) struct Header<'a> {
     /// Type and name of the readings.
     pub(super) reading: &'static str,
     pub(super) readings: &'static str,
-    /// Type and name of the coordinates.
+    /// Type and name of the outputs.
     pub(super) coordinate: &'static str,
     pub(super) coordinates: &'static str,
     /// A sentence on units.
@@ -75,13 +75,19 @@ impl Header<'_> {
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
         let (upper, portable) = (self.upper(), self.portable);
-        let mut text = format!(
-            "/* Decodes the readings of one row-wire of a tactile array into the coordinates of its nodes.\n   \
-             {units} Channels are r_1 to r_{channels}; outputs are x_1, y_1, z_1, x_2, ... */\n\
-             #ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
-            units = self.units,
-            channels = portable.channels,
-        );
+        let mut text = match &portable.meaning {
+            Meaning::Array(_) => format!(
+                "/* Decodes the readings of one row-wire of a tactile array into the coordinates of its nodes.\n   \
+                 {units} Channels are r_1 to r_{channels}; outputs are x_1, y_1, z_1, x_2, ... */\n",
+                units = self.units,
+                channels = portable.channels,
+            ),
+            own @ Meaning::Own { .. } => format!(
+                "/* Decodes readings into targets.\n   {} */\n",
+                own.legend().join("\n   ")
+            ),
+        };
+        let _ = write!(text, "#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n");
         if self.reading == "int32_t" {
             text += "#include <stdint.h>\n\n";
         }
@@ -98,15 +104,17 @@ impl Header<'_> {
              enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2\n}};\n\n"
         );
         let row = if portable.takes_row() {
-            format!(" Row-wires are counted from 1 to {}.", portable.networks.len())
+            format!(" Rows are counted from 1 to {}.", portable.networks.len())
         } else {
             String::new()
         };
         let _ = write!(
             text,
-            "/* Decodes one row-wire.{row} Returns {upper}_OK, or leaves the coordinates as they are and returns\n   \
+            "/* Decodes {one}.{row} Returns {upper}_OK, or leaves the {coordinates} as they are and returns\n   \
              what is wrong. */\n{};\n\n",
-            self.decode_signature()
+            self.decode_signature(),
+            one = portable.meaning.sample(),
+            coordinates = portable.meaning.output().to_owned() + "s",
         );
         if portable.ranges().is_some() {
             let _ = write!(

@@ -31,7 +31,7 @@ pub(super) fn write_floating(
     let self_test = SelfTest {
         header: &header,
         vectors,
-        unit_mm: 1.0,
+        unit: 1.0,
         limit,
         bits: None,
     };
@@ -55,7 +55,7 @@ pub(super) fn write_fixed(
     let self_test = SelfTest {
         header: &header,
         vectors,
-        unit_mm: 1e-6,
+        unit: 1e-6,
         limit,
         bits: Some(vectors.iter().flat_map(|vector| bits_of(networks, vector)).collect()),
     };
@@ -67,9 +67,7 @@ pub(super) fn write_fixed(
 }
 
 fn bits_of(networks: &FixedNetworks, vector: &Vector) -> Vec<i32> {
-    networks
-        .decode(vector.network, &vector.readings_ohm)
-        .unwrap_or_default()
+    networks.decode(vector.network, &vector.readings).unwrap_or_default()
 }
 
 fn files(header: &Header<'_>, source: String, self_test: String) -> Files {

@@ -5,8 +5,8 @@ use crate::export::bundle::vectors::Vector;
 pub(super) struct SelfTest<'a> {
     pub(super) header: &'a Header<'a>,
     pub(super) vectors: &'a [Vector],
-    /// Millimetres of one unit of the decoded coordinates.
-    pub(super) unit_mm: f64,
+    /// What one unit of the decoded outputs is, in mm where they are coordinates.
+    pub(super) unit: f64,
     /// Largest deviation allowed, relative to the range of the outputs.
     pub(super) limit: f64,
     /// Whole numbers that must come out bit for bit, vector by vector.
@@ -14,22 +14,23 @@ pub(super) struct SelfTest<'a> {
 }
 
 impl SelfTest<'_> {
-    /// Writes the program. `reading` writes a reading in ohm as a literal.
+    /// Writes the program. `reading` writes a reading as a literal.
     pub(super) fn text(&self, reading: impl Fn(f64) -> String) -> String {
         let Self {
             header,
             vectors,
-            unit_mm,
+            unit,
             limit,
             bits,
         } = self;
         let (name, upper, portable) = (header.name, header.upper(), header.portable);
         let mut text = format!(
-            "/* Decodes the golden vectors and compares the coordinates with those of the program that made them.\n   \
+            "/* Decodes the golden vectors and compares the {output}s with those of the program that made them.\n   \
              Exits with 0 if they agree. */\n\
              #include \"{name}_decode.h\"\n\n#include <math.h>\n#include <stdio.h>\n\n\
              #define VECTORS {count}\n\n",
-            count = vectors.len()
+            count = vectors.len(),
+            output = portable.meaning.output(),
         );
         if portable.takes_row() {
             let rows = vectors.iter().map(|vector| vector.network + 1);
@@ -38,20 +39,24 @@ impl SelfTest<'_> {
         let declaration = format!("static const {} readings[VECTORS][{upper}_CHANNELS]", header.reading);
         let readings = vectors
             .iter()
-            .flat_map(|vector| &vector.readings_ohm)
+            .flat_map(|vector| &vector.readings)
             .map(|&ohm| reading(ohm));
         push_array(&mut text, &declaration, &[vectors.len(), portable.channels], readings);
-        let declaration = format!("static const double expected_mm[VECTORS][{upper}_OUTPUTS]");
+        let declaration = format!("static const double expected[VECTORS][{upper}_OUTPUTS]");
         let expected = vectors
             .iter()
-            .flat_map(|vector| &vector.coordinates_mm)
-            .map(|mm| format!("{mm:e}"));
+            .flat_map(|vector| &vector.answers)
+            .map(|value| format!("{value:e}"));
         push_array(&mut text, &declaration, &[vectors.len(), portable.outputs], expected);
+        let scales = portable.scales.iter().map(|scale| format!("{scale:e}"));
+        text += "/* Ranges to which deviations are relative. */\n";
+        let declaration = format!("static const double scales[{upper}_OUTPUTS]");
+        push_array(&mut text, &declaration, &[portable.outputs], scales);
         let same_bits = if let Some(bits) = bits {
             let declaration = format!("static const int32_t expected_bits[VECTORS][{upper}_OUTPUTS]");
             push_array(&mut text, &declaration, &[vectors.len(), portable.outputs], bits);
             "            if (decoded[k] != expected_bits[v][k]) {\n                \
-             puts(\"a coordinate differs from the model in whole numbers\");\n                \
+             puts(\"an output differs from the model in whole numbers\");\n                \
              return 1;\n            }\n"
         } else {
             ""
@@ -106,14 +111,13 @@ impl SelfTest<'_> {
              return 1;\n        }}\n\
              {outside}        \
              for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n            \
-             const double deviation = fabs((double)decoded[k] * {unit_mm:e} - expected_mm[v][k]) / {range:e};\n            \
+             const double deviation = fabs((double)decoded[k] * {unit:e} - expected[v][k]) / scales[k];\n            \
              if (!(deviation <= largest)) {{\n                \
              largest = deviation;\n            }}\n{same_bits}        }}\n    }}\n\
              {bad_reading}{bad_row}    \
              printf(\"largest deviation: %.3e of the range of the outputs, limit {limit:.1e}\\n\", largest);\n    \
              return largest <= {limit:e} ? 0 : 1;\n}}\n",
             coordinate = header.coordinate,
-            range = portable.full_scale_mm,
         )
     }
 }

@@ -28,6 +28,8 @@ pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) logarithm: LogTable,
     /// Bound on the error of a coordinate within the limits of the readings, in mm.
     pub(in crate::export::bundle) bound_mm: f64,
+    /// Widest range of a coordinate in training, in mm.
+    pub(in crate::export::bundle) range_mm: f64,
 }
 
 /// One network in whole numbers.
@@ -58,15 +60,15 @@ impl FixedNetworks {
     /// The range of the readings is not known, a number does not fit, or the bound on the error is as large as the range
     /// of the outputs.
     pub(in crate::export::bundle) fn of(portable: &Portable) -> Result<Self, FixedPointError> {
-        let range_mm = portable.full_scale_mm;
-        let sixteen = Self::with_width(portable, HiddenWidth::Sixteen);
+        let range_mm = portable.output_range_mm().ok_or(FixedPointError::Raw)?;
+        let sixteen = Self::with_width(portable, range_mm, HiddenWidth::Sixteen);
         if sixteen
             .as_ref()
             .is_ok_and(|fixed| fixed.bound_mm <= USUAL_BOUND * range_mm)
         {
             return sixteen;
         }
-        let wide = Self::with_width(portable, HiddenWidth::TwentyFour)?;
+        let wide = Self::with_width(portable, range_mm, HiddenWidth::TwentyFour)?;
         if wide.bound_mm < range_mm {
             return Ok(wide);
         }
@@ -74,7 +76,7 @@ impl FixedNetworks {
         Err(FixedPointError::Coarse { bound_mm, range_mm })
     }
 
-    fn with_width(portable: &Portable, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
+    fn with_width(portable: &Portable, range_mm: f64, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
         if portable.quantity == Quantity::Raw {
             return Err(FixedPointError::Raw);
         }
@@ -92,7 +94,7 @@ impl FixedNetworks {
         let mut networks = Vec::new();
         let mut bound_mm = 0.0_f64;
         for (network, range) in portable.networks.iter().zip(ranges) {
-            let changes: Vec<_> = (range.limits.iter().zip(&network.centre_ohm))
+            let changes: Vec<_> = (range.limits.iter().zip(&network.centre))
                 .map(|(&limits, &centre_ohm)| Change::of(portable.quantity, decimals, limits, centre_ohm))
                 .collect();
             let (fixed, bound_nm) = FixedNetwork::of(network, range, &changes, decimals, hidden_width, tangent_error)?;
@@ -107,6 +109,7 @@ impl FixedNetworks {
             tangent,
             logarithm,
             bound_mm,
+            range_mm,
         })
     }
 
@@ -121,8 +124,8 @@ impl FixedNetworks {
     }
 
     /// Decodes a row: coordinates in nm, or `None` if a reading is not above 0.
-    pub(in crate::export::bundle) fn decode(&self, network: usize, readings_ohm: &[f64]) -> Option<Vec<i32>> {
-        let readings: Vec<_> = readings_ohm.iter().map(|&ohm| self.reading(ohm)).collect();
+    pub(in crate::export::bundle) fn decode(&self, network: usize, readings: &[f64]) -> Option<Vec<i32>> {
+        let readings: Vec<_> = readings.iter().map(|&ohm| self.reading(ohm)).collect();
         self.decode_whole(network, &readings)
     }
 }

@@ -4,6 +4,7 @@ mod npz;
 
 use self::npz::NamedArray;
 use super::{
+    meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, Digits, RoundedNetwork, Weights},
 };
@@ -20,7 +21,9 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
         values: weights.networks.iter().flat_map(of).collect(),
     };
     let mut arrays = vec![
-        array("centre_ohm", hidden, &[channels], &|network| network.centre_ohm.clone()),
+        array(portable.meaning.centre(), hidden, &[channels], &|network| {
+            network.centre.clone()
+        }),
         array("hidden_weights", hidden, &[channels, portable.hidden], &|network| {
             network.hidden_weights.clone()
         }),
@@ -41,8 +44,9 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
             shape: vec![ranges.len(), channels],
             values: ranges.iter().flat_map(|range| range.limits.iter().map(pick)).collect(),
         };
-        arrays.push(limit("lowest_ohm", |limits| limits.0));
-        arrays.push(limit("highest_ohm", |limits| limits.1));
+        let [lowest, highest] = portable.meaning.limits();
+        arrays.push(limit(lowest, |limits| limits.0));
+        arrays.push(limit(highest, |limits| limits.1));
     }
     npz::write(&arrays)
 }
@@ -51,7 +55,7 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
 ///
 /// # Errors
 /// A description of the damage.
-pub(super) fn read_weights(bytes: &[u8], quantity: Quantity) -> Result<Weights, String> {
+pub(super) fn read_weights(bytes: &[u8], portable: &Portable) -> Result<Weights, String> {
     let arrays = npz::read(bytes)?;
     let array = |name: &str| {
         let found = arrays.iter().find(|array| array.name == name);
@@ -65,10 +69,11 @@ pub(super) fn read_weights(bytes: &[u8], quantity: Quantity) -> Result<Weights, 
             .map(<[f64]>::to_vec)
             .ok_or_else(|| format!("'{name}' is too short"))
     };
-    let centre = array("centre_ohm")?;
+    let centre_name = portable.meaning.centre();
+    let centre = array(centre_name)?;
     let networks = (0..centre.shape[0]).map(|index| {
         Ok(RoundedNetwork {
-            centre_ohm: of_network("centre_ohm", index)?,
+            centre: of_network(centre_name, index)?,
             hidden_weights: of_network("hidden_weights", index)?,
             hidden_biases: of_network("hidden_biases", index)?,
             output_weights: of_network("output_weights", index)?,
@@ -76,7 +81,7 @@ pub(super) fn read_weights(bytes: &[u8], quantity: Quantity) -> Result<Weights, 
         })
     });
     Ok(Weights {
-        quantity,
+        quantity: portable.quantity,
         arithmetic: Arithmetic {
             hidden: centre.digits,
             rest: array("output_weights")?.digits,
@@ -91,21 +96,27 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
     let (argument, row) = if portable.takes_row() {
         let check = format!(
             "    row = np.broadcast_to(np.asarray(row), len(r))\n    if not np.isin(row, np.arange(1, {rows} + 1)).all():\n        \
-             raise ValueError(\"row: give row-wires from 1 to {rows}\")\n"
+             raise ValueError(\"row: give rows from 1 to {rows}\")\n"
         );
         (", row", check)
     } else {
         ("", "    row = np.ones(len(r))\n".to_owned())
     };
     let row_text = if portable.takes_row() {
-        "; row: the row-wire of each sample, from 1"
+        "; row: the row of each sample, from 1"
     } else {
         ""
     };
+    let meaning = &portable.meaning;
+    let (input, output, centre) = (
+        meaning.readings(),
+        meaning.outputs(),
+        format!("w[\"{}\"]", meaning.centre()),
+    );
     let change = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => "x - w[\"centre_ohm\"]",
-        Quantity::Conductance => "(w[\"centre_ohm\"] - x) / x",
-        Quantity::LogResistance => "np.log1p((x - w[\"centre_ohm\"]) / w[\"centre_ohm\"])",
+        Quantity::Resistance | Quantity::Raw => format!("x - {centre}"),
+        Quantity::Conductance => format!("({centre} - x) / x"),
+        Quantity::LogResistance => format!("np.log1p((x - {centre}) / {centre})"),
     };
     let is_reading = match portable.quantity {
         Quantity::Raw => "np.isfinite(r)",
@@ -117,40 +128,55 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
     };
     let (outside, counted) = if portable.ranges().is_some() {
         (
-            "        outside[mine] = ((r[mine] < w[\"lowest_ohm\"]) | (r[mine] > w[\"highest_ohm\"])).sum(axis=1)\n",
+            format!(
+                "        outside[mine] = ((r[mine] < w[\"{lowest}\"]) | (r[mine] > w[\"{highest}\"])).sum(axis=1)\n",
+                lowest = meaning.limits()[0],
+                highest = meaning.limits()[1],
+            ),
             "the number of readings of each sample outside the range of training",
         )
     } else {
-        ("", "zeros, because the range of training is not known")
+        (String::new(), "zeros, because the range of training is not known")
     };
+    let outputs = portable.outputs;
+    let (purpose, answers) = match meaning {
+        Meaning::Array(_) => (
+            "Decodes readings of a tactile array in ohm into the coordinates of its nodes in mm",
+            format!("the coordinates in mm (samples x {outputs}: x_1, y_1, z_1, x_2, ...)"),
+        ),
+        Meaning::Own { .. } => (
+            "Decodes readings into targets",
+            format!("the targets (samples x {outputs})"),
+        ),
+    };
+    let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
     format!(
-        r#""""Decodes readings of a tactile array in ohm into the coordinates of its nodes in mm; see README.txt."""
-import pathlib
+        r#""""{purpose}; see README.txt."""
+{legend}import pathlib
 
 import numpy as np
 
 NETWORKS = dict(np.load(pathlib.Path(__file__).with_name("network.npz")))
 
 
-def decode(resistances_ohm{argument}):
-    """Returns the coordinates in mm (samples x {outputs}: x_1, y_1, z_1, x_2, ...), and
+def decode({input}{argument}):
+    """Returns {answers}, and
     {counted}.
 
-    resistances_ohm: samples x {channels}{row_text}
+    {input}: samples x {channels}{row_text}
     """
-    r = np.atleast_2d(np.asarray(resistances_ohm, dtype={dtype}))
+    r = np.atleast_2d(np.asarray({input}, dtype={dtype}))
     if not ({is_reading}).all():
-        raise ValueError("resistances_ohm: give finite numbers{above}")
-{row}    coordinates_mm, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
+        raise ValueError("{input}: give finite numbers{above}")
+{row}    {output}, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
     for index in range({rows}):
         mine, w = row == index + 1, {{name: array[index] for name, array in NETWORKS.items()}}
-        x = r[mine].astype(w["centre_ohm"].dtype)
+        x = r[mine].astype({centre}.dtype)
         sums = ({change}) @ w["hidden_weights"] + w["hidden_biases"]
-        coordinates_mm[mine] = np.tanh(sums.astype(r.dtype)) @ w["output_weights"] + w["output_biases"]
-{outside}    return coordinates_mm, outside
+        {output}[mine] = np.tanh(sums.astype(r.dtype)) @ w["output_weights"] + w["output_biases"]
+{outside}    return {output}, outside
 "#,
         channels = portable.channels,
-        outputs = portable.outputs,
         above = if portable.quantity == Quantity::Raw {
             ""
         } else {

@@ -2,12 +2,12 @@
 //!
 //! | input | shape | type |
 //! |---|---|---|
-//! | `resistances_ohm` | batch × M4 | float or double |
+//! | `resistances_ohm`, or `readings` of own data | batch × M4 | float or double |
 //! | `row`, for networks of known rows | batch | int64, from 1 |
 //!
 //! | output | shape | type |
 //! |---|---|---|
-//! | `coordinates_mm` | batch × 3·M2 | as the input; NaN where a reading or the row is invalid |
+//! | `coordinates_mm`, or `targets` | batch × 3·M2 | as the input; NaN where a reading or the row is invalid |
 //! | `readings_outside`, if the range in training is known | batch | int64 |
 
 mod evaluator;
@@ -36,7 +36,7 @@ pub(super) struct OnnxGraph {
 
 /// The outputs of a graph.
 pub(super) struct OnnxAnswers {
-    pub(super) coordinates_mm: Vec<Vec<f64>>,
+    pub(super) answers: Vec<Vec<f64>>,
     #[cfg_attr(not(test), expect(dead_code, reason = "compared with the range in tests"))]
     pub(super) readings_outside: Option<Vec<i64>>,
 }
@@ -66,11 +66,12 @@ impl OnnxGraph {
     /// # Errors
     /// A description of the first operation that fails.
     pub(super) fn decode(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
-        let channels = vectors.first().map_or(0, |vector| vector.readings_ohm.len());
-        let readings = vectors.iter().flat_map(|vector| &vector.readings_ohm);
+        let channels = vectors.first().map_or(0, |vector| vector.readings.len());
+        let readings = vectors.iter().flat_map(|vector| &vector.readings);
         let readings = readings.map(|&ohm| self.digits.round(ohm)).collect();
+        let name = |values: &[schema::ValueInfo]| values.first().map(|value| value.name.clone()).unwrap_or_default();
         let mut inputs = vec![(
-            "resistances_ohm".to_owned(),
+            name(&self.graph.input),
             Tensor::real(self.digits, [vectors.len(), channels], readings),
         )];
         if self.graph.input.len() > 1 {
@@ -78,21 +79,19 @@ impl OnnxGraph {
             inputs.push(("row".to_owned(), Tensor::int([vectors.len()], rows)));
         }
         let mut values = evaluate(&self.graph, inputs)?;
-        let coordinates_mm = match values
-            .remove("coordinates_mm")
-            .map(|tensor| (tensor.shape, tensor.values))
-        {
+        let found = values.remove(&name(&self.graph.output));
+        let answers = match found.map(|tensor| (tensor.shape, tensor.values)) {
             Some((shape, Values::Real(_, values))) if shape.len() == 2 => {
                 values.chunks(shape[1].max(1)).map(<[f64]>::to_vec).collect()
             }
-            _ => return Err("there are no coordinates".to_owned()),
+            _ => return Err("there are no outputs".to_owned()),
         };
         let readings_outside = match values.remove("readings_outside").map(|tensor| tensor.values) {
             Some(Values::Int(outside)) => Some(outside),
             _ => None,
         };
         Ok(OnnxAnswers {
-            coordinates_mm,
+            answers,
             readings_outside,
         })
     }

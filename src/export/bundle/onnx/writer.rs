@@ -7,10 +7,12 @@ use super::{
 };
 use crate::{
     export::bundle::{
-        metadata::{Metadata, coordinate_names, reading_names},
+        exported_network::Metadata,
+        meaning::{Meaning, comment},
         portable::Portable,
         weights::{Digits, RoundedNetwork, Weights},
     },
+    import::Channel,
     network::Quantity,
 };
 
@@ -25,7 +27,7 @@ pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, m
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
     });
     let row = if portable.takes_row() {
-        "the network of the row-wire 'row' (from 1)"
+        "the network of the row 'row' (from 1)"
     } else {
         "the network"
     };
@@ -33,10 +35,17 @@ pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, m
         ir_version: IR_VERSION,
         producer_name: env!("CARGO_PKG_NAME").to_owned(),
         producer_version: env!("CARGO_PKG_VERSION").to_owned(),
-        doc_string: format!(
-            "Decodes the readings of one row-wire in ohm into the coordinates of its nodes in mm with {row}. Answers are \
-             NaN where a reading or the row is invalid."
-        ),
+        doc_string: match portable.meaning {
+            Meaning::Array(_) => format!(
+                "Decodes the readings of one row-wire in ohm into the coordinates of its nodes in mm with {row}. Answers are \
+                 NaN where a reading or the row is invalid."
+            ),
+            Meaning::Own { .. } => {
+                format!(
+                    "Decodes readings into targets with {row}. Answers are NaN where a reading or the row is invalid."
+                )
+            }
+        },
         graph: Some(graph(portable, weights)),
         opset_import: vec![OperatorSet {
             domain: String::new(),
@@ -72,25 +81,38 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
         biases,
     );
     let answers = builder.node("Add", &[&products, &biases], "answers");
-    builder.node("Where", &[&is_valid, &answers, "not_a_number"], "coordinates_mm");
+    let meaning = &portable.meaning;
+    builder.node("Where", &[&is_valid, &answers, "not_a_number"], meaning.outputs());
+    let names = |array: &str, own: &str, channels: Vec<Channel>| {
+        let is_array = matches!(meaning, Meaning::Array(_));
+        let name = |channel: &Channel| {
+            if is_array {
+                channel.name.clone()
+            } else {
+                comment(&channel.title())
+            }
+        };
+        let names: Vec<String> = channels.iter().map(name).collect();
+        format!("{}: {}", if is_array { array } else { own }, names.join(", "))
+    };
     let mut outputs = vec![value(
-        "coordinates_mm",
+        meaning.outputs(),
         element_type(digits),
         Some(portable.outputs),
-        format!("Coordinates in mm: {}", coordinate_names(portable).join(", ")),
+        names("Coordinates in mm", "Targets", meaning.targets()),
     )];
     if add_readings_outside(&mut builder, portable, digits) {
         let text = "Number of readings beyond the range seen in training by more than a tenth of it";
         outputs.push(value("readings_outside", INT64, None, text.to_owned()));
     }
     let mut inputs = vec![value(
-        "resistances_ohm",
+        meaning.readings(),
         element_type(digits),
         Some(portable.channels),
-        format!("Readings in ohm: {}", reading_names(portable).join(", ")),
+        names("Readings in ohm", "Readings", meaning.inputs()),
     )];
     if portable.takes_row() {
-        let text = format!("Row-wire of each reading, from 1 to {}", portable.networks.len());
+        let text = format!("Row of each reading, from 1 to {}", portable.networks.len());
         inputs.push(value("row", INT64, None, text));
     }
     Graph {
@@ -104,16 +126,17 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
 /// Adds the condition (batch × 1) under which there is an answer, and the index of the row's network.
 fn add_validity(builder: &mut GraphBuilder, portable: &Portable, digits: Digits) -> String {
     let scalar = |value: f64| Tensor::real(digits, [], vec![value]);
+    let readings = portable.meaning.readings();
     let not_outside = builder.constant("infinity", &scalar(f64::INFINITY));
     builder.constant("not_a_number", &scalar(f64::NAN));
     builder.constant("second_axis", &Tensor::int([1], vec![1]));
     let is_reading = if portable.quantity == Quantity::Raw {
-        let size = builder.node("Abs", &["resistances_ohm"], "reading_sizes");
+        let size = builder.node("Abs", &[readings], "reading_sizes");
         builder.node("Less", &[&size, &not_outside], "is_reading")
     } else {
         let zero = builder.constant("zero", &scalar(0.0));
-        let is_positive = builder.node("Greater", &["resistances_ohm", &zero], "is_positive");
-        let is_finite = builder.node("Less", &["resistances_ohm", &not_outside], "is_finite");
+        let is_positive = builder.node("Greater", &[readings, &zero], "is_positive");
+        let is_finite = builder.node("Less", &[readings, &not_outside], "is_finite");
         builder.node("And", &[&is_positive, &is_finite], "is_reading")
     };
     let is_invalid = builder.node("Not", &[&is_reading], "is_invalid_reading");
@@ -138,12 +161,19 @@ fn add_validity(builder: &mut GraphBuilder, portable: &Portable, digits: Digits)
 fn add_hidden_sums(builder: &mut GraphBuilder, portable: &Portable, weights: &Weights) -> String {
     let digits = weights.arithmetic.hidden;
     let readings = if digits == weights.arithmetic.rest {
-        "resistances_ohm".to_owned()
+        portable.meaning.readings().to_owned()
     } else {
-        builder.cast("resistances_ohm", digits, "resistances_in_double")
+        builder.cast(portable.meaning.readings(), digits, "readings_in_double")
     };
-    let centre = |network: &RoundedNetwork| network.centre_ohm.clone();
-    let centre = add_table(builder, "centre_ohm", weights, digits, &[portable.channels], centre);
+    let centre = |network: &RoundedNetwork| network.centre.clone();
+    let centre = add_table(
+        builder,
+        portable.meaning.centre(),
+        weights,
+        digits,
+        &[portable.channels],
+        centre,
+    );
     let changes = match portable.quantity {
         Quantity::Resistance | Quantity::Raw => builder.node("Sub", &[&readings, &centre], "changes"),
         Quantity::Conductance => {
@@ -220,12 +250,11 @@ fn add_readings_outside(builder: &mut GraphBuilder, portable: &Portable, digits:
         let table = builder.constant(&format!("{name}_of_rows"), &Tensor::real(digits, shape, values));
         builder.node("Gather", &[&table, "row_index"], name)
     };
-    let (low, high) = (
-        limit("lowest_ohm", |limits| limits.0),
-        limit("highest_ohm", |limits| limits.1),
-    );
-    let not_below = builder.node("GreaterOrEqual", &["resistances_ohm", &low], "is_not_below");
-    let not_above = builder.node("LessOrEqual", &["resistances_ohm", &high], "is_not_above");
+    let [lowest, highest] = portable.meaning.limits();
+    let (low, high) = (limit(lowest, |limits| limits.0), limit(highest, |limits| limits.1));
+    let readings = portable.meaning.readings();
+    let not_below = builder.node("GreaterOrEqual", &[readings, &low], "is_not_below");
+    let not_above = builder.node("LessOrEqual", &[readings, &high], "is_not_above");
     let is_inside = builder.node("And", &[&not_below, &not_above], "is_inside");
     let is_outside = builder.node("Not", &[&is_inside], "is_outside");
     let counted = builder.cast_to(&is_outside, INT64, "counted_outside");

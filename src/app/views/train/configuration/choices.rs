@@ -2,6 +2,7 @@ use eframe::egui::{self, RichText, Slider, Stroke, TextEdit, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, space, type_size},
         widgets::{
             fields::{capitalised, count_ui, usually},
@@ -30,7 +31,10 @@ pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
         counted(scale.columns(), "column-wire"),
         counted(scale.nodes_per_column(), "node")
     );
-    ui.label(RichText::new(text).size(type_size().note).color(dim));
+    let wires = [glossary::ROW_WIRE, glossary::COLUMN_WIRE, glossary::NODE];
+    let wires = wires.map(|term| format!("{}: {}", term.name, term.hint)).join("\n\n");
+    ui.label(RichText::new(text).size(type_size().note).color(dim))
+        .on_hover_text(wires);
     if let Some(note) = scale.note() {
         note_ui(ui, &note);
     }
@@ -51,10 +55,7 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
             ui.add(edit).labelled_by(label.id)
         })
         .inner
-        .on_hover_text(
-            "M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any size is \
-                        possible.",
-        );
+        .on_hover_text(glossary::ARRAY_SCALE.hint);
     let parsed = text.parse::<ArrayScale>();
     if response.changed() {
         ui.data_mut(|data| data.insert_temp(id, text));
@@ -70,12 +71,11 @@ fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 
 /// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
 pub fn hidden_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let hint = "Number of nodes in the tanh layer between resistances and coordinates.";
     let usual = SimulatedSettings::default().hidden;
     count_ui(
         ui,
         "Hidden nodes",
-        hint,
+        glossary::HIDDEN_NODES.hint,
         &mut draft.hidden,
         usually(usual, 1..=LARGEST_HIDDEN),
     );

@@ -5,6 +5,7 @@ use super::{
     method_section::{method_choice_ui, method_settings_ui, stopping_ui},
     network_section::inputs_ui,
     preset_section::{applied, present, preset_section_ui},
+    scene_choice::scene_choice_ui,
     scene_section::{outlook_notes_ui, samples_section_ui, scene_section_ui},
     sensor_section::geometry_ui,
     summaries,
@@ -14,7 +15,7 @@ use crate::{
         shared::{Effect, Phase, Shared},
         theme::space,
         views::train::paper_figure::PaperFigure,
-        widgets::{fold_ui, ghost_button, scrolled_ui},
+        widgets::{Landmark, fold_ui, ghost_button, scrolled_ui},
     },
     evaluation::{Outlook, SimulatedSettings},
 };
@@ -30,13 +31,16 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
         let scene = draft.source.scene;
         let followed = present(&draft);
         ui.add_space(space(2));
+        let top = ui.cursor().top();
         ui.add_enabled_ui(!is_busy, |ui| {
             array_choice_ui(ui, &mut draft.source.sensor.scale);
             hidden_choice_ui(ui, &mut draft);
         });
         ui.add_enabled_ui(!is_busy || is_held, |ui| method_choice_ui(ui, &mut draft));
+        Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
         ui.add_enabled_ui(!is_busy, |ui| {
             preset_section_ui(ui, &mut draft);
+            scene_choice_ui(ui, &mut draft);
             ui.add_space(space(2));
             ui.separator();
             outlook_notes_ui(ui, &draft, outlook(shared));
@@ -100,19 +104,19 @@ fn outlook(shared: &Shared) -> Option<&Outlook> {
 
 /// The paper's figures of single networks, one click each.
 fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
-    // So small that the names fit in the narrowest window.
-    let gap = space(1);
+    const GAP: f32 = space(1);
     let mut picked = None;
-    let count = PaperFigure::ALL.len() as f32;
-    let width = (ui.available_width() - gap * (count - 1.0)) / count;
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = gap;
-        for figure in PaperFigure::ALL {
-            let button = ghost_button(figure.name()).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(figure.description()).clicked() {
-                picked = Some(figure);
+    let width = 0.5 * (ui.available_width() - GAP);
+    ui.spacing_mut().item_spacing = [GAP, GAP].into();
+    for pair in PaperFigure::ALL.chunks(2) {
+        ui.horizontal(|ui| {
+            for figure in pair {
+                let button = ghost_button(figure.name()).min_size([width, space(7)].into());
+                if ui.add(button).on_hover_text(figure.description()).clicked() {
+                    picked = Some(*figure);
+                }
             }
-        }
-    });
+        });
+    }
     picked
 }

@@ -2,6 +2,7 @@ use eframe::egui::{ComboBox, RichText, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, space, type_size},
         widgets::fields::{capitalised, count_ui, input_text, quantity_ui, usually},
     },
@@ -13,7 +14,7 @@ use crate::{
 pub fn method_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let method = &mut draft.training.method;
     // The longest names fill a line.
-    let label = ui.label("Method").on_hover_text("Algorithm that adjusts the weights.");
+    let label = ui.label("Method").on_hover_text(glossary::METHOD.hint);
     let combo = ComboBox::from_id_salt("method")
         .selected_text(method.name())
         .width(ui.available_width())
@@ -42,47 +43,54 @@ pub fn method_settings_ui(ui: &mut Ui, draft: &mut SimulatedSettings, is_new: bo
         let limits = usually(setting.default, setting.range);
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
     }
-    let hint = "Number of trainings from different random weights, side by side; the one with the lowest validation \
-                error is kept. Several starts show how much the results vary. Default 1.";
+    let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", hint, &mut draft.starts, usually(1, 1..=MOST_STARTS))
+        count_ui(ui, "Starts", &hint, &mut draft.starts, usually(1, 1..=MOST_STARTS))
     });
 }
 
 /// The rules that end a training; changes `draft`.
 pub fn stopping_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let (stopping, usual) = (&mut draft.training.stopping, StoppingRules::default());
-    let hint = "Largest number of epochs, passes over the training set. Train counts from the first epoch, Continue \
-                from the present one.";
+    let hint = format!(
+        "Largest number of epochs. {} Train counts from the first epoch, Continue from the present one.",
+        glossary::EPOCH.hint
+    );
     count_ui(
         ui,
         "Epochs",
-        hint,
+        &hint,
         &mut stopping.epochs,
         usually(usual.epochs, 1..=StoppingRules::MOST_EPOCHS),
     );
-    let hint = "Training ends after this many epochs without a new best validation error. Default 6.";
+    let hint = format!("{} Default 6.", glossary::VALIDATION_FAILURES.hint);
     count_ui(
         ui,
         "Validation failures",
-        hint,
+        &hint,
         &mut stopping.max_fail,
         usually(usual.max_fail, 1..=StoppingRules::MOST_EPOCHS),
     );
-    let hint = "Training error (mse of the scaled coordinates) at which training ends. Default 0.";
+    let hint = format!(
+        "Training error at which training ends. Default 0.\n\n{}",
+        glossary::MSE.hint
+    );
     quantity_ui(
         ui,
         "Goal (mse)",
-        hint,
+        &hint,
         &mut stopping.goal_mse,
         usually(usual.goal_mse, 0.0..=1e300),
         "",
     );
-    let hint = "Norm of the gradient below which training ends. Default 1e-7.";
+    let hint = format!(
+        "Norm of the gradient below which training ends. Default 1e-7.\n\n{}",
+        glossary::GRADIENT.hint
+    );
     quantity_ui(
         ui,
         "Smallest gradient",
-        hint,
+        &hint,
         &mut stopping.min_gradient,
         usually(usual.min_gradient, 0.0..=1e300),
         "",

@@ -7,6 +7,7 @@ mod method_section;
 mod network_section;
 mod noise_section;
 mod preset_section;
+mod scene_choice;
 mod scene_section;
 mod sensor_section;
 mod summaries;

@@ -2,48 +2,31 @@ use eframe::egui::{RichText, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, type_size},
         widgets::fields::{capitalised, list_ui, options_ui},
     },
     evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice, Shape},
     scene::{Movement, Rows},
+    sensor::counted,
 };
 
 /// What the network reads, and how large it becomes; changes `draft`.
 pub fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let options = [
         (Quantity::Resistance, "Resistance", "R, as in the paper."),
-        (
-            Quantity::Conductance,
-            "Conductance",
-            "1/R. By Eq. (2) it is a sum over nodes, and so the closest to linear in the deformation.",
-        ),
-        (
-            Quantity::LogResistance,
-            "Log-resistance",
-            "ln R: relative errors become additive.",
-        ),
+        (Quantity::Conductance, "Conductance", glossary::CONDUCTANCE.hint),
+        (Quantity::LogResistance, "Log-resistance", glossary::LOG_RESISTANCE.hint),
     ];
-    let hint = "Quantity that the network reads for each resistance.";
-    if let Some(picked) = list_ui(ui, "Inputs", hint, &options, draft.inputs.quantity) {
+    if let Some(picked) = list_ui(ui, "Inputs", glossary::INPUTS.hint, &options, draft.inputs.quantity) {
         draft.inputs.quantity = picked;
     }
     let options = [
-        (
-            ScalingChoice::MinMax,
-            "Min-max",
-            "Each channel scaled to −1 to 1, as in the paper.",
-        ),
-        (
-            ScalingChoice::Whitening,
-            "Whitening",
-            "Principal components, each divided by √(σ² + noise²): components of small variance count as much as \
-             large ones, unless noise hides them.",
-        ),
+        (ScalingChoice::MinMax, "Min-max", glossary::MIN_MAX.hint),
+        (ScalingChoice::Whitening, "Whitening", glossary::WHITENING.hint),
     ];
-    let hint = "Scaling of the inputs.";
-    if let Some(picked) = options_ui(ui, "Scaling", hint, &options, draft.inputs.scaling) {
+    if let Some(picked) = options_ui(ui, "Scaling", glossary::SCALING.hint, &options, draft.inputs.scaling) {
         draft.inputs.scaling = picked;
     }
     weights_ui(ui, draft);
@@ -71,10 +54,12 @@ fn weights_ui(ui: &mut Ui, draft: &SimulatedSettings) {
         ScalingChoice::Whitening => "at most ",
     };
     let weights = shape.weights();
+    let [inputs, outputs, of_each] =
+        [(inputs, "input"), (outputs, "output"), (weights, "weight")].map(|(count, noun)| counted(count, noun));
     let text = match size.networks {
-        1 => format!("{at_most}{inputs} inputs, {outputs} outputs, {weights} weights"),
+        1 => format!("{at_most}{inputs}, {outputs}, {of_each}"),
         networks => format!(
-            "{networks} networks of {at_most}{inputs} inputs, {outputs} outputs and {weights} weights: {} in total",
+            "{networks} networks of {at_most}{inputs}, {outputs} and {of_each}: {} in total",
             networks * weights
         ),
     };

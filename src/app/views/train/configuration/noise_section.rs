@@ -2,6 +2,7 @@ use eframe::egui::{CollapsingHeader, RichText, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, type_size},
         widgets::fields::{count_ui, in_percent, input_text, options_ui, percent_ui, quantity_ui, usually},
         widgets::focus_ring_ui,
@@ -20,7 +21,7 @@ pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
 }
 
 fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
-    let hint = "Noise of each reading (standard deviation), in percent of the reading.";
+    let hint = glossary::RELATIVE_NOISE.hint;
     percent_ui(ui, "Relative noise", hint, &mut noise.relative, 0.0, 0.0..=100.0);
     let hint = "Noise of each reading (standard deviation), in Ω.";
     quantity_ui(
@@ -37,9 +38,7 @@ fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
                 resistance at rest. 0 for no quantisation.";
     count_ui(ui, "Converter bits", hint, &mut bits, usually(0, 0..=most));
     noise.converter_bits = u8::try_from(bits).ok().filter(|&bits| bits > 0);
-    let hint = "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, in \
-                percent).";
-    percent_ui(ui, "Drift", hint, &mut noise.drift, 0.0, 0.0..=100.0);
+    percent_ui(ui, "Drift", glossary::DRIFT.hint, &mut noise.drift, 0.0, 0.0..=100.0);
     if !noise.is_none() {
         let options = [
             (

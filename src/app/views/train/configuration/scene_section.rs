@@ -2,15 +2,19 @@ use eframe::egui::Ui;
 
 use super::noise_section::noise_ui;
 use crate::{
-    app::widgets::{
-        dim_ui,
-        fields::{capitalised, count_ui, list_ui, options_ui, percent_ui, quantity_ui, seed_ui, usually},
-        note_ui,
+    app::{
+        glossary,
+        widgets::{
+            dim_ui,
+            fields::{capitalised, count_ui, list_ui, options_ui, percent_ui, quantity_ui, seed_ui, usually},
+            note_ui,
+        },
     },
     dataset::LARGEST_SAMPLES,
     evaluation::{Outlook, SimulatedSettings},
     export::format_number,
     scene::{Indenter, IndenterShape, Loading, Movement, Rows, Scene},
+    sensor::counted,
 };
 
 /// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
@@ -19,7 +23,7 @@ pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Opt
     rows_ui(ui, draft);
     movement_ui(ui, &mut draft.source.scene.movement);
     loading_ui(ui, &mut draft.source.scene.loading);
-    let hint = "Largest displacement of a node downwards, in percent of the height.";
+    let hint = glossary::LARGEST_COMPRESSION.hint;
     percent_ui(
         ui,
         "Largest compression",
@@ -51,7 +55,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.samples,
         usually(usual.source.samples, 1..=LARGEST_SAMPLES),
     );
-    let hint = "Number of samples that select the best weights and end the training. 0 for none.";
+    let hint = glossary::VALIDATION_SET.hint;
     count_ui(
         ui,
         "Validation samples",
@@ -59,7 +63,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.validation_samples,
         usually(usual.source.validation_samples, 0..=LARGEST_SAMPLES),
     );
-    let hint = "Number of held-out samples, on which all errors are measured and whose snapshots are shown.";
+    let hint = glossary::TEST_SET.hint;
     count_ui(
         ui,
         "Test samples",
@@ -67,8 +71,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         &mut draft.source.test_samples,
         usually(usual.source.test_samples, 1..=LARGEST_SAMPLES),
     );
-    let hint = "Seed of all random numbers: the same seed gives the same network.";
-    seed_ui(ui, "Seed", hint, &mut draft.seed.0, usual.seed.0);
+    seed_ui(ui, "Seed", glossary::SEED.hint, &mut draft.seed.0, usual.seed.0);
 }
 
 fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
@@ -95,8 +98,7 @@ fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         ),
         (one, "One", "One row-wire only; nothing else is modelled."),
     ];
-    let hint = "Row-wires that are read, by one network or by one network per row.";
-    if let Some(picked) = options_ui(ui, "Rows", hint, &options, *rows) {
+    if let Some(picked) = options_ui(ui, "Rows", glossary::ROWS.hint, &options, *rows) {
         *rows = picked;
     }
     if let Rows::One(row) = rows {
@@ -120,8 +122,7 @@ fn movement_ui(ui: &mut Ui, movement: &mut Movement) {
             "Nodes also shift sideways: three times as many unknowns from the same readings.",
         ),
     ];
-    let hint = "Axes along which nodes move. The other coordinates are not modelled.";
-    if let Some(picked) = options_ui(ui, "Axes", hint, &options, *movement) {
+    if let Some(picked) = options_ui(ui, "Axes", glossary::AXES.hint, &options, *movement) {
         *movement = picked;
     }
     if let Movement::Xyz { largest_shift_mm } = movement {
@@ -145,20 +146,11 @@ fn loading_ui(ui: &mut Ui, loading: &mut Loading) {
         Loading::Indenter(_) => indenter = *loading,
     }
     let options = [
-        (
-            Loading::RandomNodes,
-            "Random nodes",
-            "Every node is pressed by an independent random amount, as in the paper.",
-        ),
-        (
-            smooth,
-            "Smooth field",
-            "A smooth random surface: nodes within the correlation length move alike.",
-        ),
-        (indenter, "Indenter", "A body pressed somewhere onto the surface."),
+        (Loading::RandomNodes, "Random nodes", glossary::RANDOM_NODES.hint),
+        (smooth, "Smooth field", glossary::SMOOTH_FIELD.hint),
+        (indenter, "Indenter", glossary::INDENTER.hint),
     ];
-    let hint = "Distribution of the deformations in the samples.";
-    if let Some(picked) = list_ui(ui, "Loading", hint, &options, *loading) {
+    if let Some(picked) = list_ui(ui, "Loading", glossary::LOADING.hint, &options, *loading) {
         *loading = picked;
     }
     match loading {
@@ -166,7 +158,7 @@ fn loading_ui(ui: &mut Ui, loading: &mut Loading) {
         Loading::SmoothField {
             correlation_length_mm: length,
         } => {
-            let hint = "Distance over which the displacements of nodes stay correlated, in mm.";
+            let hint = glossary::CORRELATION_LENGTH.hint;
             quantity_ui(ui, "Correlation length", hint, length, 1e-3..=1e6, "mm");
         }
         Loading::Indenter(indenter) => indenter_ui(ui, indenter),
@@ -231,14 +223,18 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
                     this.";
         quantity_ui(ui, "Largest tilt", hint, tilt, 0.0..=45.0, "°");
     }
-    let hint = "Decay length of the surface around the indenter, in mm.";
+    let hint = glossary::SPREAD.hint;
     quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
 /// Shows the numbers of unknowns and equations of the scene.
 fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
-    let text = format!("{} unknowns, {} equations a frame", size.unknowns, size.equations);
+    let text = format!(
+        "{}, {} a frame",
+        counted(size.unknowns, "unknown"),
+        counted(size.equations, "equation")
+    );
     dim_ui(ui, &text).on_hover_text(
         "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance \
          gives an equation, Eq. (2). What does not vary is not modelled.",
@@ -252,10 +248,7 @@ fn condition_ui(ui: &mut Ui, outlook: Option<&Outlook>) {
         Some(condition) if condition.is_infinite() => "Condition number infinite".to_owned(),
         condition => format!("Condition number {}", format_number(condition)),
     };
-    dim_ui(ui, &text).on_hover_text(
-        "Worst-case amplification of a relative error in the readings: the largest singular value of the Jacobian of \
-         ln R over the smallest, for the worst row with its nodes pressed half way.",
-    );
+    dim_ui(ui, &text).on_hover_text(glossary::CONDITION_NUMBER.hint);
 }
 
 /// Shows the warnings of the scene, which stand there also while its settings are folded away.

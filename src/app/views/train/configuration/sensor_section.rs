@@ -2,6 +2,7 @@ use eframe::egui::{RichText, Ui};
 
 use crate::{
     app::{
+        glossary,
         theme::{Theme, type_size},
         widgets::fields::{quantity_ui, usually},
     },
@@ -23,12 +24,7 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     } = &mut draft.source.sensor.geometry;
     let usual = Geometry::default();
     let lengths = [
-        (
-            "Height",
-            "Height of the row-wires above the column-wires, undeformed, in mm.",
-            height_mm,
-            usual.height_mm,
-        ),
+        ("Height", glossary::HEIGHT.hint, height_mm, usual.height_mm),
         (
             "Row pitch",
             "Distance between row-wires, in mm (the paper's wire gap).",
@@ -80,7 +76,7 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     for (name, hint, value, usual) in offsets {
         quantity_ui(ui, name, hint, value, usually(usual, -1e6..=1e6), "mm");
     }
-    let hint = "Resistance of the rubber per millimetre (g in the paper), in Ω/mm. It scales all resistances equally.";
+    let hint = glossary::RESISTIVITY.hint;
     quantity_ui(
         ui,
         "Resistivity",

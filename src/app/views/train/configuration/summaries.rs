@@ -5,7 +5,7 @@ use crate::{
     evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Rows},
-    sensor::Geometry,
+    sensor::{Geometry, counted},
 };
 
 /// Loading, rows, axes and noise.
@@ -65,7 +65,7 @@ pub(super) fn of_inputs(draft: &SimulatedSettings) -> String {
 
 /// The rule that ends every training.
 pub(super) fn of_stopping(draft: &SimulatedSettings) -> String {
-    format!("{} epochs", draft.training.stopping.epochs)
+    counted(draft.training.stopping.epochs, "epoch")
 }
 
 /// The first of the method's own settings, and the number of starts.
@@ -73,9 +73,6 @@ pub(super) fn of_method(draft: &SimulatedSettings) -> String {
     let mut method = draft.training.method;
     let first = method.settings().into_iter().next();
     let first = first.map(|setting| format!("{} {}, ", setting.name, input_text(*setting.value)));
-    let starts = match draft.starts {
-        1 => "1 start".to_owned(),
-        starts => format!("{starts} starts"),
-    };
+    let starts = counted(draft.starts, "start");
     format!("{}{starts}", first.unwrap_or_default())
 }

@@ -6,7 +6,4 @@ mod state;
 mod table;
 
 pub use state::{DecoderResult, DecodersState};
-pub use {
-    measuring::DecoderMeasuring,
-    table::{REFERENCE, decoders_ui},
-};
+pub use {measuring::DecoderMeasuring, table::decoders_ui};

@@ -3,6 +3,7 @@ use eframe::egui::{CollapsingHeader, Ui};
 use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
+        glossary,
         shared::Phase,
         theme::Theme,
         theme::space,
@@ -18,7 +19,7 @@ const TIMES_LIMIT: &str = "× limit";
 const COLUMNS: [Column; 4] = [
     Column {
         heading: "Z %",
-        meaning: "AveZerr on the test set: mean |error| of z in percent of the coordinate z",
+        meaning: glossary::Z_PERCENT.hint,
     },
     Column {
         heading: TIMES_LIMIT,
@@ -27,9 +28,7 @@ const COLUMNS: [Column; 4] = [
     },
     Column {
         heading: "residual",
-        meaning: "Root mean square of the relative difference between the readings and those of the decoded \
-                  deformation. It needs no ground truth, so a real sensor has it too; well above the noise, it casts \
-                  doubt on the answer.",
+        meaning: glossary::RESIDUAL.hint,
     },
     Column {
         heading: "µs",
@@ -83,13 +82,15 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
             palette.text
         },
         is_strong: false,
+        mark: "",
     });
     let of_limit = limit.map(|limit| Row {
         name: "limit",
-        meaning: REFERENCE,
+        meaning: glossary::REFERENCE.hint,
         cells: [limit.z_percent, Some(1.0), None, None].map(format_number).to_vec(),
         colour: palette.dim,
         is_strong: false,
+        mark: "",
     });
     let rows: Vec<Row> = rows.chain(of_limit).collect();
     ui.scope(|ui| table_ui(ui, &columns, &rows));
@@ -108,12 +109,6 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
         }
     }
 }
-
-/// Meaning of the reference row.
-pub const REFERENCE: &str = "Bayesian reference: the error that remains given the noise and the loading of the scene, \
-                             with Eq. (2) linearised at the actual deformation. On average, no decoder that knows \
-                             only the range of the loading, or its mean and covariance, does better. Without noise, \
-                             only the rounding of the readings is left.";
 
 /// In the order of [`COLUMNS`], without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {

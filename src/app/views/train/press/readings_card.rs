@@ -3,6 +3,7 @@ use ndarray::Array2;
 
 use crate::{
     app::{
+        glossary,
         plotting::cells_ui,
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
@@ -10,6 +11,7 @@ use crate::{
     },
     export::format_number,
     figure::{HeatMap, SequentialMap, readings_figure},
+    sensor::counted,
 };
 
 /// A reading under the pointer.
@@ -25,10 +27,13 @@ pub struct ReadingPointed {
 pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(6));
-        ui.label(RichText::new("Readings").font(semibold(type_size().title)));
+        ui.label(RichText::new("Readings").font(semibold(type_size().title)))
+            .on_hover_text(glossary::READING.hint);
         if let Some(drops_percent) = drops_percent {
             let (rows, columns) = drops_percent.dim();
-            dim_ui(ui, &format!("{rows} row-wires × {columns} column-wires"));
+            let [rows, columns] =
+                [(rows, "row-wire"), (columns, "column-wire")].map(|(count, noun)| counted(count, noun));
+            dim_ui(ui, &format!("{rows} × {columns}"));
         }
     });
 }
@@ -53,8 +58,9 @@ pub fn readings_ui(
     let value = format_number(map.values[[row, column]]);
     let wire = test.rows.get(row).map_or(0, |row| row + 1);
     cell.on_hover_text_at_pointer(format!(
-        "Row-wire {wire}, column-wire {}\ndrop from unloaded: {value} %\nClick for the section along it.",
-        column + 1
+        "Row-wire {wire}, column-wire {}\ndrop from unloaded: {value} %\n{}\nClick for the section along it.",
+        column + 1,
+        glossary::DROP.equation
     ));
     Some(ReadingPointed {
         cell: [row, column],

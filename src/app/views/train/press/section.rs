@@ -21,6 +21,7 @@ use crate::{
     decoupling::{DecoderKind, Precision},
     evaluation::PressedAnswer,
     export::format_number,
+    sensor::counted,
 };
 
 const TOOLS: [(Tool, &str, &str); 5] = [
@@ -168,6 +169,7 @@ fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {
         cells,
         colour,
         is_strong: mean_mm == Some(best_mm),
+        mark: "",
     };
     let of_network = shown.answer.as_ref().map(|answer| {
         let (cells, mean_mm) = cells_of(Some(answer));
@@ -228,8 +230,9 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
         note_ui(
             ui,
             &format!(
-                "{outside} of {readings} readings are outside the range of the network's training set: there it \
-                 extrapolates."
+                "{outside} of {} {} outside the range of the network's training set: there it extrapolates.",
+                counted(readings, "reading"),
+                if outside == 1 { "is" } else { "are" }
             ),
         );
     }

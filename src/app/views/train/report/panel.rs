@@ -5,16 +5,13 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
+        glossary::{self, Term},
         shared::{Effect, Phase, RunResult, RunView, Shared},
         theme::{Theme, space, type_size},
-        views::train::{
-            decoders::{REFERENCE, decoders_ui},
-            exports::open_task,
-            press::press_section_ui,
-            state::TrainView,
-        },
-        widgets::{Column, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
+        widgets::{Column, Landmark, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
     },
+    decoupling::DecoderKind,
     evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
 };
@@ -23,7 +20,7 @@ use crate::{
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         press_section_ui(ui, &mut view.press, shared);
-        section_heading_ui(ui, "Errors on the test set");
+        let heading = section_heading_ui(ui, "Errors on the test set");
         let result = view.result(shared).cloned();
         let shown = shared.shown_run().zip(result.as_ref());
         if let Some((run, result)) = shown {
@@ -48,6 +45,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         } else {
             expectation_ui(ui, shared);
         }
+        Landmark::Errors.stands_at(ui, ui.min_rect().with_min_y(heading.rect.top()));
         section_heading_ui(ui, "Open");
         let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
         ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));
@@ -62,7 +60,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
 fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     let known = shared.preview.as_ref();
     if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
-        let published = shared.draft.published();
+        // The settings may have moved on to a scene whose figures are still to come.
+        let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
+        let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
+        let published = shared.draft.published().filter(|_| is_of_draft);
         let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
         for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
             *row = ErrorRow {
@@ -80,7 +81,8 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         ui.add_space(space(2));
     }
     let text = "Press Train to fill in the network's row.";
-    if shared.draft.is_papers_scene() {
+    // The paper's own network, not only its scene.
+    if shared.draft.published().is_some() {
         dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
     } else {
         dim_ui(ui, text);
@@ -92,38 +94,31 @@ const NETWORK: &str = "network";
 
 /// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
 const COLUMNS: [Column; 5] = [
-    Column {
-        heading: "Z %",
-        meaning: "AveZerr of the paper: mean |error| of z in percent of the coordinate z",
-    },
-    Column {
-        heading: "X %",
-        meaning: "AveXerr: mean |error| of x in percent of the coordinate x",
-    },
-    Column {
-        heading: "Y %",
-        meaning: "AveYerr: mean |error| of y in percent of the coordinate y",
-    },
-    Column {
-        heading: "mm",
-        meaning: "Mean |error| of z in millimetres",
-    },
-    Column {
-        heading: "stroke %",
-        meaning: "Mean |error| of z in percent of the full scale, the distance a node can travel",
-    },
+    column(glossary::Z_PERCENT),
+    column(glossary::X_PERCENT),
+    column(glossary::Y_PERCENT),
+    column(glossary::Z_MM),
+    column(glossary::STROKE_PERCENT),
 ];
+
+const fn column(term: Term) -> Column {
+    Column {
+        heading: term.name,
+        meaning: term.hint,
+    }
+}
 
 fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let palette = Theme::of(ui).palette;
+    let of_network = rows.iter().find(|row| row.name == NETWORK).and_then(|row| row.z_mm);
     let row = |row: &ErrorRow| Row {
         name: row.name,
         meaning: match row.name {
-            "training mean" => "Always answers the mean of the training set.",
-            "linear map" => "Best affine map from the resistances to the coordinates.",
+            "training mean" => DecoderKind::Mean.meaning(),
+            "linear map" => glossary::LINEAR_MAP.hint,
             NETWORK => "The network with the lowest validation error so far",
-            "reference" => REFERENCE,
-            "published" => "What the paper reports for this array, hidden nodes and samples",
+            "reference" => glossary::REFERENCE.hint,
+            "published" => glossary::PUBLISHED.hint,
             _ => "",
         },
         cells: row.values()[..COLUMNS.len()]
@@ -136,8 +131,19 @@ fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
             _ => palette.text,
         },
         is_strong: row.name == NETWORK,
+        mark: if beats(row, of_network) { BETTER } else { "" },
     };
     ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.iter().map(row).collect::<Vec<_>>()));
+}
+
+/// Meaning of the mark at a baseline.
+const BETTER: &str = "Better on z than the network.";
+
+/// Returns true for a baseline that is better on z than the network, in millimetres.
+fn beats(row: &ErrorRow, of_network_mm: Option<f64>) -> bool {
+    let is_baseline = ["training mean", "linear map"].contains(&row.name);
+    let both = row.z_mm.zip(of_network_mm);
+    is_baseline && both.is_some_and(|(baseline_mm, network_mm)| baseline_mm < network_mm)
 }
 
 /// Says plainly where the network loses, and what would help; or by how much it wins. Nothing while it still learns.
@@ -191,7 +197,8 @@ fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
     ui.add_space(space(1));
     ui.horizontal(|ui| {
         let text = format!("Worst node {} mm", format_number(result.errors.worst_mm));
-        ui.label(RichText::new(text).size(type_size().note));
+        ui.label(RichText::new(text).size(type_size().note))
+            .on_hover_text(glossary::WORST_NODE.hint);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let place = format!(
                 "snapshot {}, row {}, node {}",
@@ -217,10 +224,8 @@ fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
         format_number(effective),
         run.weights
     );
-    ui.label(RichText::new(text).size(type_size().note)).on_hover_text(
-        "Number of weights that the data determine, as estimated by Bayesian regularisation. Near the number of \
-         weights, more hidden nodes may help; far below it, fewer would do.",
-    );
+    ui.label(RichText::new(text).size(type_size().note))
+        .on_hover_text(glossary::EFFECTIVE_PARAMETERS.hint);
 }
 
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {

@@ -58,6 +58,7 @@ pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
             cells: figures?.into_iter().map(format_number).collect(),
             colour: palette.text,
             is_strong: false,
+            mark: "",
         })
     };
     let rows: Vec<Row> = rows.into_iter().filter_map(row).collect();

@@ -1,0 +1,15 @@
+//! The glossary: every term of the field with its definition and, where there is one, its equation. What stands under the
+//! pointer at a term and what the list of all terms says come from here; decoders and training methods describe
+//! themselves.
+
+mod errors;
+mod list;
+mod sensor;
+mod term;
+mod training;
+
+pub use errors::*;
+pub use list::groups;
+pub use sensor::*;
+pub use term::Term;
+pub use training::*;

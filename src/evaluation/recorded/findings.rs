@@ -1,0 +1,145 @@
+use super::{
+    ChannelImportance, ChannelRemark, Determination, FittedModel, LearningCurve, NonlinearGain, SplitComparison,
+    channel_importance, channel_remarks,
+};
+use crate::{
+    dataset::{Dataset, Division, Folds, SplitBy, Stream},
+    evaluation::{CrossValidated, RunError, RunSettings},
+};
+
+/// What a recording tells: of each target, by each channel, and with more samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Findings {
+    /// Model behind [`Self::importance`] and the learning curves.
+    pub model: FittedModel,
+    /// What the readings tell of each target.
+    pub targets: Vec<TargetFindings>,
+    /// Constant, duplicated and saturated channels.
+    pub remarks: Vec<ChannelRemark>,
+    /// What each channel is worth; empty if there is only one.
+    pub importance: Vec<ChannelImportance>,
+    /// What a random split would hide; `None` without networks.
+    pub comparison: Option<SplitComparison>,
+}
+
+/// What a recording tells of one target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetFindings {
+    /// R² of the network; `None` without networks, or for a constant target.
+    pub network: Option<Determination>,
+    /// R² of ridge regression; `None` for a constant target.
+    pub ridge: Option<Determination>,
+    /// Error of the network beside that of ridge.
+    pub gain: Option<NonlinearGain>,
+    /// Error with fewer and with more samples.
+    pub curve: LearningCurve,
+}
+
+/// Part of the work of [`Findings::measure`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// Cross-validation by the rule of the split.
+    Folds,
+    /// Cross-validation by another rule, to compare.
+    OtherFolds,
+    /// Fits without each channel.
+    Channels,
+    /// Fits to fewer samples.
+    Samples,
+}
+
+impl Findings {
+    /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
+    /// curve; `None` if cancelled. `model` is what is fitted without each channel and to fewer samples: if it is not given, the
+    /// network where it is worth more than ridge regression for a target, else ridge; with ridge, no network is trained at all.
+    ///
+    /// # Errors
+    /// If the set cannot be divided, or the settings are invalid.
+    pub fn measure(
+        settings: &RunSettings,
+        set: &Dataset,
+        (division, folds): (&Division, usize),
+        model: Option<FittedModel>,
+        begin: &dyn Fn(Stage),
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let by = division.by;
+        let folds_by = |by| Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
+        let validate = |by| -> Result<Option<CrossValidated>, RunError> {
+            CrossValidated::on_folds(settings, set, folds_by(by)?, is_cancelled)
+        };
+        begin(Stage::Folds);
+        let mut rng = settings.seed.rng(Stream::Resampling);
+        let (network, ridge, gains, comparison);
+        if model == Some(FittedModel::Ridge) {
+            let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
+            let Some(answers) = answers else { return Ok(None) };
+            ridge = Determination::measure(set, answers.view(), by, &mut rng);
+            (network, gains, comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
+        } else {
+            let Some(validated) = validate(by)? else {
+                return Ok(None);
+            };
+            begin(Stage::OtherFolds);
+            let other = if by == SplitBy::Random {
+                SplitBy::Time
+            } else {
+                SplitBy::Random
+            };
+            let Some(compared) = validate(other)? else {
+                return Ok(None);
+            };
+            network = Determination::measure(set, validated.network.view(), by, &mut rng);
+            ridge = Determination::measure(set, validated.linear.view(), by, &mut rng);
+            gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
+            let tables = [&validated, &compared].map(|validated| validated.target_table(set));
+            comparison = Some(match (by, tables) {
+                (SplitBy::Random, [random, honest]) => SplitComparison::of(other, [honest, random]),
+                (by, tables) => SplitComparison::of(by, tables),
+            });
+        }
+        let is_worth_it = gains.iter().flatten().any(NonlinearGain::is_supported);
+        let best = if is_worth_it {
+            FittedModel::Network
+        } else {
+            FittedModel::Ridge
+        };
+        let model = model.unwrap_or(best);
+        begin(Stage::Channels);
+        let Some(importance) = channel_importance(settings, set, (&folds_by(by)?, by), model, is_cancelled)? else {
+            return Ok(None);
+        };
+        begin(Stage::Samples);
+        let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
+        let Some(curves) = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)? else {
+            return Ok(None);
+        };
+        let targets = network.into_iter().zip(ridge).zip(gains).zip(curves);
+        let target = |(((network, ridge), gain), curve)| TargetFindings {
+            network,
+            ridge,
+            gain,
+            curve,
+        };
+        Ok(Some(Self {
+            model,
+            targets: targets.map(target).collect(),
+            remarks: channel_remarks(set),
+            importance,
+            comparison,
+        }))
+    }
+}
+
+impl TargetFindings {
+    /// R² of the better of network and ridge, with the model.
+    pub fn best(&self) -> Option<(FittedModel, Determination)> {
+        let network = self.network.map(|network| (FittedModel::Network, network));
+        let ridge = self.ridge.map(|ridge| (FittedModel::Ridge, ridge));
+        match (network, ridge) {
+            (Some(network), Some(ridge)) if ridge.1.r2.value >= network.1.r2.value => Some(ridge),
+            (network, ridge) => network.or(ridge),
+        }
+    }
+}

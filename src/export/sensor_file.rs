@@ -1,0 +1,54 @@
+use std::{io::Write as _, path::Path};
+
+use serde::{Deserialize, Serialize};
+
+use super::{AtomicFile, DocumentError, DocumentKind, WriteError, document::PROGRAM};
+use crate::sensor::SensorModel;
+
+const KIND: DocumentKind = DocumentKind::Sensor;
+
+/// A sensor model, such as one that was calibrated. The file is JSON to be read and changed by hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorFile;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    format: String,
+    version: u64,
+    program: String,
+    sensor: SensorModel,
+}
+
+impl SensorFile {
+    /// Writes `sensor` whole or not at all.
+    ///
+    /// # Errors
+    /// The path cannot be written.
+    pub fn save(sensor: &SensorModel, path: &Path) -> Result<(), WriteError> {
+        let document = Document {
+            format: KIND.format().to_owned(),
+            version: *KIND.versions().end(),
+            program: PROGRAM.to_owned(),
+            sensor: *sensor,
+        };
+        let error = |source| WriteError::io(path, source);
+        let mut file = AtomicFile::create(path)?;
+        serde_json::to_writer_pretty(&mut file, &document).map_err(|source| error(source.into()))?;
+        writeln!(file).map_err(error)?;
+        file.commit()
+    }
+
+    /// Reads the sensor in the file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind or version, or its sensor is impossible.
+    pub fn load(path: &Path) -> Result<SensorModel, DocumentError> {
+        let (_, bytes) = KIND.read(path)?;
+        let document: Document =
+            serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
+        let sensor = document.sensor;
+        sensor.check().map_err(|error| KIND.damaged(path, error.to_string()))?;
+        Ok(sensor)
+    }
+}

@@ -1,0 +1,280 @@
+//! The first minute: what the window opens on, the tour, the glossary, and empty views that fill on a click.
+
+use std::path::PathBuf;
+
+use decoupler::{
+    app::Phase,
+    evaluation::{Run, SimulatedSettings},
+    export::format_number,
+    scene::Loading,
+};
+use eframe::egui::{Key, Modifiers, vec2};
+
+use crate::driver::{Driver, SKIP};
+
+fn open_first() -> Driver {
+    Driver::open_first(vec2(1440.0, 900.0))
+}
+
+/// A file that does not exist yet, in a folder that vanishes.
+fn file() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("window.json");
+    (folder, path)
+}
+
+/// The figures of the baselines that the library gives for `settings` are those of the table on show.
+#[track_caller]
+fn shows_the_baselines_of(driver: &Driver, settings: SimulatedSettings) {
+    let run = Run::prepare(settings).unwrap();
+    let baselines = run.baselines().unwrap();
+    for (name, errors) in [("training mean", baselines.mean), ("linear map", baselines.linear)] {
+        let cells = [
+            format!("{name}, Z %: {}", format_number(errors.z_percent)),
+            format!("{name}, mm: {}", format_number(errors.z_mm)),
+        ];
+        for cell in cells {
+            assert!(driver.has(&cell), "{cell} in {:#?}", driver.table());
+        }
+    }
+}
+
+#[test]
+fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
+    let mut driver = open_first();
+    driver.wait("the baselines", |driver| !driver.table().is_empty());
+    let opened = driver.state().draft;
+    assert!(matches!(opened.source.scene.loading, Loading::Indenter(_)));
+    shows_the_baselines_of(&driver, opened);
+    assert!(!driver.has("Published"), "the paper has no print");
+    // A print: most of the surface is at rest, and the middle of it is pressed.
+    let depths_mm = driver.views().train.drawn.frames.actual.nodes_mm.iter();
+    let depths_mm: Vec<f64> = depths_mm.map(|node| 5.0 - node.z).collect();
+    let at_rest = depths_mm.iter().filter(|depth_mm| **depth_mm < 0.01).count();
+    let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
+    assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
+
+    driver.click("Paper's scene");
+    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    driver.wait("the published errors", |driver| driver.has("Published"));
+    shows_the_baselines_of(&driver, SimulatedSettings::default());
+    driver.click("Indenter's print");
+    assert_eq!(driver.state().draft, opened);
+}
+
+#[test]
+fn only_the_papers_own_network_is_said_to_take_seconds() {
+    const SAYS: &str = "The paper's network takes a few seconds";
+    let mut driver = Driver::open();
+    assert!(driver.says(SAYS));
+    driver.enter("Array scale", "2x2_1x6");
+    driver.wait("the small array", |driver| {
+        let test = driver.state().test();
+        test.is_some_and(|test| test.sensor.scale.rows() == 2)
+    });
+    driver.settle();
+    assert!(driver.says("Press Train to fill in") && !driver.says(SAYS));
+}
+
+#[test]
+fn one_of_a_kind_is_singular() {
+    let mut driver = Driver::open();
+    driver.enter("Array scale", "1x1_1x1");
+    assert!(
+        driver.has("1 row-wire of 1 node over 1 column-wire of 1 node"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.enter("Hidden nodes", "1");
+    driver.wait("the array", |driver| driver.says("1 unknown, 1 equation a frame"));
+    driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
+    let texts = driver.texts();
+    let plural = |text: &&String| {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        words.windows(2).any(|pair| {
+            pair[0] == "1" && ["nodes", "rows", "row-wires", "column-wires", "unknowns", "equations"].contains(&pair[1])
+        })
+    };
+    assert_eq!(texts.iter().find(plural), None);
+}
+
+#[test]
+fn a_linear_map_that_beats_the_network_is_marked() {
+    const MARK: &str = "Better on z than the network.";
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.enter("Epochs", "1");
+    driver.train();
+    driver.settle();
+    let result = driver.state().result().unwrap().errors;
+    let linear = driver.state().run.as_ref().unwrap().baselines.linear;
+    assert!(linear.z_mm < result.z_mm, "one epoch is too few");
+    assert!(driver.has(MARK), "{:#?}", driver.texts());
+    driver.enter("Epochs", "60");
+    driver.enter("Hidden nodes", "10");
+    driver.enter("Training samples", "1000");
+    driver.train();
+    driver.settle();
+    let result = driver.state().result().unwrap().errors;
+    assert!(result.z_mm < linear.z_mm);
+    assert!(!driver.has(MARK));
+}
+
+#[test]
+fn the_tour_leads_through_five_steps_and_is_remembered() {
+    let (_folder, path) = file();
+    let mut driver = Driver::open_on_tour(&path);
+    assert!(driver.says("step 1 of 5: Press the sensor") && driver.has("1 of 5"));
+    driver.click("Do it: Press the middle of the surface");
+    driver.wait("the answer", |driver| driver.says("Network, mean mm: "));
+    for step in 2..=5 {
+        driver.click_button("Next");
+        assert!(driver.says(&format!("step {step} of 5")), "{:#?}", driver.texts());
+    }
+    driver.click_button("Back");
+    assert!(driver.says("step 4 of 5"));
+    driver.click_button("Next");
+    driver.click_button("Done");
+    assert!(!driver.says("Tour, step"));
+    assert!(driver.comes_to_rest());
+    drop(driver);
+    let mut driver = Driver::open_on_tour(&path);
+    assert!(!driver.has(SKIP), "it has ended for good");
+
+    // Until it is asked for again.
+    driver.press(Key::Questionmark);
+    driver.click_button("Take the tour");
+    assert!(driver.says("step 1 of 5"));
+    driver.click_button(SKIP);
+    assert!(!driver.says("step 1 of 5"));
+}
+
+#[test]
+fn the_tour_can_be_skipped_and_stays_away() {
+    let (_folder, path) = file();
+    let mut driver = Driver::open_on_tour(&path);
+    driver.click(SKIP);
+    drop(driver);
+    assert!(!Driver::open_on_tour(&path).has(SKIP));
+}
+
+#[test]
+fn the_tour_trains_on_a_click_and_lets_the_other_views_be() {
+    let (_folder, path) = file();
+    let mut driver = Driver::open_on_tour(&path);
+    driver.click_button("Next");
+    driver.click_button("Next");
+    driver.click_button("Compare");
+    assert!(!driver.has(SKIP), "it is about the Train view");
+    driver.click_button("Train");
+    driver.settle();
+    driver.click("Do it: Train");
+    driver.wait("the training", |driver| driver.epochs() > 2);
+    driver.click("■ Stop");
+    driver.wait("its end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+}
+
+#[test]
+fn every_term_stands_in_the_glossary_and_under_the_pointer_in_the_same_words() {
+    let mut driver = open_first();
+    driver.wait("the baselines", |driver| !driver.table().is_empty());
+    let place = driver.get("stroke %").rect().center();
+    driver.harness().hover_at(place);
+    driver.harness().run_steps(60);
+    const DEFINITION: &str = "Mean |error| of z in percent of the full scale, the distance a node can travel.";
+    const EQUATION: &str = "100 · mean(|decoupled z − z|) / stroke";
+    assert!(
+        driver.says(DEFINITION) && driver.says(EQUATION),
+        "under the pointer: {:#?}",
+        driver.texts()
+    );
+    driver.harness().remove_cursor();
+    driver.harness().run_steps(5);
+    assert!(!driver.says(EQUATION));
+
+    driver.press(Key::Questionmark);
+    driver.click("Glossary");
+    driver.type_into("Term", "stroke");
+    assert!(driver.has(DEFINITION) && driver.has(EQUATION));
+    driver.type_into("Term", "whitening");
+    assert!(!driver.has(DEFINITION) && driver.has("component / √(σ² + noise²)"));
+    driver.type_into("Term", "no such term");
+    assert!(driver.has("No term is called so."));
+    driver.press(Key::Escape);
+    assert!(!driver.has("No term is called so."));
+}
+
+#[test]
+fn the_list_of_actions_finds_terms_too() {
+    let mut driver = open_first();
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "pareto");
+    driver.press(Key::Enter);
+    driver.settle();
+    assert!(driver.says("The decoders that no other beats"), "{:#?}", driver.texts());
+}
+
+#[test]
+fn empty_views_fill_on_a_click() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click_button("Compare");
+    assert!(driver.is_enabled("Train a network now"));
+    driver.click_button("Experiments");
+    driver.settle();
+    assert!(driver.is_enabled("Run now"));
+    driver.click_button("Trade-off");
+    assert!(driver.is_enabled("Measure now"));
+    driver.click_button("Train");
+    driver.settle();
+    driver.click_button("Train now");
+    driver.wait("the end of the training", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_))
+    });
+    driver.click_button("Experiments");
+    driver.click_button("Run now");
+    driver.wait("the experiment", |driver| {
+        driver.state().working.contains(&"Experiments")
+    });
+    driver.click("■ Cancel");
+}
+
+#[test]
+fn compare_opens_on_the_last_two_runs() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    for hidden in ["3", "4", "5"] {
+        let kept = driver.state().runs.workspace.runs.len();
+        driver.enter("Hidden nodes", hidden);
+        driver.train();
+        driver.wait("the run in the list", |driver| {
+            driver.state().runs.workspace.runs.len() > kept
+        });
+    }
+    driver.click_button("Compare");
+    driver.wait("both surfaces", |driver| {
+        driver.has("Surface of A") && driver.has("Surface of B")
+    });
+    let hidden = |driver: &Driver, place| driver.state().runs.pinned(place).unwrap().file.settings.hidden;
+    assert_eq!([0, 1].map(|place| hidden(&driver, place)), [4, 5]);
+    // What the user chooses stays.
+    driver.click("10×6_3×18 h3 lm as A");
+    driver.click_button("Train");
+    driver.click_button("Compare");
+    driver.settle();
+    assert_eq!([0, 1].map(|place| hidden(&driver, place)), [3, 5]);
+}
+
+#[test]
+fn the_sample_recording_plays_without_any_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
+    driver.click_button("Live");
+    driver.click_button("Play the sample recording");
+    driver.wait("its frames", |driver| driver.views().live.shown.counts.decoded > 2);
+    assert!(driver.says("sample network.json"));
+    assert!(folder.path().join("samples/sample recording.csv").exists());
+    driver.click("■ Stop");
+    driver.settle();
+    assert_eq!(driver.notice(), None);
+}
