@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut source = Simulated::new(sensor, scene, Seed(1), FRAMES_PER_SECOND)?;
     for _ in 0..LINES {
         let time_s = source.next_frame(&mut frame_ohm)?;
-        write!(table, "{:.3}", time_s)?;
+        write!(table, "{time_s:.3}")?;
         for ohm in &frame_ohm[ROW * columns..][..columns] {
             write!(table, ",{}", rounded(*ohm))?;
         }

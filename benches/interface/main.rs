@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench interface`
 
+#![allow(clippy::print_stdout, reason = "a bench prints its table")]
+
 mod clock;
 
 use std::{

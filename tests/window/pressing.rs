@@ -140,11 +140,17 @@ fn all_of_the_window_follows_the_finger_in_the_same_frame() {
     assert!(lifted_mm < depth_mm - 0.05, "{lifted_mm} of {depth_mm}");
     says_what_is_pressed(&driver, &run);
     driver.enter("Depth", "99");
-    assert_eq!(
-        touch(&driver).print.unwrap().depth_mm,
-        1.0,
+    assert!(
+        driver.has("99 mm is too large: at most 1 mm."),
         "no deeper than the scene allows"
     );
+    assert_eq!(
+        touch(&driver).print.unwrap().depth_mm,
+        lifted_mm,
+        "what was pressed stays"
+    );
+    driver.enter("Depth", "1000 um");
+    assert_eq!(touch(&driver).print.unwrap().depth_mm, 1.0);
     says_what_is_pressed(&driver, &run);
 
     driver.press(Key::Escape);

@@ -43,6 +43,8 @@ fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
         let described = driver.harness().get(by).accesskit_node().description();
         assert_eq!(described.as_deref(), Some(reason), "it is read out with the field");
     }
+    driver.enter("Seed", "9007199254740993");
+    assert_eq!(driver.state().draft.seed.0, (1 << 53) + 1, "every digit counts");
     driver.enter("Hidden nodes", "7");
     assert!(!driver.says("too small: at least 1"), "the next number settles it");
     assert_eq!(driver.state().draft.hidden, 7);

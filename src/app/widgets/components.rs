@@ -27,10 +27,24 @@ pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
         right: 10,
         ..Margin::ZERO
     };
-    ScrollArea::vertical()
-        .id_salt(id)
-        .auto_shrink(false)
-        .show(ui, |ui| Frame::new().inner_margin(strip).show(ui, contents));
+    ScrollArea::vertical().id_salt(id).auto_shrink(false).show(ui, |ui| {
+        Frame::new().inner_margin(strip).show(ui, |ui| {
+            contents(ui);
+            follow_focus(ui);
+        });
+    });
+}
+
+/// Scrolls what has just got the focus into sight.
+fn follow_focus(ui: &Ui) {
+    let focused = ui.memory(|memory| memory.focused());
+    let response = focused.and_then(|id| ui.ctx().read_response(id));
+    if let Some(response) = response.filter(Response::gained_focus)
+        && response.layer_id == ui.layer_id()
+        && ui.min_rect().contains_rect(response.rect)
+    {
+        ui.scroll_to_rect(response.rect, None);
+    }
 }
 
 /// A card on the background that fills `rect`.

@@ -6,7 +6,7 @@ use eframe::egui::{Align, ComboBox, Layout, Response, Ui};
 
 use super::{
     explained_options_ui,
-    number_field::{FIELD_SIZE, Limits, number_ui, refusal_ui},
+    number_field::{FIELD_SIZE, Limits, number_ui, refusal_ui, whole_ui},
 };
 use crate::app::theme::space;
 
@@ -32,10 +32,8 @@ pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, limits: 
 
 /// The number from which a random draw begins.
 pub fn seed_ui(ui: &mut Ui, name: &str, hint: &str, seed: &mut u64, usual: u64) -> Response {
-    /// Larger whole numbers are not all told apart while they are typed.
-    const LARGEST: u64 = 1 << 53;
-    let limits = usually(usual, 0..=LARGEST);
-    field_ui(ui, name, hint, |ui| number_ui(ui, seed, &limits, "", FIELD_SIZE))
+    let limits = usually(usual, 0..=u64::MAX);
+    field_ui(ui, name, hint, |ui| whole_ui(ui, seed, &limits, FIELD_SIZE))
 }
 
 /// A number with its unit; typing takes any notation, also 1e-3, and other units of the same kind.

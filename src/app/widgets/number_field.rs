@@ -42,6 +42,35 @@ struct Refusal {
 /// another unit is refused: the old value stays, and [`refusal_ui`] tells why. A double click sets the usual value; a right
 /// click copies.
 pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {
+    let shown = input_text(value.to_f64());
+    typed_number_ui(ui, value, limits, (unit, &shown), size).0
+}
+
+/// As [`number_ui`] for a whole number all of whose digits count.
+pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) -> Response {
+    let shown = value.to_string();
+    let before = *value;
+    let (mut response, typed) = typed_number_ui(ui, value, limits, ("", &shown), size);
+    // More digits than the field computes with.
+    if let Some(exact) = typed.and_then(|typed| typed.trim().parse().ok())
+        && limits.range.contains(&exact)
+    {
+        *value = exact;
+        if exact != before {
+            response.mark_changed();
+        }
+    }
+    response
+}
+
+/// Shows a field; `shown` is the text of its value. Returns what was typed and taken, too.
+fn typed_number_ui<N: Numeric>(
+    ui: &mut Ui,
+    value: &mut N,
+    limits: &Limits<N>,
+    (unit, shown): (&str, &str),
+    size: Vec2,
+) -> (Response, Option<String>) {
     let range = limits.range.start().to_f64()..=limits.range.end().to_f64();
     // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
     let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
@@ -50,18 +79,24 @@ pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, uni
     } else {
         format!(" {unit}")
     };
-    let tried: RefCell<Option<Result<f64, String>>> = RefCell::new(None);
+    let tried: RefCell<Option<(String, Result<f64, String>)>> = RefCell::new(None);
     let before = *value;
     let drag = DragValue::new(value)
         .range(limits.range.clone())
         .speed(speed)
         .suffix(suffix)
         .update_while_editing(false)
-        .custom_formatter(|value, _| input_text(value))
+        .custom_formatter(|value, _| {
+            if value == before.to_f64() {
+                shown.to_owned()
+            } else {
+                input_text(value)
+            }
+        })
         .custom_parser(|text| {
             let parsed = parse(text, unit, &range, N::INTEGRAL);
             let value = parsed.as_ref().ok().copied();
-            *tried.borrow_mut() = Some(parsed);
+            *tried.borrow_mut() = Some((text.to_owned(), parsed));
             value
         });
     let mut response = ui.add_sized(size, drag);
@@ -70,28 +105,39 @@ pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, uni
         response.surrender_focus();
     }
     claim_right_click(ui, &response);
-    response.context_menu(|ui| menu_ui(ui, value, limits.usual, unit));
+    let shown = if *value == before {
+        format!("{shown} {unit}").trim_end().to_owned()
+    } else {
+        with_unit(*value, unit)
+    };
+    response.context_menu(|ui| menu_ui(ui, value, &shown, limits.usual, unit));
     if *value != before {
         response.mark_changed();
     }
-    take_refusal(ui, &response, tried.into_inner(), value.to_f64());
-    response
+    let (typed, tried) = tried.into_inner().map_or((None, None), |(text, tried)| {
+        let taken = tried.is_ok().then_some(text);
+        (taken, Some(tried))
+    });
+    take_refusal(ui, &response, tried, value.to_f64());
+    (response, typed)
 }
 
 /// Copies the value, or sets the usual one.
-fn menu_ui<N: Numeric>(ui: &mut Ui, value: &mut N, usual: Option<N>, unit: &str) {
-    let text = |value: N| format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned();
-    let shown = text(*value);
+fn menu_ui<N: Numeric>(ui: &mut Ui, value: &mut N, shown: &str, usual: Option<N>, unit: &str) {
     if ui.button(format!("Copy {shown}")).clicked() {
-        ui.ctx().copy_text(shown);
+        ui.ctx().copy_text(shown.to_owned());
         ui.close();
     }
     if let Some(usual) = usual.filter(|usual| *usual != *value)
-        && ui.button(format!("Reset to {}", text(usual))).clicked()
+        && ui.button(format!("Reset to {}", with_unit(usual, unit))).clicked()
     {
         *value = usual;
         ui.close();
     }
+}
+
+fn with_unit<N: Numeric>(value: N, unit: &str) -> String {
+    format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned()
 }
 
 fn refusal_id(field: Id) -> Id {

@@ -6,7 +6,7 @@ use eframe::egui::{
 };
 use egui_extras::{Column, TableBuilder};
 
-use super::value_under::value_under;
+use super::{fold::focus_ring_ui, value_under::value_under};
 use crate::app::theme::{Theme, radius, semibold, space, type_size};
 
 const ROW_HEIGHT: f32 = space(6);
@@ -214,6 +214,7 @@ fn heading_ui(ui: &mut Ui, column: &TableColumn<'_>, place: usize, sort: Option<
         let response = response
             .on_hover_cursor(CursorIcon::PointingHand)
             .on_hover_text("Sorts the table by this column.");
+        focus_ring_ui(ui, &response);
         let is_sorted = sort.column == Some(place);
         chosen = response.clicked().then_some(TableClick::Sort(SortBy {
             column: Some(place),
@@ -244,6 +245,7 @@ fn line_ui(ui: &mut Ui, row: &TableRow, place: usize, total: f32) -> Option<Tabl
         ui.painter()
             .rect_filled(line, f32::from(radius()) / 2.0, palette.raised);
     }
+    focus_ring_ui(ui, &response);
     underline(ui, total, 0.5);
     let mut response: Response = response.on_hover_cursor(CursorIcon::PointingHand);
     if !row.meaning.is_empty() {

@@ -113,7 +113,7 @@ mod tests {
         let (map, values) = plane();
         for line in [SectionLine::RowWire(0), SectionLine::ColumnWire(4)] {
             // On nodes, between them, and in the margin beyond them.
-            for at_mm in [9.0, 8.37, 9.999_999, 10.4, 7.6] {
+            for at_mm in [9.0, 8.37, 9.999_999, 7.6] {
                 let curve = Section { line, at_mm }.curve_mm(map.grid(), &values);
                 assert!(curve.len() > 20, "{line:?} at {at_mm}");
                 for place in curve {
