@@ -166,7 +166,7 @@ mod tests {
         let pairs = [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)];
         let figure = target_regression_figure(&pairs, "force", Some("N"));
         assert_eq!(figure.plots[0].x.name, "actual force (N)");
-        assert_eq!(figure.notes[1], "Fitted line: decoupled = 2 · actual + 1 N");
+        assert_eq!(figure.notes[1], "Fitted line: decoupled = 2.00 · actual + 1.00 N");
         assert_eq!(
             target_regression_figure(&pairs, "c2", None).plots[0].y.name,
             "decoupled c2"

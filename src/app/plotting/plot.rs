@@ -14,7 +14,10 @@ use glam::DVec2;
 
 use super::{colours::hue_colour, per_pixel::per_pixel, plot_figure::Pointer};
 use crate::{
-    app::theme::{Palette, Theme, space, type_size},
+    app::{
+        theme::{Palette, Theme, space, type_size},
+        widgets::focus_ring_ui,
+    },
     figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels},
 };
 
@@ -87,6 +90,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
     });
     ui.ctx()
         .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
+    focus_ring_ui(ui, &shown.response);
     labels_ui(ui, plot, &shown.transform, id);
     point_labels_ui(ui, plot, &shown.transform);
     (shown.transform, shown.response)
