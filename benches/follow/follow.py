@@ -1,4 +1,4 @@
-"""Live decoding over a pseudo-terminal pair, at normal priority.
+"""Live decoding over a pseudo-terminal pair.
 
 Usage: follow.py PROGRAM [SECONDS [ROWS]], where PROGRAM is the release build; SECONDS is how long lines come at a steady rate,
 600 unless given; ROWS is the number of row-wires in a line: 10, a whole frame of 300 resistances, unless 1 is given. Trains the

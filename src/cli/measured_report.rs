@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{
     failure::Failure,
     measured_files::{FileFound, files, write_files},
-    measured_table::{Target, standings, targets, worse_than_ridge, write_table, write_warnings},
+    measured_table::{Target, targets, write_table, write_warnings},
     output::{print as print_with, print_object},
 };
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
         CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
         recorded::{Determination, NonlinearGain},
     },
-    export::{MeasuredNetworkFile, format_duration},
+    export::{MeasuredNetworkFile, describe_standings, describe_worse_than_ridge, format_duration},
     import::{Channel, Dropped, Plan, PlannedSets, Recording},
     sensor::counted,
     training::StopReason,
@@ -154,8 +154,8 @@ pub(super) fn print(
         .cloned()
         .chain(flattery.iter().cloned())
         .chain(flaw.map(ToString::to_string))
-        .chain(standings(&file.targets, told))
-        .chain(worse_than_ridge(&file.targets, &file.errors, &file.ridge))
+        .chain(describe_standings(&file.targets, told))
+        .chain(describe_worse_than_ridge(&file.targets, &file.errors, &file.ridge))
         .collect();
     if is_json {
         return print_object(&Trained {
@@ -230,7 +230,7 @@ impl<'a> Folds<'a> {
         let better: Vec<&'static str> = (0..channels.len()).map(|target| best(&table, target)).collect();
         let mut warnings = recording.warnings.clone();
         warnings.extend(flattery);
-        warnings.extend(standings(channels, &told));
+        warnings.extend(describe_standings(channels, &told));
         let remarks = channels.iter().zip(gains);
         warnings.extend(remarks.filter_map(|(channel, gain)| gain?.remark(&channel.name)));
         let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);

@@ -3,10 +3,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use crate::{
-    evaluation::{
-        TargetErrors,
-        recorded::{Determination, Standing},
-    },
+    evaluation::{TargetErrors, recorded::Determination},
     export::format_number,
     import::Channel,
 };
@@ -24,35 +21,6 @@ pub(super) struct Target<'a> {
     r2_interval: Option<[f64; 2]>,
     worst: f64,
     percent_of_range: Option<f64>,
-}
-
-/// Warns of targets that the readings do not tell, or hardly.
-pub(super) fn standings(channels: &[Channel], told: &[Option<Determination>]) -> Vec<String> {
-    let of = |(channel, told): (&Channel, &Option<Determination>)| match told {
-        None => Some(format!(
-            "{} is constant in the test samples, or they are a single stretch: nothing can be judged",
-            channel.name
-        )),
-        Some(told) => (told.standing() != Standing::Told).then(|| told.sentence(&channel.name)),
-    };
-    channels.iter().zip(told).filter_map(of).collect()
-}
-
-/// Warns of networks that are worse than ridge.
-pub(super) fn worse_than_ridge(channels: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
-    let mut words = Vec::new();
-    for ((channel, network), ridge) in channels.iter().zip(network).zip(ridge) {
-        let name = &channel.name;
-        if network.rmse > ridge.rmse {
-            words.push(format!(
-                "for {name} the network is worse than ridge regression (RMSE {} against {}): take ridge, record more samples, \
-                 or use fewer hidden nodes or --method br",
-                format_number(network.rmse),
-                format_number(ridge.rmse)
-            ));
-        }
-    }
-    words
 }
 
 pub(super) fn targets<'a>(

@@ -19,6 +19,7 @@ mod network_document;
 mod network_file;
 mod old_run_list;
 mod recipe_file;
+mod recorded_words;
 #[cfg(feature = "figures")]
 pub mod report;
 mod run_folder;
@@ -47,6 +48,7 @@ pub use measured_checkpoint::MeasuredCheckpointFile;
 pub use measured_network::{MeasuredNetworkFile, MeasuredSettings};
 pub use network_file::{NetworkFile, TrainingRecord};
 pub use recipe_file::RecipeFile;
+pub use recorded_words::{describe_standings, describe_worse_than_ridge};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};

@@ -1,38 +1,6 @@
-//! Sentences about errors, splits and imports, in the words of the terminal.
+//! Sentences about splits and imports.
 
-use crate::{
-    app::widgets::fields::capitalised, dataset::SplitBy, evaluation::TargetErrors, export::format_number,
-    import::Channel,
-};
-
-/// R² on the test samples below which readings hardly tell a target.
-const HARDLY: f64 = 0.4;
-
-/// Tells of targets that the readings hardly tell, and of networks that are worse than ridge.
-pub(super) fn judgements(channels: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
-    let mut remarks = Vec::new();
-    for ((channel, network), ridge) in channels.iter().zip(network).zip(ridge) {
-        let name = &channel.name;
-        match network.r2 {
-            None => remarks.push(format!(
-                "the target {name} is constant in the test samples: nothing can be judged"
-            )),
-            Some(r2) if r2 < HARDLY => remarks.push(format!(
-                "the readings hardly tell {name}: R² {r2:.2} on the test samples, where always answering their mean has 0"
-            )),
-            Some(_) => {}
-        }
-        if network.rmse > ridge.rmse {
-            remarks.push(format!(
-                "for {name} the network is worse than ridge regression (RMSE {} against {}): record more samples, or use \
-                 fewer hidden nodes or Bayesian regularisation",
-                format_number(network.rmse),
-                format_number(ridge.rmse)
-            ));
-        }
-    }
-    remarks
-}
+use crate::{app::widgets::fields::capitalised, dataset::SplitBy};
 
 /// What a rule of division does to the errors.
 pub(super) fn flattery(by: SplitBy) -> &'static str {

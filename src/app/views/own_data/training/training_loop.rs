@@ -16,17 +16,14 @@ use crate::{
         job::Report,
         shared::Phase,
         training_worker::{continue_run, furthest_epoch},
-        views::own_data::{
-            model::{Tested, Trained, Validated},
-            remarks::judgements,
-        },
+        views::own_data::model::{Tested, Trained, Validated},
     },
     dataset::{Folds, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidated, Run, RunSettings, TargetErrors,
         recorded::{Determination, NonlinearGain, SplitComparison},
     },
-    export::{MeasuredCheckpointFile, MeasuredNetworkFile},
+    export::{MeasuredCheckpointFile, MeasuredNetworkFile, describe_standings, describe_worse_than_ridge},
     import::{Channel, Plan, PlannedSets, Progress},
     training::TrainingSettings,
 };
@@ -176,7 +173,8 @@ impl<'a> Training<'a> {
         };
         let is_standing = phase != Phase::Training;
         let saved = is_standing.then(|| MeasuredCheckpointFile::from_run(&self.run, plan, &self.about.samples_crc32));
-        let tested = Tested::new(Arc::clone(self.run.test()), self.run.decouple_test());
+        let answers = self.run.decouple_test();
+        let tested = Tested::new(Arc::clone(self.run.test()), answers.clone());
         let trained = Trained {
             name: String::new(),
             tested: Some(Arc::new(tested)),
@@ -185,7 +183,11 @@ impl<'a> Training<'a> {
             wall_time: self.run.wall_time(),
             flaw: self.run.flaw().map(|flaw| flaw.to_string()),
             remarks: if is_standing {
-                judgements(targets, &file.errors, &file.ridge)
+                let mut rng = self.run.settings().seed.rng(Stream::Resampling);
+                let told = Determination::measure(self.run.test(), answers.view(), plan.division.by, &mut rng);
+                let mut remarks = describe_standings(targets, &told);
+                remarks.extend(describe_worse_than_ridge(targets, &file.errors, &file.ridge));
+                remarks
             } else {
                 Vec::new()
             },
