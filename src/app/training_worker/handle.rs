@@ -46,10 +46,10 @@ impl Worker {
         }
     }
 
-    /// A worker that has died.
+    /// A worker that is dying; `wake` is called when it has died.
     #[cfg(test)]
-    pub fn dead() -> Self {
-        let mut dead = Self::start(Arc::new(|| ()));
+    pub fn dying(wake: Wake) -> Self {
+        let mut dead = Self::start(wake);
         dead.requests = channel().0;
         dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
         dead
