@@ -5,6 +5,7 @@
 mod merging;
 mod plan_file;
 mod row;
+#[cfg(any(test, feature = "gui"))]
 mod specification;
 #[cfg(feature = "cli")]
 mod table;
@@ -26,12 +27,14 @@ use crate::dataset::system_cause;
 pub(crate) use self::{
     merging::{MergedSweep, SweepFolderError},
     plan_file::SweepPlan,
-    row::SweepRow,
-    specification::sweep_specification,
     train_options::train_options,
     trial_file::{Trial, TrialOptions},
     trial_id::TrialId,
 };
+#[cfg(feature = "gui")]
+pub(crate) use self::row::SweepRow;
+#[cfg(any(test, feature = "gui"))]
+pub(crate) use self::specification::sweep_specification;
 #[cfg(feature = "cli")]
 pub(crate) use self::{plan_file::PlanAxis, table::SweepTableFormat, train_options::decoders_in_order};
 
