@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     decoupling::{DecoderKind, Posterior},
-    network::Shape,
+    network::{ScalingChoice, Shape},
     scene::{Movement, Rows},
     training::MachineMemory,
 };
@@ -62,8 +62,14 @@ impl Workload {
         let method = &settings.training.method;
         /// Vectors of a method and its trainer with an entry for each weight.
         const VECTORS: usize = 8;
-        let training_bytes =
-            (method.equations_bytes(shape, of_each) as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
+        // Whitening may leave inputs out, and products of fewer inputs may be kept where those of all are recomputed.
+        let fewest = match settings.inputs.scaling {
+            ScalingChoice::MinMax => shape.inputs,
+            ScalingChoice::Whitening => 1,
+        };
+        let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
+        let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
+        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
         let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
         /// Times that an epoch walks over the samples: for a step that is rejected, one that is accepted, and its products.
         const WALKS: f64 = 3.0;
@@ -213,6 +219,12 @@ mod tests {
         // 31·32/2 products of two inputs and 12 + 1 + 10 activations of each sample.
         let kept = 8 * 60_000 * (496 + 23);
         assert!(Workload::of(&known).unwrap().bytes > kept);
+        // Products of all 31 inputs would take 40 MB for each row, those of 27 take 30 MB and are kept.
+        known.source.samples = 100_000;
+        let by_range = Workload::of(&known).unwrap().bytes;
+        known.inputs.scaling = ScalingChoice::Whitening;
+        let whitened = Workload::of(&known).unwrap().bytes;
+        assert!(whitened > by_range + 10 * 30_000_000, "{whitened} {by_range}");
         let mut smooth = settings("512x512_1x512", "gd", 1);
         smooth.source.scene.loading = "smooth:4".parse().unwrap();
         let bytes = Workload::of(&smooth).unwrap().bytes;
