@@ -6,6 +6,9 @@
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs, clippy::unwrap_used)]
 
+#[path = "arithmetic/row.rs"]
+mod row_arithmetic;
+
 use std::{hint::black_box, time::Instant};
 
 use decoupler::{
@@ -23,6 +26,7 @@ use decoupler::{
 };
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
+use row_arithmetic::RowArithmetic;
 
 /// A piece of work with its name.
 type Work<'a> = (String, Box<dyn FnMut() + 'a>);
@@ -110,27 +114,7 @@ macro_rules! arithmetic {
     }};
 }
 
-/// Square roots, divisions and products that a decoder cannot avoid in a row.
-#[derive(Clone, Copy)]
-struct RowArithmetic {
-    roots: usize,
-    divisions: usize,
-    products: usize,
-}
-
 impl RowArithmetic {
-    /// Of `evaluations` of Eq. (2) and its derivatives along z, each with its normal equations and their factor.
-    fn of_newton(scale: ArrayScale, evaluations: usize) -> Self {
-        let (nodes, columns) = (scale.nodes_per_row(), scale.columns());
-        let distances = nodes * scale.nodes_per_column() * columns;
-        let equations = (nodes + 1) * (nodes + 2) / 2 * columns;
-        Self {
-            roots: evaluations * distances,
-            divisions: evaluations * distances,
-            products: evaluations * (3 * distances + equations + nodes * nodes * nodes / 6),
-        }
-    }
-
     /// Of Gaussians around `centres`, each with an exponential of about 16 products.
     fn of_radial_basis(scale: ArrayScale, centres: usize) -> Self {
         let (inputs, outputs) = (scale.columns(), scale.nodes_per_row());
@@ -149,41 +133,6 @@ impl RowArithmetic {
             roots: rounds * 2 * nodes,
             divisions: rounds * 10 * nodes,
             products: rounds * nodes * (97 * 5 + 2 * nodes * nodes),
-        }
-    }
-
-    /// The work of `rows` rows in plain loops.
-    fn work(self, rows: usize) -> impl FnMut() {
-        struct Loops<'a>(&'a mut [f64], &'a mut [f64], &'a [f64]);
-        impl WithSimd for Loops<'_> {
-            type Output = f64;
-
-            #[inline(always)]
-            fn with_simd<S: Simd>(self, _: S) -> f64 {
-                const LANES: usize = 8;
-                for value in self.0 {
-                    *value = (*value + 30.0).sqrt();
-                }
-                for value in self.1 {
-                    *value = 1.0 / *value;
-                }
-                let mut sums = [[0.0; LANES]; 4];
-                for blocks in self.2.as_chunks::<LANES>().0.as_chunks::<4>().0 {
-                    for (sums, block) in sums.iter_mut().zip(blocks) {
-                        for lane in 0..LANES {
-                            sums[lane] += 0.7 * block[lane];
-                        }
-                    }
-                }
-                sums.as_flattened().iter().sum()
-            }
-        }
-        let (mut roots, mut quotients) = (vec![1.0; self.roots], vec![1.5; self.divisions]);
-        let factors = vec![0.01; self.products];
-        move || {
-            for _ in 0..rows {
-                black_box(pulp::Arch::new().dispatch(Loops(&mut roots, &mut quotients, &factors)));
-            }
         }
     }
 }

@@ -35,9 +35,9 @@ fn arguments_that_contradict_each_other_end_with_status_2_and_the_numbers_given(
             "mu is 1e12, above largest mu, which is 1e10: lower mu, or raise largest mu",
         ),
         (
-            "train --array 10x2_2x6 --samples 1000000",
-            "1000000 training and 200 validation samples, drawn together as whole snapshots of 10 rows, are 1000200: \
-             the limit is 1000000; give fewer of either",
+            "train --array 10x2_2x6 --samples 100000 --validation-samples 900010",
+            "100000 training and 900010 validation samples, held together as whole snapshots of 10 rows, are 1000010: \
+             the limit is 1000000; give fewer for validation",
         ),
         (
             "train --method gdx --set momentum=1",

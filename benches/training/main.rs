@@ -8,6 +8,7 @@
 
 mod dense;
 mod epoch;
+mod exponent;
 mod growth;
 mod memory;
 mod methods;

@@ -20,8 +20,10 @@ use crate::{
     sensor::{ArrayScale, SensorModel},
 };
 
-/// Number of snapshots drawn and written together, so that memory does not grow with the number of samples.
+/// Largest number of snapshots drawn and written together, so that memory does not grow with the number of samples.
 const BLOCK: usize = 64;
+/// Memory for them where one of a large array takes much.
+const BLOCK_BYTES: usize = 64 << 20;
 
 /// Draw samples of an array and write them as CSV
 ///
@@ -88,8 +90,10 @@ impl Simulate {
         let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
         let snapshots = self.samples.div_ceil(rows.len());
         write_samples_header(self.array, decoder.is_some(), writer).map_err(&refused)?;
-        for first in (0..snapshots).step_by(BLOCK) {
-            let samples = BLOCK.min(snapshots - first) * rows.len();
+        let numbers = rows.len() * (self.array.columns() + self.array.coordinates_per_row());
+        let block = (BLOCK_BYTES / (size_of::<f64>() * numbers)).clamp(1, BLOCK);
+        for first in (0..snapshots).step_by(block) {
+            let samples = block.min(snapshots - first) * rows.len();
             let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
             if let Some(faulty) = &faulty {
                 set.break_before_noise(sensor, faulty);

@@ -1,6 +1,7 @@
 use clap::Args;
 
 use super::{
+    announcement::announce_workload,
     failure::Failure,
     interruption::Graceful,
     output::progress_bar,
@@ -10,7 +11,7 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{Preset, SimulatedSettings, TradeOffLevel, TradeOffPoint, measure_trade_off},
+    evaluation::{Preset, SimulatedSettings, TradeOffLevel, TradeOffPoint, Workload, measure_trade_off},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::StoppingRules,
@@ -66,6 +67,10 @@ impl Trade {
             None => Preset::ALL.to_vec(),
         };
         let decoders = self.scene.decoders();
+        for &preset in &presets {
+            let settings = self.settings(preset, noises[0])?;
+            announce_workload(&Workload::of_trade_off(&settings, &self.hidden, &decoders)?)?;
+        }
         let bar = progress_bar(
             self.json,
             noises.len() * presets.len(),

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{Dataset, LARGEST_SAMPLES};
 use crate::{
-    scene::{Noise, NoiseSource, Scene, SceneError},
+    scene::{DeformationSampler, Noise, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel},
 };
 
@@ -45,12 +45,24 @@ impl Dataset {
             return Err(SimulationError::Count(samples));
         }
         let read = scene.rows.read(model.scale.rows())?;
-        let snapshots = samples.div_ceil(read.len());
+        Self::draw(model, &scene.sampler(model), &read, samples.div_ceil(read.len()), rng)
+    }
+
+    /// Draws `snapshots` snapshots of row-wires `read`, at least one of each.
+    ///
+    /// # Errors
+    /// If the model has no resistance for a drawn deformation.
+    pub(crate) fn draw(
+        model: &SensorModel,
+        sampler: &DeformationSampler,
+        read: &[usize],
+        snapshots: usize,
+        rng: &mut impl Rng,
+    ) -> Result<Self, SimulationError> {
         let samples = snapshots * read.len();
         let mut resistances_ohm = Array2::zeros((samples, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((samples, model.scale.coordinates_per_row()));
         let mut drawn = resistances_ohm.rows_mut().into_iter().zip(coordinates_mm.rows_mut());
-        let sampler = scene.sampler(model);
         for snapshot in 0..snapshots {
             let deformation = sampler.draw(rng);
             for (&row_wire, (mut readings, mut positions)) in read.iter().zip(drawn.by_ref()) {

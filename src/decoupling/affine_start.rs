@@ -24,6 +24,11 @@ pub(super) struct AffineStart {
 const SMALLEST_VARIANCE: f64 = 1e-13;
 
 impl AffineStart {
+    /// Memory of the estimate for one row-wire.
+    pub(super) fn bytes(model: &SensorModel) -> usize {
+        (model.scale.nodes_per_row() + 1) * model.scale.columns() * size_of::<f64>()
+    }
+
     /// Computes the estimate for row-wire `row`; the middle of `stroke` if there is no inverse.
     pub(super) fn new(model: &SensorModel, row: usize, stroke: Range) -> Self {
         let (readings, nodes) = (model.scale.columns(), model.scale.nodes_per_row());

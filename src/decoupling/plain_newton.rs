@@ -65,6 +65,8 @@ enum State {
 
 /// Smallest fraction of a step; one that must be shortened further leads out of the sensor.
 pub(super) const SHORTEST_SHARE: f64 = 1e-3;
+/// Most memory for the estimates of all row-wires; above it they start from the middle, which takes a step more.
+const LARGEST_STARTS_BYTES: usize = 256 << 20;
 /// Largest number of steps; more are not needed where they converge quadratically.
 const MOST_STEPS: usize = 12;
 /// Steps that may fail to become shorter.
@@ -118,7 +120,8 @@ impl PlainNewton {
     pub(super) fn load(&mut self, lane: usize, row: usize, readings_ohm: &[f64]) {
         let lane = &mut self.lanes[lane];
         lane.read(row, readings_ohm);
-        if self.axes == Axes::Z {
+        let bytes = self.model.scale.rows() * AffineStart::bytes(&self.model);
+        if self.axes == Axes::Z && bytes <= LARGEST_STARTS_BYTES {
             let (model, stroke) = (&self.model, self.ranges[0]);
             let start = self.starts[row].get_or_insert_with(|| AffineStart::new(model, row, stroke));
             start.estimate(readings_ohm, &mut lane.unknowns_mm);
@@ -170,10 +173,18 @@ impl PlainNewton {
         for lane in 0..LANES {
             if self.lanes[lane].state == State::Moving {
                 self.lanes[lane].clamp(&self.ranges);
-                self.linearise(lane);
+                if rules.steps == 0 {
+                    self.linearise(lane);
+                } else {
+                    self.evaluate_misfits(lane);
+                }
             }
         }
-        self.equations.solve();
+        // The derivatives before the last step judge the answer: where it comes within the errors that count, the step was so
+        // short that they hardly changed.
+        if rules.steps == 0 {
+            self.equations.solve();
+        }
         let inverse_rows = self.equations.largest_inverse_rows();
         for (index, inverse_row) in inverse_rows.into_iter().enumerate() {
             let lane = &mut self.lanes[index];
@@ -219,24 +230,14 @@ impl PlainNewton {
 
     /// Evaluates Eq. (2) for the row in `lane` and sets its normal equations.
     fn linearise(&mut self, index: usize) {
-        let lane = &mut self.lanes[index];
-        let (axes, readings) = (self.axes.indices(), lane.readings_ohm.len());
-        let nodes = lane.unknowns_mm.chunks_exact(axes.len());
-        for (displacement, values) in self.displacements_mm.iter_mut().zip(nodes) {
-            for (&axis, &value) in axes.iter().zip(values) {
-                displacement[axis] = value;
-            }
-        }
+        self.place_nodes(index);
+        let row = self.lanes[index].row;
         self.conductance
-            .evaluate_refined(&self.model, lane.row, &self.displacements_mm);
-        let per_ohm = 1.0 / self.model.resistivity_ohm_per_mm;
-        let (jacobian, misfits) = lane.system.split_at_mut(lane.unknowns_mm.len() * padded(readings));
-        let mut squares = 0.0;
-        let pairs = lane.readings_ohm.iter().zip(self.conductance.sums());
-        for (misfit, (ohm, sum)) in misfits.iter_mut().zip(pairs) {
-            *misfit = 1.0 - ohm * per_ohm * sum;
-            squares += *misfit * *misfit;
-        }
+            .evaluate_refined(&self.model, row, &self.displacements_mm);
+        self.write_misfits(index);
+        let lane = &mut self.lanes[index];
+        let (readings, per_ohm) = (lane.readings_ohm.len(), 1.0 / self.model.resistivity_ohm_per_mm);
+        let jacobian = &mut lane.system[..lane.unknowns_mm.len() * padded(readings)];
         for ((unknown, slopes), range) in jacobian
             .chunks_exact_mut(padded(readings))
             .enumerate()
@@ -249,11 +250,42 @@ impl PlainNewton {
             }
         }
         if lane.length.is_infinite() {
-            lane.first_residual = rms(squares, readings);
+            lane.first_residual = lane.residual;
         }
-        lane.residual = rms(squares, readings);
         write_normal_equations(&lane.system, padded(readings), &mut self.entries);
         self.equations.set(index, &self.entries);
+    }
+
+    /// Evaluates the misfits of Eq. (2) for the row in `lane`, whose equations stay as they are.
+    fn evaluate_misfits(&mut self, index: usize) {
+        self.place_nodes(index);
+        let row = self.lanes[index].row;
+        self.conductance
+            .evaluate_sums_refined(&self.model, row, &self.displacements_mm);
+        self.write_misfits(index);
+    }
+
+    fn place_nodes(&mut self, index: usize) {
+        let axes = self.axes.indices();
+        let nodes = self.lanes[index].unknowns_mm.chunks_exact(axes.len());
+        for (displacement, values) in self.displacements_mm.iter_mut().zip(nodes) {
+            for (&axis, &value) in axes.iter().zip(values) {
+                displacement[axis] = value;
+            }
+        }
+    }
+
+    fn write_misfits(&mut self, index: usize) {
+        let lane = &mut self.lanes[index];
+        let (readings, per_ohm) = (lane.readings_ohm.len(), 1.0 / self.model.resistivity_ohm_per_mm);
+        let misfits = &mut lane.system[lane.unknowns_mm.len() * padded(readings)..];
+        let mut squares = 0.0;
+        let pairs = lane.readings_ohm.iter().zip(self.conductance.sums());
+        for (misfit, (ohm, sum)) in misfits.iter_mut().zip(pairs) {
+            *misfit = 1.0 - ohm * per_ohm * sum;
+            squares += *misfit * *misfit;
+        }
+        lane.residual = rms(squares, readings);
     }
 
     /// Takes the step of the row in `lane`.

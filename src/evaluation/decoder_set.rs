@@ -80,12 +80,13 @@ pub struct DecoderSet {
 }
 
 impl DecoderSet {
-    /// Draws the training set of `settings`; `networks` are those trained with these settings.
+    /// Draws the training set of `settings`, as far as a run holds it: up to 100 000 samples. `networks` are those trained
+    /// with these settings.
     ///
     /// # Errors
     /// If the settings are invalid.
     pub fn new(settings: &SimulatedSettings, networks: Option<Networks>) -> Result<Self, RunError> {
-        let training = settings.draw()?.0.training;
+        let training = settings.draw_held()?.0.training;
         Ok(Self::on_set((*settings).into(), training, networks))
     }
 

@@ -14,6 +14,7 @@ mod fine_tuning;
 #[cfg(feature = "files")]
 pub(crate) mod format;
 mod frame_time;
+mod further_samples;
 mod known_presses;
 mod machine;
 mod missing_figures;

@@ -6,6 +6,7 @@ use super::{
     Baselines, Errors, NoReference, Run, RunError, RunSettings, SimulatedSettings, StartTrainer, TargetErrors,
     TargetRow,
     baselines::{fit_baselines, linear_name},
+    further_samples::FurtherSamples,
     reference_errors,
     sets::check_sets,
     task::{Task, tasks},
@@ -33,12 +34,25 @@ impl Run {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
         Workload::of(&settings)?.check_memory()?;
-        let Some((split, test)) = settings.draw_unless(is_cancelled)? else {
+        Self::with_drawn_sets(settings, is_cancelled, |tasks| begin(settings.into(), tasks))
+    }
+
+    /// Prepares a run on sets that are drawn, with the trainings of `begin`; `None` once `is_cancelled`.
+    fn with_drawn_sets(
+        settings: SimulatedSettings,
+        is_cancelled: &dyn Fn() -> bool,
+        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
+    ) -> Result<Option<Self>, RunError> {
+        let Some((split, test)) = settings.draw_held_unless(is_cancelled)? else {
             return Ok(None);
         };
-        Self::with_sets(settings.into(), split, test, is_cancelled, |tasks| {
-            begin(settings.into(), tasks)
-        })
+        let further = FurtherSamples::of(&settings)?.map(Arc::new);
+        if let Some(further) = &further
+            && !further.check(is_cancelled)?
+        {
+            return Ok(None);
+        }
+        Self::with_sets(settings.into(), (split, further), test, is_cancelled, begin)
     }
 
     /// Prepares a run on existing sets, measured or from a cross-validation; see [`Self::prepare`].
@@ -46,7 +60,7 @@ impl Run {
     /// # Errors
     /// If the settings are invalid, or the sets do not belong together.
     pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        whole(Self::with_sets(settings, split, test, &|| false, |tasks| {
+        whole(Self::with_sets(settings, (split, None), test, &|| false, |tasks| {
             begin(settings, tasks)
         }))
     }
@@ -67,12 +81,7 @@ impl Run {
     ) -> Result<Option<Self>, RunError> {
         settings.check_counts()?;
         check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
-        let Some((split, test)) = settings.draw_unless(is_cancelled)? else {
-            return Ok(None);
-        };
-        let run = Self::with_sets(settings.into(), split, test, is_cancelled, |tasks| {
-            take_up(settings.into(), states, tasks)
-        })?;
+        let run = Self::with_drawn_sets(settings, is_cancelled, |tasks| take_up(settings.into(), states, tasks))?;
         Ok(run.map(Self::with_time_of_saved))
     }
 
@@ -95,16 +104,17 @@ impl Run {
         split: Split,
         test: Dataset,
     ) -> Result<Self, RunError> {
-        let run = Self::with_sets(settings, split, test, &|| false, |tasks| {
+        let run = Self::with_sets(settings, (split, None), test, &|| false, |tasks| {
             take_up(settings, states, tasks)
         });
         Ok(whole(run)?.with_time_of_saved())
     }
 
-    /// Prepares a run whose trainings are those of `begin`; `None` once `is_cancelled`.
+    /// Prepares a run whose trainings are those of `begin`, on a split and on samples that are not held; `None` once
+    /// `is_cancelled`.
     fn with_sets(
         settings: RunSettings,
-        split: Split,
+        (split, further): (Split, Option<Arc<FurtherSamples>>),
         test: Dataset,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
@@ -137,7 +147,7 @@ impl Run {
         if is_cancelled() {
             return Ok(None);
         }
-        let tasks = tasks(&settings, &split, &test)?;
+        let tasks = tasks(&settings, &split, further.as_ref(), &test)?;
         // The tasks hold the samples scaled; large sets need not be held twice.
         drop(split);
         let first = tasks.at(0);

@@ -19,11 +19,11 @@ pub enum RunError {
     Count(#[from] CountError),
     /// More samples than a run can hold.
     #[error(
-        "{training} training and {validation} validation samples, drawn together as whole snapshots of {rows} rows, are \
-         {total}: the limit is {most}; give fewer of either"
+        "{training} training and {validation} validation samples, held together as whole snapshots of {rows} rows, are \
+         {total}: the limit is {most}; give fewer for validation"
     )]
     TooManySamples {
-        /// Training samples given.
+        /// Training samples that are held.
         training: usize,
         /// Validation samples given.
         validation: usize,

@@ -1,4 +1,4 @@
-use super::{RunError, SimulatedSettings, Simulation};
+use super::{RunError, SimulatedSettings, Simulation, further_samples::MOST_HELD};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
     training::TrainingError,
@@ -13,8 +13,23 @@ impl SimulatedSettings {
         Ok(self.draw_unless(&|| false)?.expect("nothing cancels it"))
     }
 
-    /// As [`Self::draw`]; returns `None` once `is_cancelled`, which is called after each set.
-    pub(super) fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {
+    /// As [`Self::draw`], but only those training samples that a run holds.
+    pub(super) fn draw_held(&self) -> Result<(Split, Dataset), RunError> {
+        Ok(self.draw_held_unless(&|| false)?.expect("nothing cancels it"))
+    }
+
+    /// As [`Self::draw_held`]; returns `None` once `is_cancelled`, which is called after each set.
+    pub(super) fn draw_held_unless(
+        &self,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<(Split, Dataset)>, RunError> {
+        self.check_counts()?;
+        let mut held = *self;
+        held.source.samples = self.source.samples.min(MOST_HELD);
+        held.draw_unless(is_cancelled)
+    }
+
+    fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {
         self.check_counts()?;
         self.training.check().map_err(TrainingError::from)?;
         let Simulation {

@@ -1,4 +1,6 @@
-use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, preparation::reference};
+use super::{
+    DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, Workload, preparation::reference,
+};
 use crate::decoupling::{DecoderKind, Precision};
 
 /// One decoder on the trade-off between speed and accuracy.
@@ -57,6 +59,7 @@ pub fn measure_trade_off(
     is_cancelled: impl Fn() -> bool,
     mut on_point: impl FnMut(TradeOffPoint),
 ) -> Result<bool, RunError> {
+    Workload::of_trade_off(settings, hidden, decoders)?.check_memory()?;
     let mut set = DecoderSet::new(settings, None)?;
     let test = settings.draw_test()?;
     let reference = reference(settings, &test)?.ok();

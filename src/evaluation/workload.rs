@@ -2,11 +2,13 @@ use std::time::Duration;
 
 use super::{
     RunError, SimulatedSettings,
+    further_samples::MOST_HELD,
     machine::{Speed, node_pairs_per_row},
 };
 use crate::{
-    network::Shape,
-    scene::{Loading, Movement, Rows},
+    decoupling::{DecoderKind, Posterior},
+    network::{ScalingChoice, Shape},
+    scene::{Movement, Rows},
     training::MachineMemory,
 };
 
@@ -15,8 +17,12 @@ use crate::{
 pub struct Workload {
     /// Memory at its peak, in bytes: samples, drawn and scaled, equations of all trainings, and priors of the rows.
     pub bytes: u64,
+    /// Number of training samples that are not held but drawn again whenever they are needed.
+    pub drawn_again: usize,
     /// Pairs of nodes in the resistances of all samples that are drawn.
     node_pairs: f64,
+    /// Pairs of nodes in the resistances of the samples that are drawn again in an epoch.
+    epoch_node_pairs: f64,
     /// Multiplications of an epoch of all trainings.
     epoch_multiplications: f64,
     /// Largest number of epochs.
@@ -45,46 +51,76 @@ impl Workload {
         let scale = source.sensor.scale;
         let whole = |samples: usize| samples.div_ceil(size.rows) * size.rows;
         let training = whole(source.samples);
+        let held = whole(source.samples.min(MOST_HELD));
         let held_out = whole(source.validation_samples) + whole(source.test_samples);
         let shape = largest_shape(settings);
         // Readings and targets: drawn, split, scaled, and in blocks for the training.
         let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + shape.inputs + 1 + shape.outputs;
-        let samples = float_bytes(training.saturating_add(held_out), per_sample);
+        let samples = float_bytes(held.saturating_add(held_out), per_sample);
         let trainings = settings.starts * size.networks;
         let of_each = training.div_ceil(size.networks);
         let method = &settings.training.method;
         /// Vectors of a method and its trainer with an entry for each weight.
         const VECTORS: usize = 8;
-        let training_bytes =
-            (method.equations_bytes(shape, of_each) as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
-        // Nodes that move on their own have priors in closed form.
-        let unknowns = size.unknowns / size.rows;
-        let priors = match source.scene.loading {
-            Loading::RandomNodes => 0,
-            _ => float_bytes(size.rows, unknowns * unknowns),
+        // Whitening may leave inputs out, and products of fewer inputs may be kept where those of all are recomputed.
+        let fewest = match settings.inputs.scaling {
+            ScalingChoice::MinMax => shape.inputs,
+            ScalingChoice::Whitening => 1,
         };
+        let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
+        let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
+        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
+        let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
+        /// Times that an epoch walks over the samples: for a step that is rejected, one that is accepted, and its products.
+        const WALKS: f64 = 3.0;
+        let drawn_again = training - held;
+        let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
             .saturating_add(training_bytes.saturating_mul(trainings as u64))
             .saturating_add(priors);
         Ok(Self {
             bytes,
-            node_pairs: (training + held_out) as f64 * node_pairs_per_row(&source.sensor),
+            drawn_again,
+            // What is drawn again is also checked once.
+            node_pairs: (training + held_out) as f64 * per_row,
+            epoch_node_pairs: WALKS * (settings.starts * drawn_again) as f64 * per_row,
             epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
             epochs: settings.training.stopping.epochs,
         })
     }
 
+    /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes, one after the other: that
+    /// of the largest run.
+    ///
+    /// # Errors
+    /// If the array lacks a row of the scene.
+    pub fn of_trade_off(
+        settings: &SimulatedSettings,
+        hidden: &[usize],
+        decoders: &[DecoderKind],
+    ) -> Result<Self, RunError> {
+        let trains = decoders.iter().any(|kind| kind.needs_network());
+        let largest = hidden.iter().copied().max().filter(|_| trains);
+        Self::of(&SimulatedSettings {
+            hidden: largest.unwrap_or(1),
+            ..*settings
+        })
+    }
+
     /// Returns `true` if it takes so much memory or time that the user should know before it begins: a gigabyte, some
-    /// seconds to draw the samples, or a second an epoch.
+    /// seconds to draw the samples, more samples than are held, or a second an epoch.
     pub fn is_large(&self) -> bool {
-        self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
+        self.bytes > 1_000_000_000
+            || self.node_pairs > 1e10
+            || self.drawn_again > 0
+            || self.epoch_multiplications > 1e10
     }
 
     /// Computes the time on this machine. The first time its speed is measured, which takes some 20 ms.
     pub fn time(&self) -> WorkloadTime {
         let speed = Speed::measured();
         let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let epoch = self.epoch_multiplications / speed.multiplications;
+        let epoch = self.epoch_multiplications / speed.multiplications + self.epoch_node_pairs / speed.node_pairs;
         WorkloadTime {
             drawing: duration(self.node_pairs / speed.node_pairs),
             epoch: duration(epoch),
@@ -161,6 +197,40 @@ mod tests {
         }
     }
 
+    /// Beyond those that are held, samples cost time and no memory but for the equations, which are bounded too.
+    #[test]
+    fn memory_does_not_grow_with_the_samples() {
+        let workload = |samples| {
+            let mut settings = settings("10x10_5x30", "lm", 12);
+            settings.source.samples = samples;
+            Workload::of(&settings).unwrap()
+        };
+        let (held, all) = (workload(MOST_HELD), workload(1_000_000));
+        assert_eq!((held.drawn_again, all.drawn_again), (0, 900_000));
+        assert!(all.bytes < held.bytes + 100_000_000, "{held:?} {all:?}");
+        assert!(all.time().epoch > 20 * held.time().epoch, "{held:?} {all:?}");
+    }
+
+    #[test]
+    fn kept_products_and_draws_of_priors_are_counted() {
+        let mut known = settings("10x10_5x30", "lm", 12);
+        known.source.scene.rows = Rows::Known;
+        known.source.samples = 60_000;
+        // 31·32/2 products of two inputs and 12 + 1 + 10 activations of each sample.
+        let kept = 8 * 60_000 * (496 + 23);
+        assert!(Workload::of(&known).unwrap().bytes > kept);
+        // Products of all 31 inputs would take 40 MB for each row, those of 27 take 30 MB and are kept.
+        known.source.samples = 100_000;
+        let by_range = Workload::of(&known).unwrap().bytes;
+        known.inputs.scaling = ScalingChoice::Whitening;
+        let whitened = Workload::of(&known).unwrap().bytes;
+        assert!(whitened > by_range + 10 * 30_000_000, "{whitened} {by_range}");
+        let mut smooth = settings("512x512_1x512", "gd", 1);
+        smooth.source.scene.loading = "smooth:4".parse().unwrap();
+        let bytes = Workload::of(&smooth).unwrap().bytes;
+        assert!(bytes > 8 * 512 * 512 * 4000, "{bytes}");
+    }
+
     /// Bayesian regularisation holds the factor and the inverse of the equations of the hidden layer: (31·512)² each.
     #[test]
     fn the_equations_dominate_the_memory_of_wide_networks() {
@@ -172,7 +242,8 @@ mod tests {
     #[test]
     fn what_no_machine_has_is_refused() {
         let mut settings = settings("512x512_1x512", "lm", 512);
-        settings.source.samples = 1_000_000;
+        settings.source.validation_samples = 1_000_000;
+        settings.source.test_samples = 1_000_000;
         settings.starts = 100;
         let workload = Workload::of(&settings).unwrap();
         assert!(workload.bytes > 500_000_000_000, "{workload:?}");

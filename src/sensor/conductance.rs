@@ -61,6 +61,14 @@ impl RowConductance {
         self.evaluate_by::<Refined>(model, row, displacements_mm);
     }
 
+    /// Evaluates the sums alone, with the same bits as [`Self::evaluate_refined`]; derivatives stay those of the last
+    /// evaluation.
+    pub(crate) fn evaluate_sums_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
+        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+        let sensor = (model.scale, &model.geometry);
+        sum_reciprocal_distances::<0, Refined>(sensor, row, displacements_mm, &mut self.sums, &mut []);
+    }
+
     /// Returns `true` if refined reciprocal roots can be computed of distances up to that of nodes displaced by
     /// `largest_mm`, no nearer to the column-wires than `nearest_mm`.
     pub(crate) fn is_within_reach(model: &SensorModel, nearest_mm: f64, largest_mm: f64) -> bool {
@@ -105,6 +113,10 @@ mod tests {
                 let (mut exact, mut refined) = (RowConductance::new(&model, axes), RowConductance::new(&model, axes));
                 exact.evaluate(&model, 1, &at);
                 refined.evaluate_refined(&model, 1, &at);
+                let mut alone = refined.clone();
+                alone.evaluate_sums_refined(&model, 2.min(model.scale.rows() - 1), &at);
+                alone.evaluate_sums_refined(&model, 1, &at);
+                assert_eq!(alone, refined);
                 for (exact, refined) in exact.sums().iter().zip(refined.sums()) {
                     assert!(
                         (refined / exact - 1.0).abs() <= 4.0 * f64::EPSILON,

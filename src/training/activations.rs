@@ -67,8 +67,7 @@ impl Activations {
 
     /// Mean squared error of `mlp` over samples and outputs.
     pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let blocks = examples.blocks().iter();
-        let squares = blocks.map(|block| self.forward(mlp, block)).sum::<f64>();
+        let squares = examples.blocks().map(|block| self.forward(mlp, &block)).sum::<f64>();
         squares / examples.errors()
     }
 }
@@ -87,11 +86,16 @@ pub(super) struct KeptActivations {
 }
 
 impl KeptActivations {
+    /// About how many bytes are kept for so many samples.
+    pub(super) fn bytes(shape: Shape, samples: usize) -> usize {
+        let bytes = all_bytes(shape, samples);
+        if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }
+    }
+
     /// Allocates for samples that are worked on in up to `parts` parts.
     pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
-        let bytes = examples.samples() * (shape.hidden + 1 + shape.outputs) * size_of::<f64>();
-        let recomputed = bytes > LARGEST_KEPT_BYTES;
-        let count = if recomputed { parts } else { examples.blocks().len() };
+        let recomputed = all_bytes(shape, examples.samples()) > LARGEST_KEPT_BYTES;
+        let count = if recomputed { parts } else { examples.block_count() };
         Self {
             buffers: vec![Activations::new(shape); count],
             recomputed,
@@ -112,7 +116,6 @@ impl KeptActivations {
     }
 
     fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let blocks = examples.blocks();
         let mut buffers = self.buffers.as_mut_slice();
         let part = |blocks: Range<usize>| {
             let count = if self.recomputed { 1 } else { blocks.len() };
@@ -120,10 +123,10 @@ impl KeptActivations {
             buffers = others;
             (blocks, own, 0.0)
         };
-        let mut parts: Vec<_> = parts(blocks.len(), self.parts).map(part).collect();
+        let mut parts: Vec<_> = parts(examples.block_count(), self.parts).map(part).collect();
         for_each_part(&mut parts, |(numbers, own, squares)| {
-            for (index, block) in blocks[numbers.clone()].iter().enumerate() {
-                *squares += own[index % own.len()].forward(mlp, block);
+            for (index, number) in numbers.clone().enumerate() {
+                *squares += own[index % own.len()].forward(mlp, &examples.block(number));
             }
         });
         parts.iter().map(|(.., squares)| squares).sum()
@@ -138,24 +141,33 @@ impl KeptActivations {
         sums: &mut [S],
         work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
     ) {
-        let numbers = parts(examples.blocks().len(), sums.len());
+        let numbers = parts(examples.block_count(), sums.len());
         if self.recomputed {
             let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.buffers).collect();
             for_each_part(&mut parts, |((numbers, sums), activations)| {
                 for number in numbers.clone() {
-                    activations.forward(mlp, &examples.blocks()[number]);
-                    work(sums, &BlockNow::new(examples, number, activations));
+                    let block = examples.block(number);
+                    activations.forward(mlp, &block);
+                    work(sums, &BlockNow::new(number, &block, activations));
                 }
             });
         } else {
             let mut parts: Vec<_> = numbers.zip(sums).collect();
             for_each_part(&mut parts, |(numbers, sums)| {
                 for number in numbers.clone() {
-                    work(sums, &BlockNow::new(examples, number, &self.buffers[number]));
+                    work(
+                        sums,
+                        &BlockNow::new(number, &examples.block(number), &self.buffers[number]),
+                    );
                 }
             });
         }
     }
+}
+
+/// Bytes of the activations of so many samples.
+fn all_bytes(shape: Shape, samples: usize) -> usize {
+    samples.saturating_mul((shape.hidden + 1 + shape.outputs) * size_of::<f64>())
 }
 
 /// A block of samples with its activations.
@@ -167,10 +179,10 @@ pub(super) struct BlockNow<'a> {
 }
 
 impl<'a> BlockNow<'a> {
-    fn new(examples: &'a Examples, number: usize, activations: &'a Activations) -> Self {
+    fn new(number: usize, block: &'a Block, activations: &'a Activations) -> Self {
         Self {
             number,
-            block: &examples.blocks()[number],
+            block,
             activations,
         }
     }

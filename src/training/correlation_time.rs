@@ -7,9 +7,10 @@ use crate::network::Mlp;
 /// 1 + 2 Σ ρ(k) of the errors of `mlp`, over all outputs together, up to the first lag without positive correlation, at most
 /// `lags` (Sokal 1997, doi:10.1007/978-1-4899-0319-8_6). 1 for independent errors.
 pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f64 {
-    let mut outputs = vec![Vec::with_capacity(examples.samples()); examples.outputs()];
+    let mut outputs = vec![Vec::new(); examples.outputs()];
     let mut activations = Activations::new(mlp.shape());
-    for block in examples.blocks() {
+    // Samples that are drawn again are independent, and their errors need not be held either.
+    for block in examples.held() {
         activations.forward(mlp, block);
         for (index, errors) in outputs.iter_mut().enumerate() {
             errors.extend_from_slice(&column(activations.errors.as_ref(), index)[..block.samples()]);

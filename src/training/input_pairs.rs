@@ -39,9 +39,14 @@ impl Default for PairsBuffer {
 }
 
 impl InputPairs {
+    /// Number of bytes that are kept for so many samples; 0 if their pairs are recomputed.
+    pub(super) fn kept_bytes(inputs: usize, samples: usize) -> usize {
+        let bytes = samples.saturating_mul(pairs(inputs + 1) * size_of::<f64>());
+        if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }
+    }
+
     pub(super) fn new(examples: &Examples) -> Self {
-        let n1 = examples.inputs() + 1;
-        if examples.samples() * pairs(n1) * size_of::<f64>() > LARGEST_KEPT_BYTES {
+        if Self::kept_bytes(examples.inputs(), examples.samples()) == 0 {
             return Self::Recomputed;
         }
         kept(examples);

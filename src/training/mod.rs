@@ -43,6 +43,7 @@ pub use damping::Damping;
 pub(crate) use epoch_columns::History;
 use evaluation::Evaluation;
 pub use examples::Examples;
+pub(crate) use examples::{BLOCK, DrawnBlocks};
 pub use flaw::TrainingFlaw;
 pub use gradient_descent::GradientDescentSettings;
 pub use history::EpochRecord;

@@ -197,14 +197,14 @@ fn add_blocks(to: &mut [f64], factor: f64, from: &[f64]) {
     }
 }
 
-/// In four strands, which the compiler turns into vectors.
+/// In four strands of fixed order. Chunks are arrays, for slices of them are not compiled for vector registers.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
-    let mut sums = [0.0; 4];
-    for (a, b) in a4.zip(b4) {
-        for lane in 0..4 {
+    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    let mut sums = [0.0; LANES];
+    for (a, b) in a4.iter().zip(b4) {
+        for lane in 0..LANES {
             sums[lane] += a[lane] * b[lane];
         }
     }
@@ -213,7 +213,13 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[inline(always)]
 fn add(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (to, from) in to.iter_mut().zip(from) {
+    let ((to4, to_rest), (from4, from_rest)) = (to.as_chunks_mut::<LANES>(), from.as_chunks::<LANES>());
+    for (to, from) in to4.iter_mut().zip(from4) {
+        for lane in 0..LANES {
+            to[lane] += factor * from[lane];
+        }
+    }
+    for (to, from) in to_rest.iter_mut().zip(from_rest) {
         *to += factor * from;
     }
 }

@@ -64,6 +64,11 @@ impl Posterior {
         })
     }
 
+    /// About how many bytes the priors of so many rows take while they are estimated.
+    pub(crate) fn prior_bytes(scene: &Scene, rows: usize, unknowns_per_row: usize) -> u64 {
+        RowPrior::bytes(scene.loading, rows, unknowns_per_row)
+    }
+
     /// The same posterior of readings rounded to a part of `parts` of what they are taken to be rounded to: how finely they
     /// are is known to its order of magnitude only.
     pub(crate) fn rounded_finer(&self, parts: f64) -> Self {

@@ -31,6 +31,16 @@ const PRIOR_DRAWS: usize = 4000;
 const SMALLEST_SPREAD: f64 = 1e-3;
 
 impl RowPrior {
+    /// About how many bytes the priors of so many rows take while they are estimated.
+    pub(super) fn bytes(loading: Loading, rows: usize, unknowns: usize) -> u64 {
+        // Nodes that move on their own have priors in closed form.
+        if loading == Loading::RandomNodes {
+            return 0;
+        }
+        let entries = (rows * unknowns) as u64 * (PRIOR_DRAWS + unknowns) as u64;
+        entries.saturating_mul(size_of::<f64>() as u64)
+    }
+
     /// The priors of `rows`.
     pub(super) fn of_rows(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Vec<Self> {
         if scene.loading == Loading::RandomNodes {

@@ -60,11 +60,11 @@ impl Trial {
         settings: SimulatedSettings,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let (split, test) = settings.draw()?;
+        let (split, test) = settings.draw_held()?;
         let bottleneck = Bottleneck::fit(split.training.targets(), settings.hidden)?;
         let reconstructed = bottleneck.reconstruct(test.targets());
         let bottleneck = Errors::measure(&test, &reconstructed, settings.source.stroke_mm());
-        let mut run = Run::on_sets(settings.into(), split, test)?;
+        let mut run = Run::prepare(settings)?;
         let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
             return Ok(None);
         };

@@ -4,7 +4,9 @@
 use crate::{
     network::Shape,
     training::{
+        activations::KeptActivations,
         examples::BLOCK,
+        input_pairs::InputPairs,
         parallel::{LARGE, Work},
     },
 };
@@ -54,7 +56,12 @@ impl Cost {
     /// About how many bytes the equations take, beside the samples.
     pub(super) fn bytes(&self) -> usize {
         let matrices = self.entries.saturating_mul(size_of::<f64>());
-        matrices.saturating_add(self.part_bytes())
+        let kept = KeptActivations::bytes(self.shape, self.samples)
+            + match self.pairs {
+                0 => 0,
+                _ => InputPairs::kept_bytes(self.shape.inputs, self.samples),
+            };
+        matrices.saturating_add(self.part_bytes()).saturating_add(kept)
     }
 
     /// About how many bytes the products take for each part of the samples.

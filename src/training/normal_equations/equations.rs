@@ -108,7 +108,7 @@ impl NormalEquations<SchurComplement> {
 impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     fn with_solver(solver: Box<S>, cost: &Cost, examples: &Examples) -> Self {
         let shape = cost.shape;
-        let gathering = cost.gathering_parts(examples.blocks().len());
+        let gathering = cost.gathering_parts(examples.block_count());
         Self {
             activations: KeptActivations::new(shape, examples, gathering.max(solver.parts())),
             products: Products::new(&*solver, cost, gathering),
@@ -304,7 +304,7 @@ mod tests {
     fn parts_of_the_samples_add_up() {
         let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
         let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
-        let blocks = examples.blocks().len();
+        let blocks = examples.block_count();
         assert!(SchurComplement::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
         assert!(ConjugateGradient::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
         let [factored, iterated] = solvers(mlp.shape(), &examples).map(|(name, mut equations)| {

@@ -1,0 +1,41 @@
+//! Large arrays and many samples: `cargo bench --no-default-features --bench scale`, or a part of it with its name behind
+//! `--`: `arrays`, `growth` or `samples`.
+//!
+//! One thread; medians. Only ratios and exponents are worth remembering.
+#![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod array;
+mod arrays;
+#[path = "../training/exponent.rs"]
+mod exponent;
+mod growth;
+#[path = "../arithmetic/row.rs"]
+mod row_arithmetic;
+mod samples;
+#[path = "../training/timing.rs"]
+mod timing;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(count) = samples::asked(&arguments) {
+        samples::print_peak(count);
+        return;
+    }
+    let parts: [(&str, fn()); 3] = [
+        ("arrays", arrays::print),
+        ("growth", growth::print),
+        ("samples", samples::print),
+    ];
+    // What begins with two dashes comes from cargo.
+    let named: Vec<&String> = arguments.iter().filter(|name| !name.starts_with("--")).collect();
+    for name in &named {
+        assert!(parts.iter().any(|(part, _)| part == name), "there is no part {name}");
+    }
+    for (_, print) in parts
+        .iter()
+        .filter(|(part, _)| named.is_empty() || named.iter().any(|name| name == part))
+    {
+        print();
+    }
+}
