@@ -1,4 +1,4 @@
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -17,8 +17,7 @@ use crate::{
 pub enum NoReference {
     /// The posterior of a row did not converge.
     NotConverged,
-    /// What the readings leave unknown is decided by how they are rounded, of which no more is known than the order of
-    /// magnitude.
+    /// The rounding of the readings decides which part stays unknown, and no more is known of it than the order of magnitude.
     Rounding,
 }
 
@@ -61,19 +60,20 @@ pub fn reference_errors(
 ) -> Result<Result<Errors, NoReference>, SensorError> {
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
     let mut posterior = Posterior::new(model, scene, rows, rng)?;
-    let measured = |posterior: &mut Posterior, test: &Dataset| {
-        let limit_mm = limits_mm(posterior, test)?;
-        Some(Errors::measure(test, &limit_mm, scene.stroke_mm(&model.geometry)))
-    };
-    let Some(errors) = measured(&mut posterior, test) else {
+    let measured =
+        |test: &Dataset, limits_mm: &Array2<f64>| Errors::measure(test, limits_mm, scene.stroke_mm(&model.geometry));
+    let Some(limits) = limits_mm(&mut posterior, test) else {
         return Ok(Err(NoReference::NotConverged));
     };
+    let errors = measured(test, &limits);
     if !errors.is_rounding() && scene.noise.in_test().relative < SMALLEST_BESIDE_ROUNDING {
-        let some = every_few(test);
-        let mut finer = posterior.rounded_finer(FINER_ROUNDING);
-        let z_mm = [&mut posterior, &mut finer].map(|posterior| measured(posterior, &some).map(|errors| errors.z_mm));
-        let is_same = matches!(z_mm, [Some(z_mm), Some(finer_mm)] if finer_mm >= (1.0 - OWED_TO_ROUNDING) * z_mm);
-        if !is_same {
+        let every = test.samples().div_ceil(TRIED_SAMPLES).max(1);
+        let tried: Vec<usize> = (0..test.samples()).step_by(every).collect();
+        let some = test.select(&tried);
+        let z_mm = measured(&some, &limits.select(Axis(0), &tried)).z_mm;
+        let finer = limits_mm(&mut posterior.rounded_finer(FINER_ROUNDING), &some);
+        let is_same = |finer: Array2<f64>| measured(&some, &finer).z_mm >= (1.0 - OWED_TO_ROUNDING) * z_mm;
+        if !finer.is_some_and(is_same) {
             return Ok(Err(NoReference::Rounding));
         }
     }
@@ -96,13 +96,6 @@ fn limits_mm(posterior: &mut Posterior, test: &Dataset) -> Option<Array2<f64>> {
         }
     }
     Some(limits_mm)
-}
-
-/// Some samples of all parts of the set.
-fn every_few(set: &Dataset) -> Dataset {
-    let step = set.samples().div_ceil(TRIED_SAMPLES).max(1);
-    let some: Vec<usize> = (0..set.samples()).step_by(step).collect();
-    set.select(&some)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-use std::{io::Write as _, path::Path};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AtomicFile, DocumentError, DocumentKind, WriteError, document::PROGRAM};
+use super::{DocumentError, DocumentKind, WriteError, atomic_write, document::PROGRAM};
 use crate::import::Plan;
 
 const KIND: DocumentKind = DocumentKind::Recipe;
@@ -33,11 +33,10 @@ impl RecipeFile {
             program: PROGRAM.to_owned(),
             plan: plan.relative_to(folder(path)),
         };
-        let error = |source| WriteError::io(path, source);
-        let mut file = AtomicFile::create(path)?;
-        serde_json::to_writer_pretty(&mut file, &document).map_err(|source| error(source.into()))?;
-        writeln!(file).map_err(error)?;
-        file.commit()
+        atomic_write(path, |writer| {
+            serde_json::to_writer_pretty(&mut *writer, &document)?;
+            writeln!(writer)
+        })
     }
 
     /// Reads the plan in the file at `path`, with paths relative to the working folder.

@@ -5,8 +5,10 @@ use crate::{
     export::{
         Table, TableForm, atomic_write,
         figures::{PictureError, PictureFormat},
+        write_loss_curves,
     },
     figure::Figure,
+    training::EpochRecord,
 };
 
 /// A thing that a view can hand out, in one form, or the reason why it cannot now.
@@ -184,6 +186,39 @@ pub fn copy_exports<'a>(
             }),
         }
     })
+}
+
+/// The errors on show as a CSV file named after `stem`; `table` gives them, or the reason why there are none.
+pub fn error_table_export<'a>(stem: String, table: Result<impl Fn() -> Table + 'a, String>) -> Export<'a> {
+    let words = FileWords {
+        kind: "error table",
+        description: "The table of errors with every digit, as CSV.",
+        extensions: &["csv"],
+    };
+    csv_export("Error table", words, stem, table)
+}
+
+/// The loss curves as a CSV file named after `stem`, or the reason why there are none.
+pub fn loss_export<'a>(stem: String, history: Result<&'a [EpochRecord], String>) -> Export<'a> {
+    let words = FileWords {
+        kind: "loss curves",
+        description: "Training, validation and test error of every epoch with every digit, as CSV.",
+        extensions: &["csv"],
+    };
+    Export {
+        group: ExportGroup::Tables,
+        name: "Loss curves".to_owned(),
+        form: "CSV".to_owned(),
+        description: words.description,
+        ask: history.map(|history| -> Ask<'a> {
+            Box::new(move || {
+                let history = history.to_vec();
+                let contents =
+                    Contents::new(move |path| atomic_write(path, |writer| write_loss_curves(&history, writer)));
+                Effect::ChooseFile(FileTask::save(words, &stem, contents))
+            })
+        }),
+    }
 }
 
 /// The table as a CSV file; `table` gives it, or the reason why there is none.

@@ -21,7 +21,9 @@ mod view;
 pub use super::training_worker::RunResult;
 pub use colour_scale::colour_scale_ui;
 pub use effect::Effect;
-pub use export::{Ask, Export, ExportGroup, copy_exports, csv_export, picture_exports};
+pub use export::{
+    Ask, Export, ExportGroup, copy_exports, csv_export, error_table_export, loss_export, picture_exports,
+};
 pub use file_task::{Contents, FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
 pub use network_exports::{NetworkSource, file_stem, network_exports};

@@ -1,10 +1,10 @@
-//! What fields have in common: the reason why what was typed was not taken, and the menu of a value.
+//! Parts that all fields share: the reason for which typed text was not taken, and the menu of a value.
 
 use eframe::egui::{Id, Key, Response, RichText, Stroke, StrokeKind, Ui, accesskit::Invalid};
 
 use crate::app::theme::{Theme, radius, type_size};
 
-/// What was typed and could not be taken, with the reason.
+/// Text that was typed and could not be taken, with the reason.
 #[derive(Clone, Debug, PartialEq)]
 struct Refusal {
     reason: String,

@@ -49,8 +49,8 @@ impl SplitComparison {
         )))
     }
 
-    /// Compares the tables of errors of two runs or cross-validations, by `by` and at random: [`Run::target_table`](crate::evaluation::Run::target_table) or
-    /// [`CrossValidated::target_table`].
+    /// Compares the tables of errors of two runs or cross-validations, by `by` and at random:
+    /// [`Run::target_table`](crate::evaluation::Run::target_table) or [`CrossValidated::target_table`].
     ///
     /// # Panics
     /// If a table does not have the mean, ridge and the network.

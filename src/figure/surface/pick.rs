@@ -54,7 +54,7 @@ fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
     (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
 }
 
-/// Where the ray, seen from above, crosses the lines of the grid, in its own units and order; `None` beside the grid.
+/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` beside the grid.
 fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     if ray.direction.truncate() == glam::DVec2::ZERO {
         // Straight down it stays over one cell.
@@ -91,16 +91,15 @@ fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
     let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
     let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
     let is_inside = [x, y].iter().all(|share| (0.0..=1.0).contains(share));
-    is_inside.then(|| {
-        if y <= x {
-            a.z + x * (b.z - a.z) + y * (c.z - b.z)
-        } else {
-            a.z + y * (d.z - a.z) + x * (c.z - d.z)
-        }
-    })
+    let height = if y <= x {
+        a.z + x * (b.z - a.z) + y * (c.z - b.z)
+    } else {
+        a.z + y * (d.z - a.z) + x * (c.z - d.z)
+    };
+    is_inside.then_some(height)
 }
 
-/// Where the ray meets a triangle, in its own units (Möller and Trumbore 1997).
+/// Share of the ray at which it meets a triangle, in its own units (Möller and Trumbore 1997).
 fn share_at(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let (ab, ac, from) = (b - a, c - a, ray.from_mm - a);
     let across = ray.direction.cross(ac);

@@ -1,5 +1,5 @@
-//! Where the surface lies beyond the value axis it is drawn at its end, as a plateau: these are the marks on it, a rim and
-//! hatching, so that nobody takes it for a height.
+//! Marks on a plateau, which is drawn at the end of the value axis for what lies beyond: a rim and hatching, so that nobody
+//! takes it for a height.
 
 use glam::DVec3;
 
@@ -95,7 +95,7 @@ mod tests {
         )
     }
 
-    /// Whether any painted piece of the surface covers a place of the screen.
+    /// Returns true if any painted piece of the surface covers a place of the screen.
     fn covers(drawing: &Drawing, place: Vec2) -> bool {
         let mesh = &drawing.mesh;
         let covers = |corners: [Vec2; 3]| {

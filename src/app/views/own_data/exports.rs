@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::{model::Trained, state::OwnDataView};
 use crate::{
     app::shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Phase, copy_exports, csv_export,
-        picture_exports,
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Phase, copy_exports, error_table_export,
+        loss_export, picture_exports,
     },
-    export::{Cell, RecipeFile, Table, TableColumn, atomic_write, write_loss_curves},
+    export::{Cell, RecipeFile, Table, TableColumn},
     figure::Figure,
 };
 
@@ -31,18 +31,6 @@ const RECIPE: FileWords = FileWords {
     description: "The files, what their columns mean, and the split, as JSON: it repeats this import here and in a \
                   terminal (train --recipe FILE).",
     extensions: &["json"],
-};
-
-const ERRORS: FileWords = FileWords {
-    kind: "error table",
-    description: "The table of errors with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-const LOSS_CURVES: FileWords = FileWords {
-    kind: "loss curves",
-    description: "Training, validation and test error of every epoch with every digit, as CSV.",
-    extensions: &["csv"],
 };
 
 /// Everything that can be exported.
@@ -69,13 +57,9 @@ pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
     });
     exports.extend(picture_exports("Chart", stem(view.chart.tab.file_word()), chart));
     let errors = shown.clone().map(|shown| move || error_table(shown));
-    exports.push(csv_export("Error table", ERRORS, stem("errors"), errors.clone()));
-    let loss = shown.clone().map(|shown| {
-        let history = shown.file.training.history.clone();
-        let contents = Contents::new(move |path| atomic_write(path, |writer| write_loss_curves(&history, writer)));
-        save(LOSS_CURVES, stem("loss"), contents)
-    });
-    exports.push(one(ExportGroup::Tables, "Loss curves", LOSS_CURVES, "CSV", loss));
+    exports.push(error_table_export(stem("errors"), errors.clone()));
+    let history = shown.clone().map(|shown| shown.file.training.history.as_slice());
+    exports.push(loss_export(stem("loss"), history));
     exports.extend(copy_exports("Error table", errors));
     let checkpoint = shown.and_then(|shown| match (&shown.checkpoint, view.phase) {
         (Some(file), _) => {

@@ -4,10 +4,10 @@ use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
 use crate::{
     app::shared::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
-        RunView, Shared, copy_exports, csv_export, file_stem, network_exports, picture_exports,
+        RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
     },
     evaluation::{DecoderReport, error_rows},
-    export::{CheckpointFile, atomic_write, decoder_table, error_table, write_loss_curves},
+    export::{CheckpointFile, decoder_table, error_table},
     figure::{Figure, surface::ViewMode},
 };
 
@@ -23,18 +23,6 @@ const OPENED: FileWords = FileWords {
     description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
                   history, and pauses it. A resumed training gives bit-identical results.",
     ..CHECKPOINT
-};
-
-const ERRORS: FileWords = FileWords {
-    kind: "error table",
-    description: "The table of errors with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-const LOSS_CURVES: FileWords = FileWords {
-    kind: "loss curves",
-    description: "Training, validation and test error of every epoch with every digit, as CSV.",
-    extensions: &["csv"],
 };
 
 /// Task of saving the checkpoint of `run`.
@@ -82,8 +70,8 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     });
     let of_epoch = view.scrub.result().map(|past| format!("-epoch{}", past.epochs_run));
     let of_errors = stem("errors") + &of_epoch.unwrap_or_default();
-    exports.push(csv_export("Error table", ERRORS, of_errors, errors.clone()));
-    exports.push(loss_export(run.clone(), stem("loss")));
+    exports.push(error_table_export(of_errors, errors.clone()));
+    exports.push(loss_export(stem("loss"), run.clone().map(|run| run.history.as_slice())));
     exports.extend(copy_exports("Error table", errors));
     let decoders = shown.map(|(run, _)| run).and_then(|run| {
         let reports = measured(view);
@@ -142,23 +130,6 @@ fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult)
         exports.sort_by_key(|export| export.group);
     }
     exports
-}
-
-fn loss_export<'a>(run: Result<&'a RunView, String>, stem: String) -> Export<'a> {
-    Export {
-        group: ExportGroup::Tables,
-        name: "Loss curves".to_owned(),
-        form: "CSV".to_owned(),
-        description: LOSS_CURVES.description,
-        ask: run.map(|run| -> Ask<'a> {
-            Box::new(move || {
-                let history = run.history.clone();
-                let contents =
-                    Contents::new(move |path| atomic_write(path, |writer| write_loss_curves(&history, writer)));
-                Effect::ChooseFile(FileTask::save(LOSS_CURVES, &stem, contents))
-            })
-        }),
-    }
 }
 
 /// Reports of the decoders measured so far.

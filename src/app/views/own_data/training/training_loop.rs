@@ -8,8 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use ndarray::Array2;
-
 use super::{Command, Task, TrainingEvent, ValidationChoice};
 use crate::{
     app::{
@@ -20,7 +18,7 @@ use crate::{
     },
     dataset::{Folds, Seed, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Run, RunSettings, TargetErrors,
+        CrossValidated, Run, RunSettings,
         recorded::{Determination, NonlinearGain, SplitComparison},
     },
     export::{MeasuredCheckpointFile, MeasuredNetworkFile, describe_standings, describe_worse_than_ridge},
@@ -223,16 +221,10 @@ fn validate(
     let Some(validated) = cross_validated(by)? else {
         return Ok(None);
     };
-    let errors = |answers: &Array2<f64>| TargetErrors::measure(set.targets(), answers.view());
+    let table = validated.target_table(set);
     let comparison = if compares_random && by != SplitBy::Random {
         let random = cross_validated(SplitBy::Random)?;
-        random.map(|random| SplitComparison {
-            by,
-            network: errors(&validated.network),
-            ridge: errors(&validated.linear),
-            random_network: errors(&random.network),
-            random_ridge: errors(&random.linear),
-        })
+        random.map(|random| SplitComparison::of(by, [table.clone(), random.target_table(set)]))
     } else {
         None
     };
@@ -249,7 +241,7 @@ fn validate(
     Ok(Some(Validated {
         folds: format!("{folds} folds by {by}"),
         samples: set.samples(),
-        table: validated.target_table(set),
+        table,
         targets: recording.targets,
         remarks,
     }))
