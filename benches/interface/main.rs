@@ -15,6 +15,8 @@ use std::{
 use decoupler::{
     app::{DecouplerWindow, DialogKind, Effect, Phase, Shared},
     evaluation::SimulatedSettings,
+    figure::{EpochOutline, loss_figure},
+    training::EpochRecord,
 };
 use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, pos2, vec2};
 
@@ -128,6 +130,39 @@ fn over_the_surfaces(number: usize) -> Vec<Event> {
     ))]
 }
 
+/// Prints the time that the loss chart of a long training takes a frame before it is painted.
+fn long_training() {
+    const EPOCHS: usize = 1_000_000;
+    let mut outline = EpochOutline::new();
+    let epochs: Vec<EpochRecord> = (0..EPOCHS)
+        .map(|epoch| EpochRecord {
+            epoch,
+            training_mse: 1.0 / (1.0 + epoch as f64) + 0.1 * (epoch as f64 * 0.37).sin().abs(),
+            validation_mse: Some(0.5),
+            test_mse: Some(0.6 + 0.1 * (epoch as f64 * 0.11).cos()),
+            gradient_norm: 1.0 / (1.0 + epoch as f64),
+            parameter: 1e-3,
+            effective_parameters: None,
+            validation_failures: epoch % 6,
+        })
+        .collect();
+    epochs.chunks(100).for_each(|news| outline.extend(news));
+    let mut figures = Vec::new();
+    let mut points = 0;
+    for _ in 0..FRAMES {
+        let begun = Instant::now();
+        let figure = loss_figure(outline.records(), &[], 0);
+        figures.push(begun.elapsed());
+        points = figure.plots[0].series.iter().map(|series| series.points.len()).sum();
+    }
+    let kept = outline.records().len();
+    clock::print_row(
+        &format!("loss chart of {EPOCHS} epochs: {kept} kept, {points} points"),
+        figures,
+        None,
+    );
+}
+
 fn main() {
     let begun = Instant::now();
     let mut bench = Bench::open();
@@ -177,4 +212,5 @@ fn main() {
         bench.window.apply(Effect::Stop);
         bench.wait(|state| matches!(state.phase, Phase::Ended(_)));
     }
+    long_training();
 }

@@ -57,7 +57,7 @@ pub use known_presses::{pressed_rows, rebased};
 pub use missing_figures::MissingFigures;
 pub use node_spread::node_rms_mm;
 pub use outlook::{Outlook, OutlookError};
-pub use past_networks::PastNetworks;
+pub use past_networks::{PastNetwork, PastNetworks};
 pub use preset::{Preset, PresetError};
 pub use pressed::{Pressed, PressedAnswer};
 pub use published::{PublishedErrors, published_errors};

@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use super::Run;
 use crate::network::{DecouplingNetwork, Mlp, Networks};
@@ -17,11 +17,28 @@ pub struct PastNetworks {
     bytes: usize,
 }
 
-/// The network of a past epoch.
+/// The network that a run stopped at an epoch would have kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PastNetwork {
+    /// The epoch.
+    pub epoch: usize,
+    /// The epoch that it is of: that of the lowest error by then.
+    pub best_epoch: usize,
+    /// Index of the start that led then.
+    pub start: usize,
+    /// Training time of that start by then, summed over all rows.
+    pub elapsed: Duration,
+    /// The network, or that of each row-wire.
+    pub networks: Networks,
+}
+
+/// The weights of a past epoch.
 #[derive(Debug)]
 struct Past {
     epoch: usize,
     best_epoch: usize,
+    start: usize,
+    elapsed: Duration,
     /// Weights of each row-wire's network, or of the one for all. Networks that stayed the best share them.
     weights: Vec<Arc<[f64]>>,
 }
@@ -73,6 +90,8 @@ impl PastNetworks {
         let past = Past {
             epoch,
             best_epoch: leader.best_epoch(),
+            start: run.leader_number(),
+            elapsed: leader.elapsed(),
             weights: weights.collect(),
         };
         self.bytes += past.bytes_after(self.kept.last());
@@ -110,8 +129,8 @@ impl PastNetworks {
         self.kept.get(after.saturating_sub(1)).map(|past| past.epoch)
     }
 
-    /// The networks at this epoch and the epoch that they are of; `present` are those of the same run at any time.
-    pub fn at(&self, epoch: usize, present: &Networks) -> Option<(Networks, usize)> {
+    /// The network at this epoch, if it is kept; `present` are those of the same run at any time.
+    pub fn at(&self, epoch: usize, present: &Networks) -> Option<PastNetwork> {
         let place = self.kept.binary_search_by_key(&epoch, |past| past.epoch).ok()?;
         let past = &self.kept[place];
         let rows = present.values().iter().zip(&past.weights);
@@ -119,7 +138,13 @@ impl PastNetworks {
             let mlp = Mlp::from_weights(network.mlp().shape(), weights.to_vec());
             DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone())
         });
-        Some((Networks::each(networks.collect()), past.best_epoch))
+        Some(PastNetwork {
+            epoch,
+            best_epoch: past.best_epoch,
+            start: past.start,
+            elapsed: past.elapsed,
+            networks: Networks::each(networks.collect()),
+        })
     }
 }
 
@@ -175,9 +200,11 @@ mod tests {
                 (0..epoch).for_each(|_| {
                     stopped.step();
                 });
-                let (networks, best_epoch) = past.at(epoch, &run.network()).unwrap();
-                assert_eq!(networks, stopped.network(), "epoch {epoch}");
-                assert_eq!(best_epoch, stopped.leader().best_epoch());
+                let past = past.at(epoch, &run.network()).unwrap();
+                assert_eq!(past.networks, stopped.network(), "epoch {epoch}");
+                assert_eq!(past.best_epoch, stopped.leader().best_epoch());
+                assert_eq!(past.start, stopped.leader_number());
+                assert!(past.elapsed <= run.trainers()[past.start].elapsed());
             }
         }
     }
@@ -218,7 +245,7 @@ mod tests {
             assert_eq!(past.epochs().collect::<Vec<_>>(), [epoch]);
         });
         let epoch = run.leader().latest().epoch;
-        assert_eq!(past.at(epoch, &run.network()).unwrap().0, run.network());
+        assert_eq!(past.at(epoch, &run.network()).unwrap().networks, run.network());
         assert!(past.at(epoch + 1, &run.network()).is_none());
         assert_eq!(PastNetworks::default().nearest(3), None);
     }

@@ -11,7 +11,7 @@ use super::{
     soundness::flaw,
 };
 use crate::{
-    evaluation::{Baselines, Errors, Run, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, Errors, PastNetwork, Run, SimulatedSettings, StartRecord},
     network::Networks,
     training::{EpochRecord, Stage, StopReason},
 };
@@ -54,7 +54,7 @@ pub struct TrainingRecord {
     /// Training methods in the order in which they were used.
     pub stages: Vec<Stage>,
     /// All starts of the run, of which the best gave the network. Empty in files of versions that had one start
-    /// only.
+    /// only, and of the network of a past epoch.
     pub starts: Vec<StartRecord>,
 }
 
@@ -69,6 +69,24 @@ impl TrainingRecord {
             history: trainer.history().to_vec(),
             stages: trainer.stages().to_vec(),
             starts: run.starts(),
+        }
+    }
+
+    /// Takes the record of the start that led at a past epoch until then.
+    fn until(run: &Run, past: &PastNetwork) -> Self {
+        let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
+        let epochs = trainer.history().partition_point(|record| record.epoch <= past.epoch);
+        let stages = trainer
+            .stages()
+            .partition_point(|stage| stage.first_epoch <= past.epoch);
+        Self {
+            stop_reason: Some(StopReason::Stopped),
+            best_epoch: past.best_epoch,
+            seconds: past.elapsed.as_secs_f64(),
+            history: trainer.history()[..epochs].to_vec(),
+            stages: trainer.stages()[..stages].to_vec(),
+            // How the other starts stood then is not kept.
+            starts: Vec::new(),
         }
     }
 }
@@ -89,6 +107,21 @@ impl NetworkFile {
             training: TrainingRecord::of(run),
             errors: scores.network,
             baselines: scores.baselines,
+        })
+    }
+
+    /// Takes the network that `run` would have kept had it been stopped at a past epoch, with its record until then and its
+    /// errors.
+    ///
+    /// # Errors
+    /// [`DocumentError::Measured`] if the samples were measured.
+    pub fn from_past(run: &Run, past: &PastNetwork) -> Result<Self, DocumentError> {
+        let errors = run.errors_of(&past.networks.decouple(run.test()));
+        Ok(Self {
+            network: past.networks.clone(),
+            training: TrainingRecord::until(run, past),
+            errors: errors.ok_or(DocumentError::Measured(KIND))?,
+            ..Self::from_run(run)?
         })
     }
 

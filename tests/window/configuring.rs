@@ -107,10 +107,19 @@ fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
         ),
         ("4x5_2x9999", "column-wires (M4) is 9999"),
     ] {
-        driver.type_into("Array scale", wrong);
+        driver.enter("Array scale", wrong);
         assert_eq!(driver.state().draft.source.sensor.scale, scale, "{wrong}");
-        driver.harness().run_steps(2);
         assert!(driver.says(reason), "{wrong}: {:#?}", driver.texts());
+        assert_eq!(
+            driver.get("Array scale").value(),
+            Some(scale.to_string()),
+            "the old one stays"
+        );
+        let described = driver.get("Array scale").accesskit_node().description();
+        assert!(
+            described.is_some_and(|told| told.contains(reason)),
+            "it is read out with the field"
+        );
     }
     driver.enter("Array scale", "4x5_2x15");
     assert_eq!(driver.get("Array scale").value().as_deref(), Some("4×5_2×15"));

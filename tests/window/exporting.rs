@@ -312,3 +312,54 @@ fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
     assert_eq!(NetworkFile::load(&network).unwrap().settings, small());
     assert!(fs::read_to_string(of_kept).unwrap().contains(&format!("<h1>{name}: ")));
 }
+
+#[test]
+fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let [past, best, errors] = ["past.json", "best.json", "errors.csv"].map(|name| folder.path().join(name));
+    let mut driver = trained_driver();
+    driver.wait_for_hold();
+    driver.open_menu();
+    let best_epoch = trained(small()).leader().best_epoch();
+    let heading = format!("BEST NETWORK, EPOCH {best_epoch}");
+    assert!(driver.has(&heading) && !driver.says("ON SHOW"), "{:#?}", driver.texts());
+    driver.press(Key::Escape);
+
+    driver.get("Epoch of the network on show").focus();
+    driver.harness().run_steps(2);
+    while driver.views().train.scrub.epoch().unwrap_or(15) > 4 {
+        driver.press(Key::ArrowLeft);
+    }
+    driver.wait("the network of the epoch", |driver| {
+        driver.says("Of the network of epoch 4.")
+    });
+    driver.open_menu();
+    assert!(
+        driver.has("NETWORK ON SHOW, EPOCH 4") && driver.has(&heading),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.save("Network file of epoch 4, JSON", &past);
+    driver.click("Dismiss");
+    driver.save(NETWORK, &best);
+    driver.click("Dismiss");
+    driver.save(ERRORS, &errors);
+
+    let mut stopped = small();
+    stopped.training.stopping.epochs = 4;
+    let stopped = trained(stopped);
+    let file = NetworkFile::load(&past).unwrap();
+    assert_eq!(file.network, stopped.network());
+    assert_eq!(file.errors, stopped.node_scores().unwrap().network);
+    assert_eq!(file.training.best_epoch, stopped.leader().best_epoch());
+    assert_eq!(file.training.history, stopped.leader().history());
+    assert_eq!(file.training.stages, stopped.leader().stages());
+    assert_eq!(file.settings, small());
+    assert_eq!(NetworkFile::load(&best).unwrap().network, trained(small()).network());
+    let table = fs::read_to_string(&errors).unwrap();
+    let z_percent = file.errors.z_percent.unwrap().to_string();
+    assert!(
+        table.contains(&z_percent),
+        "the table of the network on show, {z_percent}: {table}"
+    );
+}

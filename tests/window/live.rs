@@ -22,7 +22,7 @@ use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
 use glam::DVec3;
 
-use crate::{closing::close, driver::Driver};
+use crate::{closing::close, driver::Driver, typing::double_click_slider};
 
 /// The window with a small network in its run list, at the Live view.
 fn open(folder: &Path) -> Driver {
@@ -267,8 +267,12 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let (frame, last) = check(&driver, 1);
     assert_eq!(frame, last);
 
-    driver.get("Replay position").set_value_accesskit(0.0);
+    driver.get("Replay speed").set_value_accesskit(4.0);
     driver.harness().run_steps(2);
+    assert!(driver.has("4.0×"), "{:#?}", driver.texts());
+    double_click_slider(&mut driver, "Replay speed");
+    assert!(driver.has("1.0×"), "{:#?}", driver.texts());
+    double_click_slider(&mut driver, "Replay position");
     driver.wait("the first frame", |driver| {
         driver
             .views()

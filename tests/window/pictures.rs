@@ -92,7 +92,7 @@ fn album(size: Vec2, is_dark: bool) {
     album.driver.enter("Validation samples", "0");
     album.driver.train();
     album.take("12-diverged");
-    album.driver.type_into("Array scale", "10x6");
+    album.driver.enter("Array scale", "10x6");
     album.driver.harness().run_steps(2);
     album.take("13-geometry-and-bad-array");
 }

@@ -47,8 +47,9 @@ fn move_to(driver: &mut Driver, at: Pos2) {
     driver.harness().step();
 }
 
-/// Readings and errors of the network under the finger, by the library's own path: a set of one snapshot.
-fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors) {
+/// Readings under the finger, the errors of the network and what its surface says of its heights, by the library's own path: a
+/// set of one snapshot.
+fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
     let settings: SimulatedSettings = run.settings().simulated().unwrap();
     let sensor: SensorModel = settings.source.sensor;
     let rows = Vec::from_iter(0..sensor.scale.rows());
@@ -65,14 +66,18 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors) {
         }
     }
     let set = Dataset::new(readings.clone(), targets, Some(&rows), vec![0; rows.len()]).unwrap();
-    let errors = Errors::measure(&set, &run.network().decouple(&set), settings.source.stroke_mm());
-    (readings, errors)
+    let decoupled_mm = run.network().decouple(&set);
+    let errors = Errors::measure(&set, &decoupled_mm, settings.source.stroke_mm());
+    let z = decoupled_mm.indexed_iter().filter(|((_, column), _)| column % 3 == 2);
+    let (low, high) = z.fold((f64::MAX, f64::MIN), |(low, high), (_, z)| (low.min(*z), high.max(*z)));
+    (readings, errors, format!("z {low:.2} to {high:.2} mm"))
 }
 
 /// What the report and the readings say of the touch, in the frame just drawn, is what the library says of it.
 #[track_caller]
 fn says_what_is_pressed(driver: &Driver, run: &Run) {
-    let (readings, errors) = expected(run, &touch(driver));
+    let (readings, errors, heights) = expected(run, &touch(driver));
+    assert_eq!(driver.get("Decoupled surface").value(), Some(heights));
     let mean = format!("Network, mean mm: {}", format_number(errors.z_mm));
     let worst = format!("Network, worst mm: {}", format_number(errors.worst_mm));
     assert!(driver.has(&mean) && driver.has(&worst), "{mean}: {:?}", driver.texts());

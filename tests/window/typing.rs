@@ -1,6 +1,7 @@
 //! Numbers as they are typed: with units, and refused in place where they cannot be taken.
 
-use eframe::egui::{Event, Key, Modifiers, PointerButton, accesskit::Role};
+use decoupler::{evaluation::SimulatedSettings, sensor::ArrayScale};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::driver::Driver;
@@ -69,17 +70,13 @@ fn a_reason_is_near_its_field_and_goes_with_escape() {
     assert!(!driver.has("0 is too small: at least 1."));
 }
 
-#[test]
-fn a_double_click_sets_the_usual_value() {
-    let mut driver = Driver::open();
-    driver.enter("Hidden nodes", "33");
-    assert_eq!(driver.state().draft.hidden, 33);
-    let at = driver.get("Hidden nodes").rect().center();
+/// Clicks twice there, fast.
+fn double_click(driver: &mut Driver, at: Pos2) {
     let harness = driver.harness();
     let now = harness.ctx.input(|input| input.time);
     for click in 0..2 {
         for pressed in [true, false] {
-            harness.input_mut().time = Some(now + 0.1 * f64::from(click) + if pressed { 0.02 } else { 0.05 });
+            harness.input_mut().time = Some(now + 1.0 + 0.1 * f64::from(click) + if pressed { 0.02 } else { 0.05 });
             harness.input_mut().events.push(Event::PointerMoved(at));
             harness.input_mut().events.push(Event::PointerButton {
                 pos: at,
@@ -90,6 +87,70 @@ fn a_double_click_sets_the_usual_value() {
             harness.step();
         }
     }
-    driver.harness().run_steps(3);
+    harness.run_steps(3);
+    harness.remove_cursor();
+    harness.step();
+}
+
+/// Double-clicks a slider, which the first click moves off its usual value.
+pub(crate) fn double_click_slider(driver: &mut Driver, name: &str) {
+    driver.get(name).scroll_to_me();
+    driver.harness().run_steps(20);
+    let rect = driver.get(name).rect();
+    double_click(driver, rect.lerp_inside(vec2(0.37, 0.5)));
+}
+
+#[test]
+fn a_double_click_sets_the_usual_value() {
+    let mut driver = Driver::open();
+    driver.enter("Hidden nodes", "33");
+    assert_eq!(driver.state().draft.hidden, 33);
+    let at = driver.get("Hidden nodes").rect().center();
+    double_click(&mut driver, at);
     assert_eq!(driver.state().draft.hidden, 12);
+}
+
+#[test]
+fn a_double_click_sets_every_slider_to_its_usual_value() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    driver.wait_for_hold();
+    double_click_slider(&mut driver, "Hidden nodes slider");
+    assert_eq!(driver.state().draft.hidden, 12);
+
+    driver.get("Epoch of the network on show").focus();
+    driver.press(Key::ArrowLeft);
+    assert!(driver.views().train.scrub.epoch().is_some());
+    double_click_slider(&mut driver, "Epoch of the network on show");
+    assert_eq!(driver.views().train.scrub.epoch(), None, "the latest");
+
+    driver.enter("Depth", "0.2");
+    assert_eq!(driver.views().train.press.finger.depth_share, 0.2);
+    double_click_slider(&mut driver, "Depth of the press");
+    assert_eq!(driver.views().train.press.finger.depth_share, 0.8);
+
+    driver.act("Show Identifiability");
+    let usual = SimulatedSettings::default().source;
+    for (field, typed) in [
+        ("Height", "7"),
+        ("Node pitch", "3"),
+        ("Row pitch", "2"),
+        ("Column pitch", "3"),
+        ("Column node pitch", "3"),
+        ("First column node at x", "3"),
+        ("Relative noise", "0.01"),
+        ("Compression", "3"),
+        ("Column-wires", "12"),
+        ("Nodes on each column", "2"),
+    ] {
+        driver.enter(field, typed);
+        double_click_slider(&mut driver, &format!("{field} slider"));
+    }
+    let question = driver.views().identifiability.question;
+    assert_eq!(question.sensor.geometry, usual.sensor.geometry);
+    assert_eq!(question.scene.noise, usual.scene.noise);
+    assert_eq!(question.compression, 0.5 * usual.scene.largest_compression);
+    let columns = |scale: ArrayScale| (scale.columns(), scale.nodes_per_column());
+    assert_eq!(columns(question.sensor.scale), columns(usual.sensor.scale));
 }

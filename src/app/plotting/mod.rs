@@ -5,6 +5,7 @@ mod colours;
 mod heat_map;
 mod heat_map_frame;
 mod legend;
+mod line_labels;
 mod per_pixel;
 mod plot;
 mod plot_figure;

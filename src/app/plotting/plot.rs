@@ -3,8 +3,7 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    Align2, Color32, FontId, Id, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo,
-    accesskit::Role, pos2,
+    Color32, FontId, Id, Rangef, Response, RichText, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role, pos2,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
@@ -12,10 +11,10 @@ use egui_plot::{
 };
 use glam::DVec2;
 
-use super::{colours::hue_colour, per_pixel::per_pixel, plot_figure::Pointer};
+use super::{colours::hue_colour, line_labels::labels_ui, per_pixel::per_pixel, plot_figure::Pointer};
 use crate::{
     app::{
-        theme::{Palette, Theme, space, type_size},
+        theme::{Palette, Theme, type_size},
         widgets::focus_ring_ui,
     },
     figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels},
@@ -279,34 +278,5 @@ fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
         if let Some(corner) = corner {
             painter.galley(pos2(corner.x as f32, corner.y as f32), galley, palette.text);
         }
-    }
-}
-
-/// The words at upright reference lines.
-fn labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform, id: Id) {
-    let palette = Theme::of(ui).palette;
-    let frame = *transform.frame();
-    let painter = ui.painter().with_clip_rect(frame);
-    for (number, line) in plot.lines.iter().enumerate() {
-        let (Some(label), LineAt::X(value)) = (&line.label, line.at) else {
-            continue;
-        };
-        let Some(place) = plot.x.place(value) else { continue };
-        let x = transform.position_from_point(&Place::new(place, 0.0)).x;
-        if !frame.x_range().contains(x) {
-            continue;
-        }
-        // On the other side where there is no room on the right.
-        let (align, offset) = match frame.right() - x < space(13) {
-            true => (Align2::RIGHT_TOP, -space(1)),
-            false => (Align2::LEFT_TOP, space(1)),
-        };
-        let at = pos2(x + offset, frame.top() + 1.0);
-        let font = FontId::proportional(type_size().small);
-        let text = painter.text(at, align, label, font, palette.text);
-        let rect = Rect::from_x_y_ranges(text.x_range(), text.y_range());
-        let response = ui.interact(rect, id.with(("line", number)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &line.name));
-        response.on_hover_text(&line.name);
     }
 }

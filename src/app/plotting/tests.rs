@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use eframe::egui::{Context, Pos2, RawInput, Rect, Shape, Ui, vec2};
+use eframe::egui::{Context, Pos2, RawInput, Rect, Shape, Ui, pos2, vec2};
 use resvg::usvg::roxmltree::Document;
 
 use super::*;
@@ -16,10 +16,11 @@ use crate::{
         measure_trade_off,
     },
     figure::{
-        Figure, compared_losses_figure, error_histogram_figure, experiment_figure, loss_figure, node_figure,
-        regression_figure, singular_values_figure, trade_off_figure, training_state_figure, z_pairs_mm,
+        EpochOutline, Figure, compared_losses_figure, error_histogram_figure, experiment_figure, loss_figure,
+        node_figure, regression_figure, singular_values_figure, trade_off_figure, training_state_figure, z_pairs_mm,
     },
     sensor::{Axes, Identifiability},
+    training::EpochRecord,
 };
 
 /// Text and counts of marks found in a picture.
@@ -55,11 +56,17 @@ impl Seen {
 }
 
 fn on_screen(figure: &Figure) -> Seen {
+    let mut seen = Seen::default();
+    shapes_on_screen(figure, |shape| seen.look_at(shape));
+    seen
+}
+
+/// Calls `look` with everything that the window draws for a figure.
+fn shapes_on_screen(figure: &Figure, mut look: impl FnMut(&Shape)) {
     let ctx = Context::default();
     theme::install(&ctx, true);
-    let mut seen = Seen::default();
     // The places of the axes are known after the first frame.
-    for _ in 0..3 {
+    for frame in 0..3 {
         let input = RawInput {
             screen_rect: Some(Rect::from_min_size(Pos2::ZERO, vec2(1400.0, 600.0))),
             ..RawInput::default()
@@ -75,11 +82,11 @@ fn on_screen(figure: &Figure) -> Seen {
             Figure::Surfaces(_) => unreachable!("surfaces have tests of their own"),
         };
         let output = ctx.run_ui(input, draw);
-        seen = Seen::default();
-        output.shapes.iter().for_each(|shape| seen.look_at(&shape.shape));
+        if frame == 2 {
+            output.shapes.iter().for_each(|shape| look(&shape.shape));
+        }
         output.drop_without_applying_deltas();
     }
-    seen
 }
 
 fn in_print(figure: &Figure) -> Seen {
@@ -206,4 +213,74 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     let rows: Vec<_> = (0..4).map(row).collect();
     let singular_values = same("singular values", singular_values_figure(&rows, 2, 0.01));
     assert_eq!(singular_values.circles, rows[2].unknowns() + 1);
+}
+
+/// Of a million epochs the chart on screen has a few points for each pixel, and every peak reaches as high as it does.
+#[test]
+fn a_million_epochs_are_drawn_by_the_least_and_the_largest_of_each_pixel() {
+    const PEAKS: [usize; 3] = [31_337, 500_000, 999_983];
+    let mse = |epoch: usize| match epoch {
+        _ if PEAKS.contains(&epoch) => 80.0,
+        _ if PEAKS.contains(&(epoch + 7)) => 1e-4,
+        _ => 1.0 + 0.1 * (epoch as f64 * 0.01).sin(),
+    };
+    let history: Vec<EpochRecord> = (0..1_000_000)
+        .map(|epoch| EpochRecord {
+            epoch,
+            training_mse: mse(epoch),
+            validation_mse: None,
+            test_mse: None,
+            gradient_norm: 1.0,
+            parameter: 1e-3,
+            effective_parameters: None,
+            validation_failures: 0,
+        })
+        .collect();
+    let mut outline = EpochOutline::new();
+    history.chunks(10_000).for_each(|news| outline.extend(news));
+    let figure = Figure::from(loss_figure(outline.records(), &[], 0));
+    let mut curves = Vec::new();
+    shapes_on_screen(&figure, |shape| curves_of(shape, &mut curves));
+    let curve = curves.iter().max_by_key(|points| points.len()).unwrap();
+    assert!(
+        (1300..4 * 1400).contains(&curve.len()),
+        "{} points on 1400 pixels",
+        curve.len()
+    );
+    let ends = |of: fn(&Pos2) -> f32, points: &[Pos2]| {
+        let ends = points.iter().map(of);
+        ends.fold((f32::MAX, f32::MIN), |(low, high), at| (low.min(at), high.max(at)))
+    };
+    let (top, bottom) = ends(|point| point.y, curve);
+    // The curve fills its width, so the places of the epochs follow from those of its ends.
+    let (from, to) = ends(|point| point.x, curve);
+    for peak in PEAKS {
+        let x = from + (to - from) * peak as f32 / 999_999.0;
+        let near: Vec<Pos2> = curve
+            .iter()
+            .copied()
+            .filter(|point| (point.x - x).abs() < 2.0)
+            .collect();
+        let (highest, lowest) = ends(|point| point.y, &near);
+        assert!(
+            highest < top + 0.5 && lowest > bottom - 0.5,
+            "the peak of epoch {peak}: {near:?}"
+        );
+    }
+}
+
+/// Points of all lines, and both edges of bands that stand for dense ones.
+fn curves_of(shape: &Shape, curves: &mut Vec<Vec<Pos2>>) {
+    match shape {
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| curves_of(shape, curves)),
+        Shape::Path(path) if !path.closed => curves.push(path.points.clone()),
+        Shape::Band(band) => {
+            let edges = band
+                .points
+                .iter()
+                .flat_map(|point| [point.y.min, point.y.max].map(|y| pos2(point.x, y)));
+            curves.push(edges.collect());
+        }
+        _ => {}
+    }
 }

@@ -1,4 +1,4 @@
-use std::{fmt, path::Path};
+use std::{borrow::Cow, fmt, path::Path};
 
 use super::{Contents, Effect, FileTask, FileWords};
 use crate::{
@@ -31,6 +31,10 @@ pub type Ask<'a> = Box<dyn FnOnce() -> Effect + 'a>;
 /// Parts of the Export menu.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ExportGroup {
+    /// The network of a past epoch that is on show.
+    NetworkOnShow(usize),
+    /// The best network of a training, of this epoch.
+    BestNetwork(usize),
     /// Networks for other programs.
     Network,
     /// The report of a run.
@@ -47,15 +51,18 @@ pub enum ExportGroup {
 
 impl ExportGroup {
     /// Heading of the part.
-    pub fn heading(self) -> &'static str {
-        match self {
+    pub fn heading(self) -> Cow<'static, str> {
+        let heading = match self {
+            Self::NetworkOnShow(epoch) => return format!("Network on show, epoch {epoch}").into(),
+            Self::BestNetwork(epoch) => return format!("Best network, epoch {epoch}").into(),
             Self::Network => "Network",
             Self::Report => "Report",
             Self::Figures => "Figures",
             Self::Tables => "Tables",
             Self::Copies => "Copy table as",
             Self::Training => "Training",
-        }
+        };
+        heading.into()
     }
 }
 

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
 use crate::{
     app::training_worker::RunId,
-    evaluation::{DecoderReport, Run, SimulatedSettings},
+    evaluation::{DecoderReport, PastNetworks, Run, SimulatedSettings},
     export::{
         NetworkFile,
         bundle::{BundleFormat, BundlePrecision, BundleReport, export_bundle},
@@ -19,6 +19,8 @@ use crate::{
 pub enum NetworkSource {
     /// Of the training on show, which the worker has.
     Training(RunId, Box<SimulatedSettings>),
+    /// Of a past epoch of the training on show.
+    Past(RunId, Box<SimulatedSettings>, usize, PastNetworks),
     /// Of a kept run with this name.
     Kept(String, Arc<NetworkFile>),
 }
@@ -38,6 +40,18 @@ impl NetworkSource {
                     Ok(contents(Arc::new(file), Some(run)))
                 };
                 FileTask::save_run(words, &file_stem(what, settings), *run, take)
+            }
+            Self::Past(run, settings, epoch, past) => {
+                let (epoch, past) = (*epoch, past.clone());
+                let take = move |run: &Run| {
+                    let network = past.at(epoch, &run.network());
+                    let network =
+                        network.ok_or_else(|| format!("the network of epoch {epoch} is not kept any more"))?;
+                    let file = NetworkFile::from_past(run, &network).map_err(|error| error.to_string())?;
+                    Ok(contents(Arc::new(file), None))
+                };
+                let stem = format!("{}-epoch{epoch}", file_stem(what, settings));
+                FileTask::save_run(words, &stem, *run, take)
             }
             Self::Kept(_, file) => {
                 let stem = file_stem(what, &file.settings);
@@ -171,6 +185,7 @@ const REPORT: FileWords = FileWords {
 fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask {
     let name = match source {
         NetworkSource::Training(..) => None,
+        NetworkSource::Past(_, _, epoch, _) => Some(format!("epoch {epoch}")),
         NetworkSource::Kept(name, _) => Some(name.clone()),
     };
     source.task(REPORT, "report", move |file, run| {

@@ -25,6 +25,7 @@ pub(super) struct Painted {
     mesh: Arc<Mesh>,
     pub(super) dots: Dots,
     pub(super) sight: Sight,
+    pub(super) note: Option<String>,
 }
 
 impl Painted {
@@ -67,6 +68,7 @@ impl Painted {
             mesh: Arc::new(mesh(&drawing.mesh)),
             dots: drawing.dots,
             sight: drawing.sight,
+            note: drawing.note,
         }
     }
 

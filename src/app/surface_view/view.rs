@@ -112,11 +112,13 @@ impl SurfaceView<'_> {
             .map(to_egui);
         let nodes = (shown.hovered_node.or(self.marked_node), self.lit_nodes);
         painted.paint(&painter, &self.theme.palette, self.section, nodes);
-        if let Some(note) = painted.dots.note() {
+        if let Some(note) = &painted.note {
             // Below the axes, partly in the margin of the card, so that the picture keeps its size.
             let size = type_size().small;
             let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
-            let text = RichText::new(note).size(size).color(self.theme.palette.warning);
+            let text = RichText::new(note.as_str())
+                .size(size)
+                .color(self.theme.palette.warning);
             ui.put(line, Label::new(text).truncate());
         }
     }

@@ -1,8 +1,8 @@
 //! The few components that egui lacks, each reachable by its label.
 
 use eframe::egui::{
-    self, Align, Button, Color32, CornerRadius, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea,
-    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
+    self, Align, Button, Color32, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea, Sense,
+    Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
 };
 
 use crate::app::theme::{Theme, radius, semibold, space, type_size};
@@ -121,25 +121,6 @@ pub fn note_ui(ui: &mut Ui, text: &str) -> Response {
             ui.label(RichText::new(text).size(type_size().note).color(palette.warning));
         })
         .response
-}
-
-/// Makes the sliders of this `ui` look like ours: accent up to the handle, a ring as the handle.
-pub fn slider_style(ui: &mut Ui) {
-    let palette = Theme::of(ui).palette;
-    let visuals = ui.visuals_mut();
-    visuals.selection.bg_fill = palette.accent;
-    visuals.widgets.inactive.bg_fill = palette.line;
-    visuals.widgets.inactive.corner_radius = CornerRadius::same(2);
-    for state in [&mut visuals.widgets.hovered, &mut visuals.widgets.active] {
-        state.bg_fill = palette.accent;
-    }
-    for state in [
-        &mut visuals.widgets.inactive,
-        &mut visuals.widgets.hovered,
-        &mut visuals.widgets.active,
-    ] {
-        state.fg_stroke = Stroke::new(2.0, palette.accent);
-    }
 }
 
 /// A row of options of which one is selected, filling the available width if `fill_width`. Returns the option the

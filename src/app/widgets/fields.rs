@@ -6,7 +6,8 @@ use eframe::egui::{Align, ComboBox, Layout, Response, Ui};
 
 use super::{
     explained_options_ui,
-    number_field::{FIELD_SIZE, Limits, number_ui, refusal_ui, whole_ui},
+    number_field::{FIELD_SIZE, Limits, number_ui, whole_ui},
+    refusal::refusal_ui,
 };
 use crate::app::theme::space;
 

@@ -2,12 +2,15 @@
 
 use std::{cell::RefCell, ops::RangeInclusive};
 
-use eframe::egui::{
-    DragValue, Id, Key, Response, RichText, Stroke, StrokeKind, Ui, Vec2, accesskit::Invalid, emath::Numeric,
-};
+use eframe::egui::{DragValue, Response, Ui, Vec2, emath::Numeric};
 
-use super::{fields::input_text, quantity_text::parse, value_under::claim_right_click};
-use crate::app::theme::{Theme, radius, space, type_size};
+use super::{
+    fields::input_text,
+    quantity_text::parse,
+    refusal::{menu_ui, take_refusal},
+    value_under::claim_right_click,
+};
+use crate::app::theme::space;
 
 /// Numbers that a field takes.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,14 +31,6 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
         range,
         usual: Some(usual),
     }
-}
-
-/// Text that was typed and could not be taken, with the reason.
-#[derive(Clone, Debug, PartialEq)]
-struct Refusal {
-    reason: String,
-    /// The value that stayed; the refusal goes when it changes.
-    kept: u64,
 }
 
 /// A number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". What is no number, out of `limits`, or of
@@ -110,75 +105,21 @@ fn typed_number_ui<N: Numeric>(
     } else {
         with_unit(*value, unit)
     };
-    response.context_menu(|ui| menu_ui(ui, value, &shown, limits.usual, unit));
+    let usual = limits.usual.map(|usual| (usual, with_unit(usual, unit)));
+    response.context_menu(|ui| menu_ui(ui, value, &shown, usual));
     if *value != before {
         response.mark_changed();
     }
     let (typed, tried) = tried.into_inner().map_or((None, None), |(text, tried)| {
         let taken = tried.is_ok().then_some(text);
-        (taken, Some(tried))
+        (taken, Some(tried.map(drop)))
     });
-    take_refusal(ui, &response, tried, value.to_f64());
+    take_refusal(ui, &response, tried, &value.to_f64().to_string());
     (response, typed)
-}
-
-/// Copies the value, or sets the usual one.
-fn menu_ui<N: Numeric>(ui: &mut Ui, value: &mut N, shown: &str, usual: Option<N>, unit: &str) {
-    if ui.button(format!("Copy {shown}")).clicked() {
-        ui.ctx().copy_text(shown.to_owned());
-        ui.close();
-    }
-    if let Some(usual) = usual.filter(|usual| *usual != *value)
-        && ui.button(format!("Reset to {}", with_unit(usual, unit))).clicked()
-    {
-        *value = usual;
-        ui.close();
-    }
 }
 
 fn with_unit<N: Numeric>(value: N, unit: &str) -> String {
     format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned()
-}
-
-fn refusal_id(field: Id) -> Id {
-    field.with("refusal")
-}
-
-fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<f64, String>>, value: f64) {
-    let id = refusal_id(response.id);
-    let kept = value.to_bits();
-    match tried {
-        Some(Err(reason)) => {
-            ui.data_mut(|data| data.insert_temp(id, Refusal { reason, kept }));
-        }
-        Some(Ok(_)) => ui.data_mut(|data| data.remove::<Refusal>(id)),
-        None => {}
-    }
-    let Some(refusal) = ui.data(|data| data.get_temp::<Refusal>(id)) else {
-        return;
-    };
-    let is_dismissed = response.has_focus() && ui.input(|input| input.key_pressed(Key::Escape));
-    if refusal.kept != kept || is_dismissed {
-        ui.data_mut(|data| data.remove::<Refusal>(id));
-        return;
-    }
-    let stroke = Stroke::new(1.0, Theme::of(ui).palette.bad);
-    let corner = f32::from(radius());
-    ui.painter()
-        .rect_stroke(response.rect, corner, stroke, StrokeKind::Inside);
-    ui.ctx().accesskit_node_builder(response.id, |node| {
-        node.set_invalid(Invalid::True);
-        node.set_description(refusal.reason.as_str());
-    });
-}
-
-/// Tells below a field why what was typed was not taken.
-pub fn refusal_ui(ui: &mut Ui, field: &Response) {
-    let refusal = ui.data(|data| data.get_temp::<Refusal>(refusal_id(field.id)));
-    if let Some(refusal) = refusal {
-        let bad = Theme::of(ui).palette.bad;
-        ui.label(RichText::new(refusal.reason).size(type_size().note).color(bad));
-    }
 }
 
 /// Usual size of a field, in points.

@@ -50,7 +50,7 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     let mut exports = exports.into_iter().peekable();
     while let Some(first) = exports.next() {
         if group.replace(first.group) != Some(first.group) {
-            section_heading_ui(ui, first.group.heading());
+            section_heading_ui(ui, &first.group.heading());
         }
         let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
         if reason != told && !reason.is_empty() {

@@ -52,7 +52,7 @@ pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
                 colours: colours(surface.quantity, surface.colours),
             },
         );
-        notes.extend(drawing.dots.note().map(|note| (left, note)));
+        notes.extend(drawing.note.clone().map(|note| (left, note)));
         pieces.push((left, surface, drawing));
         left += width + if has_key(card) { key_width } else { 0.0 };
     }

@@ -10,8 +10,13 @@ pub(super) struct CutCorner {
 }
 
 /// Cuts a cell, whose corners go round it, at the levels `low` and `high`: polygons of the two triangles in which it is
-/// drawn, without what lies beyond (Sutherland and Hodgman 1974).
-pub(super) fn cut_cell(corners: [DVec3; 4], low: f64, high: f64) -> impl Iterator<Item = Vec<CutCorner>> {
+/// drawn, without what lies beyond (Sutherland and Hodgman 1974), or with that moved to the level where `keeps_plateau`.
+pub(super) fn cut_cell(
+    corners: [DVec3; 4],
+    low: f64,
+    high: f64,
+    keeps_plateau: bool,
+) -> impl Iterator<Item = Vec<CutCorner>> {
     let corner = move |at: usize| {
         let mut shares = [0.0; 4];
         shares[at] = 1.0;
@@ -20,12 +25,22 @@ pub(super) fn cut_cell(corners: [DVec3; 4], low: f64, high: f64) -> impl Iterato
             shares,
         }
     };
-    [[0, 1, 2], [0, 2, 3]].into_iter().filter_map(move |triangle| {
+    let polygons = [[0, 1, 2], [0, 2, 3]].into_iter().flat_map(move |triangle| {
         let whole = triangle.map(corner).to_vec();
         let above = cut(&whole, |place| place.z - low);
         let within = cut(&above, |place| high - place.z);
-        (within.len() > 2).then_some(within)
-    })
+        let [floor, ceiling] = [(low, -1.0), (high, 1.0)].map(|(level, side)| match keeps_plateau {
+            true => flattened(cut(&whole, |place| side * (place.z - level)), level),
+            false => Vec::new(),
+        });
+        [within, floor, ceiling]
+    });
+    polygons.filter(|polygon| polygon.len() > 2)
+}
+
+fn flattened(mut polygon: Vec<CutCorner>, level: f64) -> Vec<CutCorner> {
+    polygon.iter_mut().for_each(|corner| corner.place.z = level);
+    polygon
 }
 
 /// The part of a convex polygon where `excess` is not below 0.
@@ -69,7 +84,7 @@ mod tests {
     fn a_plane_is_cut_along_its_levels() {
         let plane = |x: f64, y: f64| DVec3::new(x, y, 4.0 * x + 2.0 * y);
         let corners = [plane(0.0, 0.0), plane(1.0, 0.0), plane(1.0, 1.0), plane(0.0, 1.0)];
-        let polygons: Vec<_> = cut_cell(corners, 1.0, 3.0).collect();
+        let polygons: Vec<_> = cut_cell(corners, 1.0, 3.0, false).collect();
         let total: f64 = polygons.iter().map(|polygon| area(polygon)).sum();
         assert!((total - (1.0 - 0.0625 - 0.5)).abs() < 1e-15, "{total}");
         for corner in polygons.iter().flatten() {
@@ -84,11 +99,26 @@ mod tests {
             assert!(mixed.distance(place) < 1e-15, "the shares lead to the place");
         }
         assert_eq!(
-            cut_cell(corners, 7.0, 9.0).count(),
+            cut_cell(corners, 7.0, 9.0, false).count(),
             0,
             "nothing is left of what lies below"
         );
-        let whole: f64 = cut_cell(corners, -1.0, 9.0).map(|polygon| area(&polygon)).sum();
+        let whole: f64 = cut_cell(corners, -1.0, 9.0, true).map(|polygon| area(&polygon)).sum();
         assert_eq!(whole, 1.0);
+    }
+    #[test]
+    fn with_its_plateaus_a_cell_is_whole() {
+        let plane = |x: f64, y: f64| DVec3::new(x, y, 4.0 * x + 2.0 * y);
+        let corners = [plane(0.0, 0.0), plane(1.0, 0.0), plane(1.0, 1.0), plane(0.0, 1.0)];
+        let polygons: Vec<_> = cut_cell(corners, 1.0, 3.0, true).collect();
+        let at_level = |level: f64| {
+            let flat = polygons
+                .iter()
+                .filter(|polygon| polygon.iter().all(|corner| corner.place.z == level));
+            flat.map(|polygon| area(polygon)).sum::<f64>()
+        };
+        assert!((at_level(1.0) - 0.0625).abs() < 1e-15 && (at_level(3.0) - 0.5).abs() < 1e-15);
+        let total: f64 = polygons.iter().map(|polygon| area(polygon)).sum();
+        assert!((total - 1.0).abs() < 1e-15, "{total}");
     }
 }

@@ -6,15 +6,16 @@ use super::{
     box_axes::BoxAxes,
     camera::OrbitCamera,
     field::Field,
-    mesh::{Mesh, Stage},
+    mesh::Mesh,
     nodes::Dots,
     plan_axes::PlanAxes,
     projection::PlotBox,
     shapes::{Bounds, Line, Text},
     sight::Sight,
+    stage::Stage,
     surface_figure::{Surface, ViewMode},
 };
-use crate::figure::colour_map::ColourMap;
+use crate::{figure::colour_map::ColourMap, sensor::counted};
 
 /// Room that the labels of a box usually take, in points.
 const LABELS: Vec2 = Vec2::new(72.0, 56.0);
@@ -44,6 +45,8 @@ pub struct Drawing {
     pub dots: Dots,
     /// From points on the screen back to millimetres.
     pub sight: Sight,
+    /// Says what lies beyond the axes and how it is drawn.
+    pub note: Option<String>,
 }
 
 impl Surface {
@@ -71,6 +74,7 @@ impl Surface {
             }
         };
         Drawing {
+            note: note(mesh.has_plateau, dots.beyond()),
             lines,
             texts: labels.into_texts(),
             mesh,
@@ -87,5 +91,16 @@ impl Surface {
             Mesh::new(field, stage, card.colours),
             Dots::new(&self.nodes, field, stage),
         )
+    }
+}
+
+/// Says that a part of the surface is drawn at the end of the axis because it lies beyond it, and how many nodes are.
+fn note(has_plateau: bool, nodes: usize) -> Option<String> {
+    match (has_plateau, nodes) {
+        (false, 0) => None,
+        (true, 0) => Some("Beyond the axes: hatched".to_owned()),
+        (true, _) => Some(format!("Beyond the axes: hatched, {}", counted(nodes, "node"))),
+        (false, 1) => Some("1 node beyond the axes is drawn at their edge".to_owned()),
+        (false, _) => Some(format!("{nodes} nodes beyond the axes are drawn at their edge")),
     }
 }

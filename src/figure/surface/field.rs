@@ -15,8 +15,10 @@ const HEADROOM: f64 = 0.08;
 pub(super) enum CellPart {
     /// Not a bit.
     Nothing,
-    /// What stays in the box.
+    /// What stays in the box, and between the nodes what is beyond it at its edge.
     Cut,
+    /// All of it at the edge of the box, beyond which it lies.
+    Plateau,
     /// All of it.
     Whole,
 }
@@ -89,20 +91,48 @@ impl<'a> Field<'a> {
         corners.map(|(ix, iy)| DVec3::new(x_mm[ix], y_mm[iy], self.values[self.grid.index(ix, iy)]))
     }
 
-    /// Returns how much of a cell is drawn: what stays in the box, and between the nodes of a map all of it.
+    /// Returns how much of a cell is drawn, and where.
     pub(super) fn part(&self, ix: usize, iy: usize) -> CellPart {
-        let is_inside = self.is_map && self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1);
         let values = self.corners(ix, iy).map(|corner| self.values[corner]);
         let (low, high) = (*self.shown.start(), *self.shown.end());
         if !values.iter().all(|value| value.is_finite()) {
             CellPart::Nothing
-        } else if is_inside || values.iter().all(|value| self.shown.contains(value)) {
+        } else if (self.is_map && self.is_between_nodes(ix, iy))
+            || values.iter().all(|value| self.shown.contains(value))
+        {
             CellPart::Whole
         } else if values.iter().all(|value| *value < low) || values.iter().all(|value| *value > high) {
-            CellPart::Nothing
+            if self.keeps_plateau(ix, iy) {
+                CellPart::Plateau
+            } else {
+                CellPart::Nothing
+            }
         } else {
             CellPart::Cut
         }
+    }
+
+    /// Returns true for a cell that is drawn at the edge of the box where it lies beyond it: in space, between the nodes.
+    /// What is extrapolated ends there.
+    pub(super) fn keeps_plateau(&self, ix: usize, iy: usize) -> bool {
+        !self.is_map && self.is_between_nodes(ix, iy)
+    }
+
+    /// Returns where a place of the surface is drawn: itself within the box, at its edge on a plateau, else nowhere.
+    pub(super) fn drawn_at(&self, place_mm: DVec3) -> Option<DVec3> {
+        let within = place_mm.z.clamp(*self.shown.start(), *self.shown.end());
+        let spans = |points_mm: &[f64], inside: RangeInclusive<usize>, at: f64| {
+            (points_mm[*inside.start()]..=points_mm[*inside.end()]).contains(&at)
+        };
+        let is_between = || {
+            spans(self.grid.x_mm(), self.grid.inside_x(), place_mm.x)
+                && spans(self.grid.y_mm(), self.grid.inside_y(), place_mm.y)
+        };
+        (within == place_mm.z || (place_mm.z.is_finite() && is_between())).then(|| place_mm.with_z(within))
+    }
+
+    fn is_between_nodes(&self, ix: usize, iy: usize) -> bool {
+        self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1)
     }
 
     /// Values that the box has room for.

@@ -2,63 +2,27 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2};
 
 use super::{
     contour::cross_cell,
     cut::cut_cell,
     field::{CellPart, Field},
-    light::Shade,
-    plan_axes::PlanAxes,
-    projection::Projection,
+    plateau::plateau_marks,
+    stage::Stage,
+    vertices::{Vertex, mixed, vertices},
 };
 use crate::figure::{
-    colour_map::{ColourMap, Rgb, is_light},
+    colour_map::{ColourMap, is_light},
     ticks::{multiples, step_for},
 };
 
-/// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
-const MARGIN_OPACITY: f32 = 0.6;
 const CONTOUR_LEVELS: usize = 10;
 const CONTOUR_OPACITY: f32 = 0.34;
+/// Opacity of the hatching and the rim of a plateau.
+const HATCH_OPACITY: f32 = 0.5;
 
-/// Mapping of places to points on the screen.
-pub(super) enum Stage<'a> {
-    /// In space, lit.
-    Space(&'a Projection),
-    /// From above.
-    Plan(&'a PlanAxes<'a>),
-}
-
-impl Stage<'_> {
-    /// Returns the position on the screen of a place with a value.
-    pub(super) fn point(&self, place: DVec3) -> Vec2 {
-        match self {
-            Self::Space(projection) => projection.point(place),
-            Self::Plan(plan) => plan.point(place.truncate()),
-        }
-    }
-
-    fn eye_mm(&self) -> Option<DVec3> {
-        match self {
-            Self::Space(projection) => Some(projection.plot_box.place_mm(projection.eye)),
-            Self::Plan(_) => None,
-        }
-    }
-}
-
-/// A point of the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertex {
-    /// Position on the screen.
-    pub at: Vec2,
-    /// Its colour under the light.
-    pub colour: Rgb,
-    /// 1 within the nodes' rectangle; fades towards the rim of the extrapolated margin.
-    pub opacity: f32,
-}
-
-/// A piece of a contour line, about one point wide.
+/// A piece of a contour line or of hatching, about one point wide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourLine {
     /// First end.
@@ -88,6 +52,8 @@ pub struct Mesh {
     lines: Vec<ContourLine>,
     /// End of each strip of cells and of its lines.
     strips: Vec<[usize; 2]>,
+    /// True if a part of the surface lies beyond the box and is drawn at its edge.
+    pub(super) has_plateau: bool,
 }
 
 impl Mesh {
@@ -107,25 +73,25 @@ impl Mesh {
         let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
         let rows = far_to_near(y_mm, eye_mm.y);
         let levels = contour_levels(&field.range);
-        let inks: Vec<bool> = levels
-            .iter()
-            .map(|level| is_light(map.at(field.share(*level))))
-            .collect();
+        let is_black = |value: f64| is_light(map.at(field.share(value)));
+        let inks: Vec<bool> = levels.iter().map(|level| is_black(*level)).collect();
         let mut lineless = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
             let mut strip = Vec::with_capacity(rows.len());
             for &iy in &rows {
                 match field.part(ix, iy) {
                     CellPart::Nothing => continue,
-                    CellPart::Whole => mesh.cells.push(field.grid.index(ix, iy) as u32),
+                    CellPart::Whole | CellPart::Plateau => mesh.cells.push(field.grid.index(ix, iy) as u32),
                     CellPart::Cut => mesh.cut(ix, iy, field, stage),
                 }
                 strip.push((ix, iy));
             }
             // Lines lag one strip behind, or the next strip would cover half of their width.
+            mesh.hatch(&lineless, field, stage, is_black);
             mesh.end_strip(&lineless, field, stage, (&levels, &inks));
             lineless = strip;
         }
+        mesh.hatch(&lineless, field, stage, is_black);
         mesh.end_strip(&lineless, field, stage, (&levels, &inks));
         mesh
     }
@@ -134,7 +100,8 @@ impl Mesh {
     fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Stage<'_>) {
         let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
         let (low, high) = (*field.shown().start(), *field.shown().end());
-        for polygon in cut_cell(field.corners_mm(ix, iy), low, high) {
+        let keeps_plateau = field.keeps_plateau(ix, iy);
+        for polygon in cut_cell(field.corners_mm(ix, iy), low, high, keeps_plateau) {
             let first = self.vertices.len() as u32;
             self.vertices.extend(polygon.iter().map(|corner| Vertex {
                 at: stage.point(corner.place),
@@ -147,6 +114,30 @@ impl Mesh {
                 let [b, c, d] = others.map(|corner| first + corner);
                 self.pieces.push([first, b, c, d]);
             }
+        }
+    }
+
+    /// Appends the marks of what lies beyond the box in `cells`.
+    fn hatch(
+        &mut self,
+        cells: &[(usize, usize)],
+        field: &Field<'_>,
+        stage: &Stage<'_>,
+        is_black: impl Fn(f64) -> bool,
+    ) {
+        let is_beyond =
+            |cell: &&(usize, usize)| matches!(field.part(cell.0, cell.1), CellPart::Cut | CellPart::Plateau);
+        for &(ix, iy) in cells.iter().filter(is_beyond) {
+            plateau_marks(field, ix, iy, |ends| {
+                let [from, to] = ends.map(|place| stage.point(place));
+                self.has_plateau = true;
+                self.lines.push(ContourLine {
+                    from,
+                    to,
+                    is_black: is_black(ends[0].z),
+                    opacity: HATCH_OPACITY,
+                });
+            });
         }
     }
 
@@ -214,59 +205,6 @@ impl Mesh {
     }
 }
 
-/// One vertex for every grid point, in their order.
-fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Vec<Vertex> {
-    let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
-    let across = y_mm.len();
-    let places = field.values.iter().enumerate().map(|(index, &value)| {
-        let (ix, iy) = (index / across, index % across);
-        (ix, iy, DVec3::new(x_mm[ix], y_mm[iy], value))
-    });
-    let vertex = |ix: usize, iy: usize, at: Vec2, value: f64, light: f32| {
-        let beyond = field.beyond(ix, iy);
-        Vertex {
-            at,
-            colour: map.at(field.share(value)).map(|part| (f32::from(part) * light) as u8),
-            opacity: if beyond > 0.0 {
-                MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3)
-            } else {
-                1.0
-            },
-        }
-    };
-    match stage {
-        Stage::Plan(plan) => places
-            .map(|(ix, iy, place)| vertex(ix, iy, plan.point(place.truncate()), place.z, 1.0))
-            .collect(),
-        Stage::Space(projection) => {
-            let plot_box = projection.plot_box;
-            let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
-            let in_box = |place: DVec3| plot_box.unit(place.with_z(place.z.clamp(low, high)));
-            let units: Vec<Vec3> = places.clone().map(|(_, _, place)| in_box(place)).collect();
-            let shade = Shade::new(&units, across, projection.eye);
-            let lit = places.zip(&units).map(|((ix, iy, place), unit)| {
-                vertex(ix, iy, projection.point_of_unit(*unit), place.z, shade.at(ix, iy))
-            });
-            lit.collect()
-        }
-    }
-}
-/// A vertex between others, by its share of each.
-fn mixed(vertices: &[Vertex; 4], shares: [f64; 4]) -> Vertex {
-    let mix = |of: &dyn Fn(&Vertex) -> f32| -> f32 {
-        vertices
-            .iter()
-            .zip(shares)
-            .map(|(vertex, share)| of(vertex) * share as f32)
-            .sum()
-    };
-    Vertex {
-        at: Vec2::ZERO,
-        colour: [0, 1, 2].map(|part| mix(&|vertex| f32::from(vertex.colour[part])).round() as u8),
-        opacity: mix(&|vertex| vertex.opacity),
-    }
-}
-
 /// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
 /// micrometre would draw lines all over it.
 fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
@@ -288,7 +226,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        figure::surface::{Bounds, OrbitCamera, Quantity, Surface, ViewMode, projection::PlotBox},
+        figure::surface::{
+            Bounds, OrbitCamera, Quantity, Surface, ViewMode,
+            projection::{PlotBox, Projection},
+        },
         surface::SurfaceMap,
     };
 

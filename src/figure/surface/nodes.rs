@@ -4,8 +4,8 @@ use glam::{DVec3, Vec2};
 
 use super::{
     field::Field,
-    mesh::Stage,
     shapes::{Bounds, Disc, Ink},
+    stage::Stage,
 };
 use crate::surface::Grid;
 
@@ -53,13 +53,9 @@ impl Dots {
         }
     }
 
-    /// Says of nodes beyond the axes that they are drawn at their edge.
-    pub fn note(&self) -> Option<String> {
-        match self.dots.iter().flatten().filter(|dot| dot.is_beyond).count() {
-            0 => None,
-            1 => Some("1 node beyond the axes is drawn at their edge".to_owned()),
-            count => Some(format!("{count} nodes beyond the axes are drawn at their edge")),
-        }
+    /// Number of nodes beyond the axes, which are drawn at their edge.
+    pub(super) fn beyond(&self) -> usize {
+        self.dots.iter().flatten().filter(|dot| dot.is_beyond).count()
     }
 
     /// The visible node nearest to `place`, if it is near.

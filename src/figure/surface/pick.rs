@@ -26,7 +26,7 @@ impl Surface {
             let corners = match field.part(ix, iy) {
                 CellPart::Nothing => return None,
                 CellPart::Cut => field.corners_mm(ix, iy),
-                CellPart::Whole => field
+                CellPart::Whole | CellPart::Plateau => field
                     .corners_mm(ix, iy)
                     .map(|corner| corner.with_z(corner.z.clamp(low, high))),
             };
@@ -37,6 +37,12 @@ impl Surface {
                 .flatten()
                 .map(|share| (share, ray.from_mm + ray.direction * share));
             let shown = places.filter(|(_, place)| (low - CRACK..=high + CRACK).contains(&place.z));
+            let plateaus = [(low, -1.0), (high, 1.0)].into_iter().filter_map(|(level, side)| {
+                let share = (level - ray.from_mm.z) / ray.direction.z;
+                let place = ray.at_level(level).filter(|_| field.keeps_plateau(ix, iy))?;
+                (side * (height_at(corners, place)? - level) > 0.0).then_some((share, place))
+            });
+            let shown = shown.chain(plateaus);
             Some(shown.min_by(|(one, _), (other, _)| one.total_cmp(other))?.1)
         })
     }
@@ -78,6 +84,19 @@ fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     crossings.extend([from, to]);
     crossings.sort_by(f64::total_cmp);
     Some(crossings)
+}
+
+/// Height of the two triangles of a cell at a place; `None` beside it.
+fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
+    let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
+    let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
+    let is_inside = [x, y].iter().all(|share| (0.0..=1.0).contains(share));
+    let height = if y <= x {
+        a.z + x * (b.z - a.z) + y * (c.z - b.z)
+    } else {
+        a.z + y * (d.z - a.z) + x * (c.z - d.z)
+    };
+    is_inside.then_some(height)
 }
 
 /// Share of the ray at which it meets a triangle, in its own units (Möller and Trumbore 1997).
@@ -256,5 +275,23 @@ mod tests {
         assert!(seen > 60, "{seen}");
         let (above, _) = sight(&surface(ViewMode::Top, slope), OrbitCamera::default());
         assert_eq!(above.height_mm(DVec3::new(9.0, 7.0, 5.0), 1.0, DVec2::ZERO), None);
+    }
+    #[test]
+    fn a_plateau_beyond_the_axis_is_picked_at_its_edge() {
+        let steep = |x: f64, _: f64| 4.5 + 0.6 * (x - 10.0);
+        let surface = surface(ViewMode::ThreeD, steep);
+        // From high enough to look down on it: the box ends at 3.92 and 5.08.
+        for camera in cameras().filter(|camera| camera.pitch > 0.6) {
+            let (sight, _) = sight(&surface, camera);
+            for step in 0..50 {
+                let place = DVec3::new(
+                    10.97 + 0.02 * f64::from(step),
+                    3.1 + 0.11 * f64::from(step * 7 % 50),
+                    5.08,
+                );
+                let picked = surface.pick(&sight.ray(sight.point(place))).unwrap();
+                assert!(picked.distance(place) < 1e-9, "{picked} for {place}, {camera:?}");
+            }
+        }
     }
 }

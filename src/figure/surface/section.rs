@@ -62,14 +62,15 @@ impl Section {
         points.collect()
     }
 
-    /// Returns the curve on the screen, in pieces where the surface has gaps or leaves the box of the axes.
+    /// Returns the curve on the screen, along the surface as it is drawn: in pieces where it has gaps or ends at the box of
+    /// the axes.
     pub fn pieces(&self, surface: &Surface, sight: &Sight) -> Vec<Vec<DVec2>> {
         let field = Field::new(surface);
         let curve = self.curve_mm(field.grid, field.values);
-        let is_shown = |place: &DVec3| field.shown().contains(&place.z);
-        let pieces = curve.split(|place| !is_shown(place)).filter(|piece| piece.len() > 1);
+        let drawn: Vec<Option<DVec3>> = curve.into_iter().map(|place| field.drawn_at(place)).collect();
+        let pieces = drawn.split(Option::is_none).filter(|piece| piece.len() > 1);
         pieces
-            .map(|piece| piece.iter().map(|place| sight.point(*place)).collect())
+            .map(|piece| piece.iter().flatten().map(|place| sight.point(*place)).collect())
             .collect()
     }
 }

@@ -10,12 +10,12 @@ use crate::{
         theme::space,
         widgets::{
             dim_ui,
-            fields::{count_ui, quantity_ui},
-            primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_style,
+            fields::{count_ui, quantity_ui, usually},
+            primary_button, scrolled_ui, section_heading_ui, segmented_ui, slider_ui,
         },
     },
-    scene::{Movement, RowModel, Rows},
-    sensor::{ArrayScale, LARGEST_COUNT, counted},
+    scene::{Movement, RowModel, Rows, Scene},
+    sensor::{ArrayScale, Geometry, LARGEST_COUNT, counted},
 };
 
 /// Array, geometry and scene to be tried, and the way back to the Train view.
@@ -43,59 +43,67 @@ pub fn form_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, eff
 }
 
 fn geometry_ui(ui: &mut Ui, question: &mut Question) {
-    let geometry = &mut question.sensor.geometry;
+    let (geometry, usual) = (&mut question.sensor.geometry, Geometry::default());
     let lengths = [
         (
             "Height",
             "Height of the row-wires above the column-wires, undeformed, in mm.",
             &mut geometry.height_mm,
+            usual.height_mm,
             0.5..=15.0,
         ),
         (
             "Node pitch",
             "Distance between nodes on a row-wire, in mm.",
             &mut geometry.node_pitch_mm,
+            usual.node_pitch_mm,
             0.2..=8.0,
         ),
         (
             "Row pitch",
             "Distance between row-wires, in mm.",
             &mut geometry.row_pitch_mm,
+            usual.row_pitch_mm,
             0.2..=8.0,
         ),
         (
             "Column pitch",
             "Distance between column-wires, in mm.",
             &mut geometry.column_pitch_mm,
+            usual.column_pitch_mm,
             0.2..=8.0,
         ),
         (
             "Column node pitch",
             "Distance between nodes on a column-wire, in mm.",
             &mut geometry.column_node_pitch_mm,
+            usual.column_node_pitch_mm,
             0.5..=15.0,
         ),
     ];
-    for (name, hint, value, range) in lengths {
-        quantity_ui(ui, name, hint, value, 1e-6..=1e6, "mm");
-        slider_ui(ui, name, value, range, 0.05);
+    for (name, hint, value, usual, range) in lengths {
+        quantity_ui(ui, name, hint, value, usually(usual, 1e-6..=1e6), "mm");
+        stepped_slider_ui(ui, name, value, usual, range, 0.05);
     }
     let hint = "x coordinate of the first node on each column-wire, in mm. Shifting it breaks the symmetry that makes \
                 rows read alike.";
     let name = "First column node at x";
-    let value = &mut geometry.column_node_x0_mm;
-    quantity_ui(ui, name, hint, value, -1e6..=1e6, "mm");
-    slider_ui(ui, name, value, -10.0..=40.0, 0.05);
+    let (value, usual) = (&mut geometry.column_node_x0_mm, usual.column_node_x0_mm);
+    quantity_ui(ui, name, hint, value, usually(usual, -1e6..=1e6), "mm");
+    stepped_slider_ui(ui, name, value, usual, -10.0..=40.0, 0.05);
 }
 
 fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
+    let usual = ArrayScale::default();
     let (mut columns, mut nodes) = (scale.columns(), scale.nodes_per_column());
     let hint = "Number of column-wires. Each adds one reading to every row.";
-    count_ui(ui, "Column-wires", hint, &mut columns, 1..=LARGEST_COUNT);
-    slider_ui(ui, "Column-wires", &mut columns, 1..=100, 1.0);
+    let limits = |usual: usize| usually(usual, 1..=LARGEST_COUNT);
+    count_ui(ui, "Column-wires", hint, &mut columns, limits(usual.columns()));
+    stepped_slider_ui(ui, "Column-wires", &mut columns, usual.columns(), 1..=100, 1.0);
     let hint = "Number of nodes on each column-wire, which are read together.";
-    count_ui(ui, "Nodes on each column", hint, &mut nodes, 1..=LARGEST_COUNT);
-    slider_ui(ui, "Nodes on each column", &mut nodes, 1..=20, 1.0);
+    let (name, usual) = ("Nodes on each column", usual.nodes_per_column());
+    count_ui(ui, name, hint, &mut nodes, limits(usual));
+    stepped_slider_ui(ui, name, &mut nodes, usual, 1..=20, 1.0);
     if let Ok(changed) = ArrayScale::new(scale.rows(), scale.nodes_per_row(), nodes, columns) {
         *scale = changed;
     }
@@ -119,36 +127,50 @@ fn scene_ui(ui: &mut Ui, question: &mut Question) {
         scene.movement = if is_sideways { Movement::SIDEWAYS } else { Movement::Z };
     }
     let hint = glossary::RELATIVE_NOISE.hint;
-    let noise = &mut scene.noise.relative;
-    quantity_ui(ui, "Relative noise", hint, noise, 0.0..=1.0, "");
-    let present = *noise;
-    let slider = Slider::new(noise, 0.0..=1.0).logarithmic(true).smallest_positive(1e-6);
-    add_slider(ui, "Relative noise", present, slider);
+    let (noise, usual) = (&mut scene.noise.relative, Scene::default().noise.relative);
+    quantity_ui(ui, "Relative noise", hint, noise, usually(usual, 0.0..=1.0), "");
+    form_slider_ui(ui, "Relative noise", noise, usual, |noise| {
+        Slider::new(noise, 0.0..=1.0).logarithmic(true).smallest_positive(1e-6)
+    });
     let hint = "Compression of all nodes at which the sensor is analysed, in percent of the height, up to the largest \
                 of the scene.";
     let mut percent = 100.0 * question.compression;
     let most = 100.0 * scene.largest_compression;
-    quantity_ui(ui, "Compression", hint, &mut percent, 0.0..=most, "%");
-    slider_ui(ui, "Compression", &mut percent, 0.0..=most, 0.5);
+    let usual = 0.5 * most;
+    quantity_ui(ui, "Compression", hint, &mut percent, usually(usual, 0.0..=most), "%");
+    stepped_slider_ui(ui, "Compression", &mut percent, usual, 0.0..=most, 0.5);
     // Only what was changed, lest rounding change it.
     if percent != 100.0 * question.compression {
         question.compression = percent / 100.0;
     }
 }
 
-fn slider_ui<N: Numeric>(ui: &mut Ui, name: &str, value: &mut N, range: RangeInclusive<N>, step: f64) {
-    let present = value.to_f64();
-    add_slider(ui, name, present, Slider::new(value, range).step_by(step));
+fn stepped_slider_ui<N: Numeric>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut N,
+    usual: N,
+    range: RangeInclusive<N>,
+    step: f64,
+) {
+    form_slider_ui(ui, name, value, usual, |value| Slider::new(value, range).step_by(step));
 }
 
-/// A value beyond the slider's ends stays as it is until the slider is moved.
-fn add_slider(ui: &mut Ui, name: &str, present: f64, slider: Slider<'_>) {
-    ui.scope(|ui| {
-        slider_style(ui);
-        ui.spacing_mut().slider_width = ui.available_width();
-        let response = ui.add(slider.show_value(false).clamping(SliderClamping::Never));
-        response.widget_info(|| WidgetInfo::slider(true, present, format!("{name} slider")));
-    });
+/// A slider as wide as the form, which a double click sets to `usual`. A value beyond its ends stays as it is until the
+/// slider is moved.
+fn form_slider_ui<N: Numeric>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut N,
+    usual: N,
+    slider: impl FnOnce(&mut N) -> Slider<'_>,
+) {
+    let (present, width) = (value.to_f64(), ui.available_width());
+    let response = slider_ui(ui, slider(value).clamping(SliderClamping::Never), width);
+    if response.double_clicked() {
+        *value = usual;
+    }
+    response.widget_info(|| WidgetInfo::slider(true, present, format!("{name} slider")));
 }
 
 /// Returns whether the question is to be that of the Train view again.

@@ -3,7 +3,7 @@ use eframe::egui::{Align, Label, Layout, RichText, Slider, Ui, WidgetInfo};
 use super::{LiveView, engine::Command};
 use crate::app::{
     theme::{Theme, space, type_size},
-    widgets::{dim_ui, ghost_button, slider_style},
+    widgets::{dim_ui, ghost_button, slider_ui},
 };
 
 /// Height of the bar, in points.
@@ -28,13 +28,14 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
                 ui.add_space(space(2));
                 let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
                 ui.label(RichText::new(text).size(type_size().note));
-                slider_style(ui);
-                ui.spacing_mut().slider_width = ui.available_width() - space(2);
                 let mut at_s = replay.at_s;
-                let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE)).show_value(false);
-                let slider = ui.add(slider);
+                let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE));
+                let width = ui.available_width() - space(2);
+                let slider = slider_ui(ui, slider, width);
                 slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
-                if slider.changed() {
+                if slider.double_clicked() {
+                    view.command(Command::Seek(0.0));
+                } else if slider.changed() {
                     view.command(Command::Seek(at_s));
                 }
             });
@@ -49,19 +50,16 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
         [space(8), space(6)],
         Label::new(RichText::new(text).size(type_size().note).color(colour)),
     );
-    ui.scope(|ui| {
-        slider_style(ui);
-        ui.spacing_mut().slider_width = space(24);
-        let before = view.source.speed;
-        let slider = Slider::new(&mut view.source.speed, 0.1..=10.0)
-            .logarithmic(true)
-            .show_value(false);
-        let slider = ui.add(slider);
-        slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
-        slider.on_hover_text("Recorded seconds per second, from 0.1 to 10.");
-        if view.source.speed != before {
-            view.command(Command::Speed(view.source.speed));
-        }
-    });
+    let before = view.source.speed;
+    let slider = Slider::new(&mut view.source.speed, 0.1..=10.0).logarithmic(true);
+    let slider = slider_ui(ui, slider, space(24));
+    if slider.double_clicked() {
+        view.source.speed = 1.0;
+    }
+    slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
+    slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
+    if view.source.speed != before {
+        view.command(Command::Speed(view.source.speed));
+    }
     dim_ui(ui, "Speed");
 }

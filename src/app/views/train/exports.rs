@@ -3,8 +3,8 @@
 use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
 use crate::{
     app::shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunView,
-        Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
+        RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
     },
     evaluation::{DecoderReport, error_rows},
     export::{CheckpointFile, decoder_table, error_table},
@@ -52,10 +52,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         run.as_ref()
             .map_or_else(|_| String::new(), |run| file_stem(what, &run.settings))
     };
-    let source = run
-        .clone()
-        .map(|run| NetworkSource::Training(run.id, Box::new(run.settings)));
-    let mut exports = network_exports("", &source, move || measured(view));
+    let mut exports = networks(view, &shown);
     let what = match shared.look.mode {
         ViewMode::ThreeD => "surfaces",
         ViewMode::Top => "surfaces-top",
@@ -67,10 +64,13 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         Ok(move || Figure::from(figure.clone()))
     });
     exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
-    let errors = shown
-        .clone()
-        .map(|(run, result)| move || error_table(&error_rows(&result.errors, &run.baselines, run.published.as_ref())));
-    exports.push(error_table_export(stem("errors"), errors.clone()));
+    let errors = shown.clone().map(|(run, latest)| {
+        let result = view.result(shared).unwrap_or(latest);
+        move || error_table(&error_rows(&result.errors, &run.baselines, run.published.as_ref()))
+    });
+    let of_epoch = view.scrub.result().map(|past| format!("-epoch{}", past.epochs_run));
+    let of_errors = stem("errors") + &of_epoch.unwrap_or_default();
+    exports.push(error_table_export(of_errors, errors.clone()));
     exports.push(loss_export(stem("loss"), run.clone().map(|run| run.history.as_slice())));
     exports.extend(copy_exports("Error table", errors));
     let decoders = shown.map(|(run, _)| run).and_then(|run| {
@@ -93,6 +93,42 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         description: CHECKPOINT.description,
         ask: standing.map(|run| -> Ask<'a> { Box::new(|| Effect::ChooseFile(checkpoint_task(run))) }),
     });
+    exports
+}
+
+/// The best network, and before it that of a past epoch while it is on show.
+fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
+    let source = shown
+        .as_ref()
+        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.settings)));
+    let mut exports = network_exports("", &source.map_err(String::clone), move || measured(view));
+    let Ok((run, latest)) = shown else { return exports };
+    let in_group = |group: ExportGroup| {
+        move |mut export: Export<'a>| {
+            if export.group == ExportGroup::Network {
+                export.group = group;
+            }
+            export
+        }
+    };
+    exports = exports
+        .into_iter()
+        .map(in_group(ExportGroup::BestNetwork(latest.best_epoch)))
+        .collect();
+    if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
+        let source = NetworkSource::Past(run.id, Box::new(run.settings), epoch, run.past.clone());
+        // The decoders were measured beside the best network.
+        let past = network_exports("", &Ok(source), Vec::new).into_iter();
+        let past = past
+            .map(in_group(ExportGroup::NetworkOnShow(epoch)))
+            .map(|export| Export {
+                name: format!("{} of epoch {epoch}", export.name),
+                ..export
+            });
+        exports.extend(past);
+        // Each part of the menu for itself.
+        exports.sort_by_key(|export| export.group);
+    }
     exports
 }
 

@@ -81,6 +81,8 @@ fn section(view: &TrainView, shared: &Shared) -> Option<Section> {
 fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     let text = if view.press.is_pressing() {
         view.press.waiting_text(shared)
+    } else if shared.phase.is_busy() {
+        "What the network makes of the readings appears here with its first epoch. Meanwhile, press the surface on the left."
     } else {
         "Press the surface on the left: what a network makes of its readings appears here. Or train your own, which \
          takes shape here while it learns."

@@ -68,7 +68,7 @@ fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
         return placeholder_ui(ui, "No trial has finished yet.");
     }
     ui.allocate_ui(vec2(ui.available_width(), ui.available_height()), |ui| {
-        table_ui(ui, table, sort)
+        table_ui(ui, table, sort);
     });
 }
 

@@ -1,4 +1,4 @@
-use eframe::egui::{self, RichText, Slider, Stroke, TextEdit, Ui};
+use eframe::egui::{RichText, Slider, Stroke, Ui};
 
 use crate::{
     app::{
@@ -6,7 +6,7 @@ use crate::{
         theme::{Theme, space, type_size},
         widgets::{
             fields::{capitalised, count_ui, usually},
-            note_ui, segmented_ui, slider_style,
+            note_ui, segmented_ui, slider_ui, text_ui,
         },
     },
     evaluation::{SimulatedSettings, Workload},
@@ -17,7 +17,13 @@ use crate::{
 
 /// The scale of the array: one of the paper's, or any other typed; changes `scale`.
 pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
-    array_scale_ui(ui, scale);
+    text_ui(
+        ui,
+        "Array scale",
+        glossary::ARRAY_SCALE.hint,
+        scale,
+        ArrayScale::default(),
+    );
     let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
     let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
     if let Some(picked) = segmented_ui(ui, "Array scale of the paper", &options, *scale, true) {
@@ -39,34 +45,6 @@ pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
         note_ui(ui, &note);
     }
     ui.add_space(space(1));
-}
-
-/// The scale as text, taken over when it parses; until then the reason it does not stands below.
-fn array_scale_ui(ui: &mut Ui, scale: &mut ArrayScale) {
-    let id = ui.scope_id().with("array scale text");
-    let typed = ui.data(|data| data.get_temp::<String>(id));
-    let mut text = typed.clone().unwrap_or_else(|| scale.to_string());
-    let response = ui
-        .horizontal(|ui| {
-            let label = ui.label("Array scale");
-            let edit = TextEdit::singleline(&mut text)
-                .desired_width(f32::INFINITY)
-                .margin(egui::vec2(space(2), space(1)));
-            ui.add(edit).labelled_by(label.id)
-        })
-        .inner
-        .on_hover_text(glossary::ARRAY_SCALE.hint);
-    let parsed = text.parse::<ArrayScale>();
-    if response.changed() {
-        ui.data_mut(|data| data.insert_temp(id, text));
-        if let Ok(parsed) = parsed {
-            *scale = parsed;
-        }
-    } else if !response.has_focus() && typed.is_some() && parsed.is_ok() {
-        ui.data_mut(|data| data.remove_temp::<String>(id));
-    } else if let (Some(_), Err(error)) = (typed, parsed) {
-        note_ui(ui, &error.to_string());
-    }
 }
 
 /// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
@@ -109,23 +87,21 @@ fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
 /// A slider for small networks, with small marks at the suggestions.
 fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
     const MOST: usize = 64;
-    ui.scope(|ui| {
-        slider_style(ui);
-        ui.spacing_mut().slider_width = ui.available_width();
-        let slider = Slider::new(hidden, 1..=MOST)
-            .show_value(false)
-            .clamping(eframe::egui::SliderClamping::Never);
-        let response = ui.add(slider);
-        let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
-        let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-        for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
-            let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
-            let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
-            ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
-        }
-        let value = *hidden as f64;
-        response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
-    });
+    let slider = Slider::new(hidden, 1..=MOST).clamping(eframe::egui::SliderClamping::Never);
+    let width = ui.available_width();
+    let response = slider_ui(ui, slider, width);
+    if response.double_clicked() {
+        *hidden = SimulatedSettings::default().hidden;
+    }
+    let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
+    let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
+    for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
+        let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
+        let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
+        ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
+    }
+    let value = *hidden as f64;
+    response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
     ui.add_space(space(1));
 }
 

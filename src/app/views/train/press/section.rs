@@ -14,8 +14,8 @@ use crate::{
         test_view::TestView,
         theme::{Theme, space},
         widgets::{
-            Column, Row, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui, section_heading_ui,
-            slider_style, table_ui, usually,
+            Column, Row, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui, section_heading_ui, slider_ui,
+            table_ui, usually,
         },
     },
     decoupling::{DecoderKind, Precision},
@@ -69,10 +69,7 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     } else if press.is_pressing() {
         dim_ui(ui, "Computing the readings…");
     } else {
-        dim_ui(
-            ui,
-            "Press on the actual surface with the mouse; the wheel sets the depth.",
-        );
+        dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
         return;
     }
     let back = ui.small_button("Back to the test set");
@@ -122,9 +119,10 @@ fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
     let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
     let mut depth_mm = finger.depth_share * stroke_mm;
     let before_mm = depth_mm;
+    let usual_mm = Finger::default().depth_share * stroke_mm;
     let label = ui.label("Depth").on_hover_text(&hint);
     let field = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let limits = usually(Finger::default().depth_share * stroke_mm, 0.0..=stroke_mm);
+        let limits = usually(usual_mm, 0.0..=stroke_mm);
         // A thousandth of a millimetre is finer than any finger.
         let shown_mm = (1e3 * depth_mm).round() / 1e3;
         let mut typed_mm = shown_mm;
@@ -133,13 +131,13 @@ fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
             depth_mm = typed_mm;
         }
         let number = number.labelled_by(label.id).on_hover_text(&hint);
-        ui.scope(|ui| {
-            slider_style(ui);
-            ui.spacing_mut().slider_width = (ui.available_width() - space(2)).max(space(8));
-            let slider = ui.add(Slider::new(&mut depth_mm, 0.0..=stroke_mm).show_value(false));
-            slider.widget_info(|| WidgetInfo::slider(true, depth_mm, "Depth of the press"));
-            slider.on_hover_text(&hint);
-        });
+        let width = (ui.available_width() - space(2)).max(space(8));
+        let slider = slider_ui(ui, Slider::new(&mut depth_mm, 0.0..=stroke_mm), width);
+        if slider.double_clicked() {
+            depth_mm = usual_mm;
+        }
+        slider.widget_info(|| WidgetInfo::slider(true, depth_mm, "Depth of the press"));
+        slider.on_hover_text(&hint);
         number
     });
     if depth_mm != before_mm {

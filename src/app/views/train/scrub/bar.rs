@@ -6,7 +6,7 @@ use super::ScrubState;
 use crate::{
     app::{
         theme::{Theme, space, type_size},
-        widgets::{ghost_button, slider_style},
+        widgets::{ghost_button, slider_ui},
     },
     evaluation::PastNetworks,
 };
@@ -35,7 +35,7 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
             let is_past = scrub.epoch().is_some();
             let button = ui.add_enabled(is_past, ghost_button("Latest").min_size(Vec2::new(0.0, space(6))));
             if button
-                .on_hover_text("Shows the latest network again. Files always take that one.")
+                .on_hover_text("Shows the latest network again. Export offers the one on show and the best.")
                 .clicked()
             {
                 scrub.show_latest();
@@ -52,9 +52,7 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
                 ui.set_min_width(size.x);
                 ui.label(RichText::new(text).size(type_size().note).color(colour));
             });
-            slider_style(ui);
-            ui.spacing_mut().slider_width = (ui.available_width() - space(2)).max(space(10));
-            slider_ui(ui, scrub, past, others.len(), &epochs);
+            epoch_slider_ui(ui, scrub, past, others.len(), &epochs);
         });
     });
 }
@@ -74,12 +72,16 @@ fn replay_button_ui(ui: &mut Ui, scrub: &mut ScrubState, now_seconds: f64, past:
     }
 }
 
-fn slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, last: usize, epochs: &[usize]) {
+fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, last: usize, epochs: &[usize]) {
     let shown = scrub
         .epoch()
         .map_or(last, |epoch| epochs.partition_point(|other| *other < epoch));
     let mut place = shown;
-    let slider = ui.add(Slider::new(&mut place, 0..=last).show_value(false));
+    let width = (ui.available_width() - space(2)).max(space(10));
+    let slider = slider_ui(ui, Slider::new(&mut place, 0..=last), width);
+    if slider.double_clicked() {
+        place = last;
+    }
     slider.widget_info(|| WidgetInfo::slider(true, epochs[place.min(last)] as f64, "Epoch of the network on show"));
     if place != shown {
         // The hand takes over from the replay.

@@ -147,7 +147,8 @@ fn result_at(
     test: &Dataset,
     stroke_mm: f64,
 ) -> Option<RunResult> {
-    let (networks, best_epoch) = past.at(epoch, present)?;
+    let past = past.at(epoch, present)?;
+    let (networks, best_epoch) = (past.networks, past.best_epoch);
     let decoupled_mm = networks.decouple(test);
     Some(RunResult {
         errors: Errors::measure(test, &decoupled_mm, stroke_mm),
