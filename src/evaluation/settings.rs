@@ -35,6 +35,9 @@ pub struct RunSettings<S = Source> {
 /// Settings of a run on simulated samples.
 pub type SimulatedSettings = RunSettings<Simulation>;
 
+/// Settings of a run on measured samples.
+pub type MeasuredSettings = RunSettings<Measured>;
+
 /// Largest number of starts in a run: enough for the distribution of its results, and within memory.
 pub const MOST_STARTS: usize = 100;
 
@@ -77,6 +80,12 @@ impl From<Measured> for RunSettings {
 
 impl From<SimulatedSettings> for RunSettings {
     fn from(settings: SimulatedSettings) -> Self {
+        settings.with_source(settings.source.into())
+    }
+}
+
+impl From<MeasuredSettings> for RunSettings {
+    fn from(settings: MeasuredSettings) -> Self {
         settings.with_source(settings.source.into())
     }
 }
@@ -132,6 +141,14 @@ impl RunSettings {
             0.2
         } else {
             0.0
+        }
+    }
+
+    /// Returns these settings as those of a run on measured samples, if they are.
+    pub fn measured(&self) -> Option<MeasuredSettings> {
+        match self.source {
+            Source::Simulated(_) => None,
+            Source::Measured(measured) => Some(self.with_source(measured)),
         }
     }
 
@@ -244,5 +261,29 @@ impl<'de> Deserialize<'de> for SimulatedSettings {
             training: record.training,
             seed: record.seed,
         })
+    }
+}
+
+/// File format of the settings of a run on measured samples.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "RunSettings<Measured>", deny_unknown_fields)]
+struct MeasuredRecord {
+    source: Measured,
+    inputs: InputChoice,
+    hidden: usize,
+    starts: usize,
+    training: TrainingSettings,
+    seed: Seed,
+}
+
+impl Serialize for MeasuredSettings {
+    fn serialize<Z: serde::Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        MeasuredRecord::serialize(self, serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeasuredSettings {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        MeasuredRecord::deserialize(deserializer)
     }
 }

@@ -6,6 +6,7 @@ use super::{
     Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
     algorithm::{Algorithm, Checked, Description, add_step},
     correlation_time::correlation_time,
+    normal_equations::{Decay, PerClass, class_sizes, class_squares},
     setting::settings,
 };
 use crate::network::{Mlp, Shape};
@@ -25,6 +26,10 @@ settings! {
         correlation_epoch: "correlation epoch" = 0.0, in 0.0..=1e6,
             "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
              errors count as independent, and weights are smaller. 0: never.";
+        groups: "groups of weights" = 1.0, in 1.0..=4.0,
+            "Groups of weights, each with its own strength of regularisation. 1: all. 2: hidden layer and output layer. 3: \
+             the hidden layer's biases apart too. 4: all biases apart. From 2 on, output biases are drawn towards the means \
+             of the targets, not towards 0.";
     }
 }
 
@@ -32,11 +37,28 @@ impl RegularizationSettings {
     /// Before it, what is not yet learnt makes errors look more correlated than they are.
     const EPOCH_OF_RECORDINGS: f64 = 200.0;
 
-    /// Settings for samples in the order in which they were recorded.
+    /// Settings for samples in the order in which they were recorded: few for the number of weights, and of any units.
     pub fn recorded() -> Self {
         Self {
             correlation_epoch: Self::EPOCH_OF_RECORDINGS,
+            groups: 4.0,
             ..Self::default()
+        }
+    }
+
+    /// Group of each class of weights, from 0.
+    fn group_of_classes(&self) -> PerClass<usize> {
+        let [hidden_weights, hidden_biases, output_weights, output_biases] = match self.groups as usize {
+            ..=1 => [0, 0, 0, 0],
+            2 => [0, 0, 1, 1],
+            3 => [0, 1, 2, 2],
+            _ => [0, 1, 2, 3],
+        };
+        PerClass {
+            hidden_weights,
+            hidden_biases,
+            output_weights,
+            output_biases,
         }
     }
 
@@ -47,6 +69,7 @@ impl RegularizationSettings {
             mu_increase,
             mu_max,
             correlation_epoch: _,
+            groups: _,
         } = self;
         Damping {
             mu,
@@ -65,6 +88,11 @@ impl RegularizationSettings {
 /// α = γ / (2 Σw²)                     β = (n − γ) / (2 Σe²)
 /// ```
 ///
+/// With several groups of weights each has its own α, by its own γ and Σw² (MacKay 1992, doi:10.1162/neco.1992.4.3.448):
+/// weights of inputs and of outputs have scales of their own, and one α for both suits neither, which shows with few samples.
+/// Of output biases w² is then that of their distance from the mean of the target, which a network that is told nothing
+/// answers, so that no answer depends on where the zero of a target lies.
+///
 /// Errors of neighbouring frames of a recording are correlated, and n of them tell only as much as n/τ independent ones, τ
 /// being their [`correlation_time`]. From [`RegularizationSettings::correlation_epoch`] on, where it is measured once, α/β is
 /// therefore that of n/τ errors of the same size: a posterior that takes every frame for new evidence fits the noise.
@@ -75,6 +103,10 @@ pub(super) struct BayesianRegularization {
     damping: Damping,
     /// Epoch after which the correlation of errors is measured; 0 for never.
     correlation_epoch: usize,
+    /// Group of each class of weights.
+    group_of: PerClass<usize>,
+    /// Means of the targets, where output biases are drawn towards them.
+    means: Vec<f64>,
     state: BayesianState,
     equations: FactoredEquations,
     /// Number of errors n.
@@ -89,18 +121,29 @@ pub(super) struct BayesianRegularization {
 #[serde(deny_unknown_fields)]
 pub struct BayesianState {
     mu: f64,
-    /// α, the weight of Σw².
+    /// α, the weight of Σw² of the first group.
     alpha: f64,
     /// β, the weight of Σe².
     beta: f64,
-    /// γ, the effective number of parameters.
+    /// γ, the effective number of parameters of all weights.
     effective_parameters: f64,
+    /// The groups after the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    further: Vec<GroupState>,
     /// Number of epochs so far.
     #[serde(default)]
     epochs: usize,
     /// τ, once it is measured.
     #[serde(default)]
     correlation_time: Option<f64>,
+}
+
+/// State of a group of weights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GroupState {
+    alpha: f64,
+    effective_parameters: f64,
 }
 
 /// Most samples over which errors may be correlated; the sum of the correlations ends at the first that is not positive.
@@ -113,14 +156,29 @@ impl Checked for BayesianState {
 }
 
 impl BayesianState {
-    /// β Σe² + α Σw², with Σe² = `mse`·`errors`.
-    fn objective(&self, mse: f64, errors: f64, mlp: &Mlp) -> f64 {
-        self.beta * mse * errors + self.alpha * sum_of_squares(mlp)
+    /// α of each class of weights.
+    fn decays(&self, group_of: PerClass<usize>) -> PerClass {
+        group_of.map(|group| match group {
+            0 => self.alpha,
+            group => self.further[group - 1].alpha,
+        })
+    }
+
+    /// β Σe² + Σ α Σw², with Σe² = `mse`·`errors`.
+    fn objective(&self, mse: f64, errors: f64, mlp: &Mlp, (group_of, means): (PerClass<usize>, &[f64])) -> f64 {
+        let of_weights = if self.further.is_empty() {
+            self.alpha * sum_of_squares(mlp)
+        } else {
+            let squares = class_squares(mlp, means).values();
+            let products = self.decays(group_of).values().into_iter().zip(squares);
+            products.map(|(decay, squares)| decay * squares).sum()
+        };
+        self.beta * mse * errors + of_weights
     }
 }
 
 impl BayesianRegularization {
-    /// Updates α and β from γ; each is 1 where the formula gives no positive number, and neither is so extreme that their
+    /// Updates each α, and β, from γ; each is 1 where the formula gives no positive number, and none is so extreme that their
     /// ratio overflows.
     fn update_weighting(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
@@ -140,16 +198,63 @@ impl BayesianRegularization {
                 1.0
             }
         };
-        self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(mlp)));
+        if self.state.further.is_empty() {
+            self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(mlp)));
+        } else {
+            let squares = self.by_group(class_squares(mlp, &self.means), |squares| squares);
+            let further: f64 = self.state.further.iter().map(|group| group.effective_parameters).sum();
+            self.state.alpha = bounded((gamma - further) / (2.0 * squares[0]));
+            for (group, squares) in self.state.further.iter_mut().zip(&squares[1..]) {
+                group.alpha = bounded(group.effective_parameters / (2.0 * squares));
+            }
+        }
         self.state.beta = bounded(determined / (2.0 * self.mse * self.errors));
+    }
+
+    /// Sums over the classes of each group.
+    fn by_group<T: Copy>(&self, classes: PerClass<T>, value: impl Fn(T) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; 1 + self.state.further.len()];
+        for (group, class) in self.group_of.values().into_iter().zip(classes.values()) {
+            sums[group] += value(class);
+        }
+        sums
+    }
+
+    /// Measures γ at the present weights; it keeps its value if rounding hides the trace.
+    fn measure_effective_parameters(&mut self, mlp: &Mlp) {
+        let BayesianState { alpha, beta, .. } = self.state;
+        if self.state.further.is_empty() {
+            if let Some(trace) = self.equations.trace_of_inverse(mlp, alpha / beta) {
+                let weights = self.step.len() as f64;
+                self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
+            }
+            return;
+        }
+        let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
+        let Some(traces) = self.equations.traces_of_inverse(mlp, decays) else {
+            return;
+        };
+        let sizes = self.by_group(class_sizes(mlp.shape()), |size| size as f64);
+        let decayed = decays.times(traces);
+        let decayed = self.by_group(decayed, |decayed| decayed);
+        let groups: Vec<f64> = sizes
+            .iter()
+            .zip(decayed)
+            .map(|(size, decayed)| (size - decayed).clamp(0.0, *size))
+            .collect();
+        for (group, effective) in self.state.further.iter_mut().zip(&groups[1..]) {
+            group.effective_parameters = *effective;
+        }
+        self.state.effective_parameters = groups.iter().sum();
     }
 
     /// The present error with the gradient of F / (β n).
     fn regularized(&self, mlp: &Mlp) -> Evaluation {
-        let decay = self.state.alpha / self.state.beta;
+        let beta = self.state.beta;
+        let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
         Evaluation {
             mse: self.mse,
-            gradient_norm: 2.0 * self.equations.gradient_length(mlp, decay) / self.errors,
+            gradient_norm: 2.0 * self.equations.gradient_length(mlp, Decay::new(decays, &self.means)) / self.errors,
         }
     }
 }
@@ -184,14 +289,22 @@ impl Algorithm for BayesianRegularization {
         let mut equations = FactoredEquations::factored(mlp.shape(), examples);
         let evaluation = equations.gather(mlp, examples);
         let weights = mlp.weights().len();
+        let group_of = settings.group_of_classes();
         let mut method = Self {
             damping: settings.damping(),
+            group_of,
+            means: if settings.groups < 2.0 {
+                Vec::new()
+            } else {
+                examples.target_means()
+            },
             correlation_epoch: settings.correlation_epoch as usize,
             state: BayesianState {
                 mu: settings.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
+                further: Vec::new(),
                 epochs: 0,
                 correlation_time: None,
             },
@@ -201,35 +314,54 @@ impl Algorithm for BayesianRegularization {
             step: vec![0.0; weights],
             candidate: mlp.clone(),
         };
+        method.state.further = {
+            let sizes = class_sizes(mlp.shape()).values();
+            let classes = group_of.values().into_iter().zip(sizes);
+            let size = |group| {
+                classes
+                    .clone()
+                    .filter(|(of, _)| *of == group)
+                    .map(|(_, size)| size as f64)
+                    .sum()
+            };
+            (1..settings.groups as usize)
+                .map(|group| GroupState {
+                    alpha: 1.0,
+                    effective_parameters: size(group),
+                })
+                .collect()
+        };
         method.update_weighting(mlp);
         let evaluation = method.regularized(mlp);
         (method, evaluation)
     }
 
     fn restore(&mut self, state: BayesianState) {
-        self.state = state;
+        let groups = std::mem::replace(&mut self.state, state);
+        // A state has as many groups as the settings it was saved with, unless it is damaged.
+        let missing = groups.further.get(self.state.further.len()..).unwrap_or_default();
+        self.state.further.extend_from_slice(missing);
+        self.state.further.truncate(groups.further.len());
     }
 
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let weighting = self.state.clone();
-        let BayesianState { alpha, beta, .. } = weighting;
-        let objective = weighting.objective(self.mse, self.errors, mlp);
+        let (beta, prior) = (weighting.beta, (self.group_of, &self.means[..]));
+        let alphas = weighting.decays(self.group_of);
+        let objective = weighting.objective(self.mse, self.errors, mlp, prior);
         self.mse = self.damping.search(&mut self.state.mu, |mu| {
-            let damping = (mu + alpha) / beta;
+            let damping = alphas.map(|alpha| (mu + alpha) / beta);
+            let decay = Decay::new(alphas.map(|alpha| alpha / beta), prior.1);
             self.equations
-                .solve_with_decay(mlp, examples, damping, alpha / beta, &mut self.step)?;
+                .solve_with_decay(mlp, examples, damping, decay, &mut self.step)?;
             add_step(&mut self.candidate, mlp, &self.step);
             let mse = self.equations.mse(&self.candidate, examples);
             // False for NaN.
-            (weighting.objective(mse, self.errors, &self.candidate) < objective).then_some(mse)
+            (weighting.objective(mse, self.errors, &self.candidate, prior) < objective).then_some(mse)
         })?;
         std::mem::swap(mlp, &mut self.candidate);
         self.equations.gather(mlp, examples);
-        // γ keeps its value if rounding hides the trace.
-        if let Some(trace) = self.equations.trace_of_inverse(mlp, alpha / beta) {
-            let weights = self.step.len() as f64;
-            self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
-        }
+        self.measure_effective_parameters(mlp);
         self.state.epochs += 1;
         if self.state.epochs == self.correlation_epoch {
             self.state.correlation_time = Some(correlation_time(mlp, examples, LARGEST_LAG));
@@ -307,5 +439,49 @@ mod tests {
         assert!(measured < 0.9 * never, "{measured} {never}");
         let (never, measured) = (effective_parameters(0.0, 0.0), effective_parameters(0.0, 20.0));
         assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
+    }
+
+    /// Readings that tell nothing: what is left to answer is the mean of the targets, wherever their zero lies, and that
+    /// takes no parameter from the data.
+    #[test]
+    fn a_network_that_is_told_nothing_answers_the_mean() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let inputs = Array2::from_shape_fn((20, 3), |_| rng.random_range(-1.0..1.0));
+        let targets = Array2::from_shape_fn((20, 2), |(_, output)| rng.random_range(-0.3..0.3) + [0.6, -0.4][output]);
+        let mean = targets.mean_axis(ndarray::Axis(0)).unwrap();
+        let shape = Shape {
+            inputs: 3,
+            hidden: 6,
+            outputs: 2,
+        };
+        let spread_of = |groups: f64| {
+            let settings = TrainingSettings {
+                method: Method::BayesianRegularization(RegularizationSettings {
+                    groups,
+                    ..RegularizationSettings::default()
+                }),
+                stopping: StoppingRules {
+                    epochs: 200,
+                    ..StoppingRules::default()
+                },
+            };
+            let problem = Problem {
+                training: Examples::new(inputs.view(), targets.view()),
+                validation: None,
+                test: None,
+            };
+            let start = nguyen_widrow(shape, &mut ChaCha8Rng::seed_from_u64(1));
+            let mut trainer = Trainer::new(start, problem, settings).unwrap();
+            while trainer.step().is_none() {}
+            assert_eq!(
+                trainer.best().weights(),
+                trainer.present().weights(),
+                "the latest is the best"
+            );
+            let answers = trainer.best().forward(inputs.view()) - &mean;
+            answers.iter().fold(0.0, |largest: f64, off| largest.max(off.abs()))
+        };
+        assert!(spread_of(4.0) < 0.02, "{}", spread_of(4.0));
+        assert!(spread_of(1.0) > 0.05, "{}", spread_of(1.0));
     }
 }

@@ -87,6 +87,17 @@ impl Examples {
         (self.samples * self.outputs) as f64
     }
 
+    /// Mean of each target.
+    pub(super) fn target_means(&self) -> Vec<f64> {
+        let sum = |index| -> f64 {
+            let blocks = self.blocks().iter();
+            blocks.flat_map(|block| column(block.targets.as_ref(), index)).sum()
+        };
+        (0..self.outputs)
+            .map(|index| sum(index) / self.samples.max(1) as f64)
+            .collect()
+    }
+
     pub(super) fn blocks(&self) -> &[Block] {
         &self.data.blocks
     }

@@ -11,6 +11,7 @@ use super::{
     output_layer::{OutputLayer, ridge},
     products::Products,
     schur::SchurComplement,
+    weight_classes::{Decay, PerClass},
 };
 use crate::{
     network::{Mlp, Shape},
@@ -98,10 +99,20 @@ impl NormalEquations<SchurComplement> {
     /// the arithmetic.
     pub(in crate::training) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
         let (sums, v) = (self.products.sums(), output_weights(mlp));
+        let damping = PerClass::all(damping);
         self.elimination.factor(sums, damping)?;
         self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
         let trace = self.solver.trace_of_inverse(&mut self.elimination, v);
         trace.is_finite().then_some(trace)
+    }
+
+    /// As [`Self::trace_of_inverse`], the part of each class of weights, which each have their damping.
+    pub(in crate::training) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: PerClass) -> Option<PerClass> {
+        let (sums, v) = (self.products.sums(), output_weights(mlp));
+        self.elimination.factor(sums, damping)?;
+        self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
+        let traces = self.solver.traces_of_inverse(&mut self.elimination, v);
+        traces.values().iter().all(|trace| trace.is_finite()).then_some(traces)
     }
 }
 
@@ -141,17 +152,17 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         mu: f64,
         step: &mut [f64],
     ) -> Option<()> {
-        self.solve_with_decay(mlp, examples, mu, 0.0, step)
+        self.solve_with_decay(mlp, examples, PerClass::all(mu), Decay::NONE, step)
     }
 
-    /// As [`Self::solve`], with `decay`·Σw² added to the sum of squared errors: solves
+    /// As [`Self::solve`], with `decay`·Σw² of each class added to the sum of squared errors: solves
     /// `(JᵀJ + damping·I) δ = −(Jᵀe + decay·w)`. The `damping` includes the `decay`.
     pub(in crate::training) fn solve_with_decay(
         &mut self,
         mlp: &Mlp,
         examples: &Examples,
-        damping: f64,
-        decay: f64,
+        damping: PerClass,
+        decay: Decay<'_>,
         step: &mut [f64],
     ) -> Option<()> {
         let sums = self.products.sums();
@@ -172,13 +183,13 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         step: &mut [f64],
     ) -> Option<()> {
         let sums = self.products.sums();
-        self.elimination.factor(sums, ridge(&sums.g))?;
+        self.elimination.factor(sums, PerClass::all(ridge(&sums.g)))?;
         let gradient = sums.gradient_w.col_iter().flat_map(|column| column.iter());
         self.right
             .iter_mut()
             .zip(gradient)
             .for_each(|(right, gradient)| *right = *gradient);
-        self.solve_for_hidden(mlp, examples, mu)?;
+        self.solve_for_hidden(mlp, examples, PerClass::all(mu))?;
         let shape = mlp.shape();
         let right = MatRef::from_column_major_slice(&self.right, shape.inputs + 1, shape.hidden);
         write_negative(right, step);
@@ -186,7 +197,7 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     }
 
     /// Replaces the right-hand side of the hidden layer by its solution.
-    fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: f64) -> Option<()> {
+    fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: PerClass) -> Option<()> {
         let system = System {
             mlp,
             examples,
@@ -198,19 +209,26 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     }
 
     /// Returns the length of Jᵀe + decay·w from the products last gathered.
-    pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: f64) -> f64 {
+    pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: Decay<'_>) -> f64 {
         let (w, v) = mlp.layers();
+        let Shape { inputs, hidden, .. } = mlp.shape();
         // By `hypot`, since the squares overflow where the error weighs next to nothing against the weights.
-        let length = |gradient: MatRef<'_, f64>, weights: &[f64]| -> f64 {
+        let length = |gradient: MatRef<'_, f64>, weights: &[f64], pull: &dyn Fn(usize, usize, f64) -> f64| -> f64 {
             let weights = MatRef::from_row_major_slice(weights, gradient.nrows(), gradient.ncols());
-            let columns = gradient.col_iter().zip(weights.col_iter());
-            columns
-                .flat_map(|(gradient, weights)| gradient.iter().zip(weights.iter()))
-                .map(|(gradient, weight)| gradient + decay * weight)
-                .fold(0.0, f64::hypot)
+            let columns = gradient.col_iter().zip(weights.col_iter()).enumerate();
+            let entries = columns.flat_map(|(column, (gradient, weights))| {
+                let entries = gradient.iter().zip(weights.iter()).enumerate();
+                entries.map(move |(row, (gradient, weight))| gradient + pull(row, column, *weight))
+            });
+            entries.fold(0.0, f64::hypot)
         };
-        let w = length(self.products.sums().gradient_w.as_ref(), w);
-        w.hypot(length(self.products.sums().gradient_v.as_ref(), v))
+        let sums = self.products.sums();
+        let w = length(sums.gradient_w.as_ref(), w, &|row, _, weight| {
+            decay.pull_in_hidden((row, inputs), weight)
+        });
+        w.hypot(length(sums.gradient_v.as_ref(), v, &|row, column, weight| {
+            decay.pull_in_output((row, hidden), column, weight)
+        }))
     }
 
     /// Gives `mlp` the output layer of least squared error for its hidden layer; `None` if there is none in the
@@ -222,8 +240,10 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
 
 #[cfg(test)]
 mod tests {
+    use faer::linalg::solvers::DenseSolveCore;
+
     use super::{
-        super::dense::{DampedLeastSquares, distance},
+        super::dense::{DampedLeastSquares, distance, errors, jacobian},
         *,
     };
     use crate::training::{
@@ -297,6 +317,65 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Decay that differs between the classes of weights, of output biases towards values of their own, beside the matrix
+    /// written out.
+    #[test]
+    fn every_class_of_weights_decays_at_its_own_rate() {
+        let (inputs, hidden, outputs) = (5, 4, 3);
+        let (mlp, examples) = (
+            random_mlp(inputs, hidden, outputs, 1),
+            random_examples(300, inputs, outputs, 2),
+        );
+        let rates = PerClass {
+            hidden_weights: 0.3,
+            hidden_biases: 7.0,
+            output_weights: 0.05,
+            output_biases: 40.0,
+        };
+        let (biases, damping) = ([0.5, -0.3, 0.1], rates.map(|rate| rate + 0.2));
+        let class = |weight: usize| match weight {
+            0..20 => 0,
+            20..24 => 1,
+            24..36 => 2,
+            _ => 3,
+        };
+        let (jacobian, errors) = (jacobian(&mlp, &examples), errors(&mlp, &examples));
+        let mut matrix = jacobian.transpose() * &jacobian;
+        let mut right = jacobian.transpose() * &errors;
+        for (index, weight) in mlp.weights().iter().enumerate() {
+            matrix[(index, index)] += damping.values()[class(index)];
+            let towards = if index < 36 { 0.0 } else { biases[index - 36] };
+            right[(index, 0)] += rates.values()[class(index)] * (weight - towards);
+        }
+        let inverse = matrix.partial_piv_lu().inverse();
+        let step = &inverse * &right;
+
+        let mut equations = NormalEquations::factored(mlp.shape(), &examples);
+        equations.gather(&mlp, &examples);
+        let (decay, mut ours) = (Decay::new(rates, &biases), vec![0.0; mlp.weights().len()]);
+        equations
+            .solve_with_decay(&mlp, &examples, damping, decay, &mut ours)
+            .unwrap();
+        let expected: Vec<f64> = (0..ours.len()).map(|index| -step[(index, 0)]).collect();
+        assert!(distance(&ours, &expected) < 1e-11, "{:e}", distance(&ours, &expected));
+        let length = equations.gradient_length(&mlp, decay);
+        assert!((length / right.norm_l2() - 1.0).abs() < 1e-12, "{length}");
+        let traces = equations.traces_of_inverse(&mlp, damping).unwrap().values();
+        let mut expected = [0.0; 4];
+        (0..ours.len()).for_each(|index| expected[class(index)] += inverse[(index, index)]);
+        for (ours, expected) in traces.iter().zip(expected) {
+            assert!((ours / expected - 1.0).abs() < 1e-11, "{traces:?}, {expected:?}");
+        }
+        let whole = equations.trace_of_inverse(&mlp, 0.7).unwrap();
+        let parts: f64 = equations
+            .traces_of_inverse(&mlp, PerClass::all(0.7))
+            .unwrap()
+            .values()
+            .iter()
+            .sum();
+        assert!((whole / parts - 1.0).abs() < 1e-13);
     }
 
     /// Enough samples that they are divided into parts.
