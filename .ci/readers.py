@@ -158,7 +158,11 @@ def check_c(network, precision):
         for optimisation in ["-O0", "-O2"]:
             run(compiler, *FLAGS, optimisation, *sources, "-lm", "-o", folder / "selftest")
             found = re.search(r"largest deviation: (\S+)", run(folder / "selftest"))
-            note = f"bound {report['error_bound_mm']:.2g} mm" if precision == "fixed16" else ""
+            note = ""
+            if "error_bound_mm" in report:
+                note = f"bound {report['error_bound_mm']:.2g} mm"
+            elif "error_bounds" in report:
+                note = "bounds " + ", ".join(f"{bound['bound']:.2g} {bound['unit']}" for bound in report["error_bounds"])
             show(network, f"c99 {precision}", f"{compiler} {optimisation}", float(found.group(1)), limit, note)
     run("g++" if precision != "fixed16" else "gcc", "-fsyntax-only", "-x", "c++", folder / next(folder.glob("*.h")).name)
     symbols = run("gcc", *FLAGS, "-c", next(folder.glob("*_decode.c")), "-o", folder / "decode.o") + run("nm", folder / "decode.o")

@@ -125,10 +125,48 @@ fn every_format_is_verified_and_says_names_units_and_rows() {
         fs::read(path.join(format!("{network}.csv"))).unwrap()
     };
     assert_eq!(decode("copy.json"), decode("n.json"));
-    let output = decoupler("export --network n.json --format c99 --precision fixed16 --out f", path);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(
-        message.contains("reads values in other units") && !path.join("f").exists(),
-        "{message}"
-    );
+}
+
+/// The golden vectors, rounded to the units that the header defines, are answered within the bound of each target by the
+/// program's own model, and where there is a compiler by the compiled source.
+#[test]
+fn whole_numbers_have_units_of_their_own_for_each_column() {
+    for rows in ["", "--rows known"] {
+        let folder = trained(rows);
+        let report = export("--format c99 --precision fixed16 --out whole", folder.path());
+        let limit = report["limit"].as_f64().unwrap();
+        assert!(
+            report["deviation"].as_f64().unwrap() <= limit && limit < 0.02,
+            "{report}"
+        );
+        let bounds = report["error_bounds"].as_array().unwrap();
+        let of_target = |index: usize| {
+            (
+                &bounds[index]["name"],
+                &bounds[index]["unit"],
+                bounds[index]["bound"].as_f64(),
+            )
+        };
+        let ((force, newton, of_force), (torque, _, of_torque)) = (of_target(0), of_target(1));
+        assert_eq!(
+            (force, newton, torque),
+            (&"force".into(), &"N".into(), &"torque".into())
+        );
+        // Ranges of 4000 N and 0.002 N·m.
+        assert!((4e3 * 1e-5..4e3 * 0.02).contains(&of_force.unwrap()), "{bounds:?}");
+        assert!((2e-3 * 1e-5..2e-3 * 0.02).contains(&of_torque.unwrap()), "{bounds:?}");
+        let header = fs::read_to_string(folder.path().join("whole/whole_decode.h")).unwrap();
+        let units = |name: &str| -> Vec<f64> {
+            let line = header.lines().find(|line| line.contains(name)).unwrap();
+            let list = line.split_once('{').unwrap().1.trim_end_matches(['}', ' ']);
+            list.split(',').map(|unit| unit.trim().parse().unwrap()).collect()
+        };
+        // Readings up to 1000, 1.3 and 6, and a tenth of the range beside them, in 30 bits.
+        assert_eq!(units("WHOLE_READING_UNITS"), [1e-5, 1e-8, 1e-8]);
+        assert_eq!(units("WHOLE_TARGET_UNITS"), [1e-3, 1e-9]);
+        for expected in ["force (N)", "hall, a (µT)", "int32_t readings[WHOLE_CHANNELS]"] {
+            assert!(header.contains(expected), "{expected} in {header}");
+        }
+        assert!(!header.contains("ohm") && !header.contains("nm"), "{header}");
+    }
 }

@@ -24,7 +24,12 @@ struct Report<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     output_range_mm: Option<f64>,
     deviation_of_decode: f64,
+    /// In mm, of any coordinate of an array.
+    #[serde(skip_serializing_if = "Option::is_none")]
     error_bound_mm: Option<f64>,
+    /// Of each target of own data, in its unit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    error_bounds: Vec<Bound<'a>>,
     remarks: &'a [String],
 }
 
@@ -32,6 +37,13 @@ struct Report<'a> {
 struct File<'a> {
     name: &'a str,
     bytes: u64,
+}
+
+#[derive(Serialize)]
+struct Bound<'a> {
+    name: &'a str,
+    unit: Option<&'a str>,
+    bound: f64,
 }
 
 #[derive(Serialize)]
@@ -47,6 +59,12 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
         evaluator: check.evaluator,
         deviation: check.deviation,
     });
+    let bounds = report.bounds.iter().map(|(output, bound)| Bound {
+        name: &output.name,
+        unit: output.unit.as_deref(),
+        bound: *bound,
+    });
+    let is_array = report.output_range_mm.is_some();
     let printed = Report {
         path: &report.path,
         format: report.format.to_string(),
@@ -59,7 +77,8 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
         limit: report.limit,
         output_range_mm: report.output_range_mm,
         deviation_of_decode: report.program_deviation,
-        error_bound_mm: report.bound_mm,
+        error_bound_mm: report.bounds.first().filter(|_| is_array).map(|(_, bound)| *bound),
+        error_bounds: bounds.filter(|_| !is_array).collect(),
         remarks: &report.remarks,
     };
     let mut stdout = stdout().lock();
@@ -96,11 +115,8 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
         text += &format!("  decode of this program: {:.1e}\n", report.program_deviation);
         text += &format!("  limit: {:.1e}\n", report.limit);
     }
-    if let Some(bound_mm) = report.bound_mm {
-        text += &format!(
-            "Proven bound on the error in whole numbers: {} mm\n",
-            format_number(bound_mm)
-        );
+    if let Some(bounds) = report.describe_bounds() {
+        text += &format!("{bounds}\n");
     }
     for remark in &report.remarks {
         text += &format!("Note: {remark}.\n");

@@ -1,4 +1,4 @@
-//! What a recording tells, in the terminal.
+//! Findings on a recording, in the terminal.
 
 use clap::{
     Args,

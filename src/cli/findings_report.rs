@@ -82,7 +82,7 @@ struct Point {
     largest: f64,
 }
 
-/// How much the error of each target grows without a channel.
+/// Growth of the error of each target without a channel.
 #[derive(Serialize)]
 struct Worth<'a> {
     name: &'a str,

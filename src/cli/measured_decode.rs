@@ -112,7 +112,7 @@ pub(super) struct MeasuredAnswers<'a> {
     output: BufWriter<StdoutLock<'static>>,
 }
 
-/// What became of a line.
+/// Outcome of a line.
 pub(super) enum Answered {
     /// It was decoded.
     Yes,

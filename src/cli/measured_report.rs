@@ -20,7 +20,7 @@ use crate::{
     training::StopReason,
 };
 
-/// What is known of the samples.
+/// Everything known of the samples.
 #[derive(Serialize)]
 pub(super) struct Report {
     files: Vec<FileFound>,
@@ -123,13 +123,13 @@ impl Report {
     }
 }
 
-/// What is found once a network is trained.
+/// The judgement of a trained network.
 pub(super) struct Judged<'a> {
     pub(super) flaw: Option<&'a RunFlaw>,
     pub(super) wall_time: Option<Duration>,
     /// R² of each target on the test samples, with its interval.
     pub(super) told: Vec<Option<Determination>>,
-    /// What a random split hides.
+    /// Errors that a random split hides, in words.
     pub(super) flattery: Vec<String>,
 }
 

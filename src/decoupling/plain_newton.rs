@@ -31,7 +31,7 @@ pub(super) struct PlainNewton {
     /// False if a row is never solved by plain steps alone.
     is_fit: bool,
     twins: Twins,
-    /// Where to start, for each row-wire that was read.
+    /// Start for each row-wire that was read.
     starts: Vec<Option<AffineStart>>,
     conductance: RowConductance,
     displacements_mm: Vec<DVec3>,

@@ -17,8 +17,7 @@ use crate::{
 pub enum NoReference {
     /// The posterior of a row did not converge.
     NotConverged,
-    /// What the readings leave unknown is decided by how they are rounded, of which no more is known than the order of
-    /// magnitude.
+    /// The rounding of the readings decides which part stays unknown, and no more is known of it than the order of magnitude.
     Rounding,
 }
 

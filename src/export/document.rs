@@ -28,7 +28,7 @@ pub enum DocumentKind {
     MeasuredNetwork,
     /// A training on measured samples to be resumed: [`super::MeasuredCheckpointFile`].
     MeasuredCheckpoint,
-    /// How measured samples are made of files: [`super::RecipeFile`].
+    /// A recipe by which measured samples are made of files: [`super::RecipeFile`].
     Recipe,
     /// A sensor model: [`super::SensorFile`].
     Sensor,

@@ -17,7 +17,7 @@ const QUANTITIES: [fn(&EpochRecord) -> Option<f64>; 6] = [
 pub struct EpochOutline {
     /// Of all stretches one after the other; the last is still open.
     kept: Vec<EpochRecord>,
-    /// Where each stretch begins in `kept`.
+    /// Begin of each stretch in `kept`.
     begins: Vec<usize>,
     /// Number of epochs in a stretch, and of those taken into the open one.
     stretch: usize,

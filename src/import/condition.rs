@@ -21,7 +21,7 @@ pub(super) struct Comparison {
     pub(super) number: f64,
 }
 
-/// How a cell compares with the number.
+/// Relation of a cell to the number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Relation {
     Less,

@@ -82,7 +82,7 @@ pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -
     })
 }
 
-/// How well a choice of separators fits.
+/// Fit of a choice of separators.
 struct Score {
     /// Commonest number of cells in a row.
     width: usize,

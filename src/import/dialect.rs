@@ -71,7 +71,7 @@ pub struct Dialect {
     pub carriage_returns: bool,
 }
 
-/// What the user says of a file's layout; the rest is found from its beginning.
+/// The user's word on a file's layout; the rest is found from its beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DialectChoice {

@@ -191,7 +191,7 @@ impl Recipe {
     }
 }
 
-/// What is to be known of the files themselves.
+/// Notes on the files themselves.
 fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
     let mut notes = Vec::new();
     for (path, table) in files {

@@ -18,7 +18,7 @@ pub struct Inspection {
     pub columns: Vec<ColumnSummary>,
     /// Intervals of the column of times, if there is one.
     pub time: Option<TimeSummary>,
-    /// What the user should look at.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 

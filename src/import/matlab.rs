@@ -17,7 +17,7 @@ const BLOCK: usize = 1 << 20;
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
 
-/// What an element of a file is.
+/// Tag of an element of a file.
 struct Tag {
     kind: u32,
     size: usize,

@@ -10,7 +10,7 @@ use crate::dataset::{Dataset, Division, Seed, Split, SplitBy, Stream};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// How samples are made of the files.
+    /// Recipe by which samples are made of the files.
     pub import: Recipe,
     /// Files of the test samples; without them a part of the samples tests.
     #[serde(default, skip_serializing_if = "Option::is_none")]

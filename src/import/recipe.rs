@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Condition, DialectChoice, Missing};
 
-/// How samples are made of files: what to read, what to join, and what each column means.
+/// A recipe by which samples are made of files: those to read, those to join, and the meaning of each column.
 ///
 /// A column is named as in the header, or c1, c2, … where there is none; `c2..c16` is a range; the columns of a joined
 /// file have its stem in front, as in `states.c2`. Columns that are not named are not used.

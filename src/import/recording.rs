@@ -25,7 +25,7 @@ pub struct Recording {
     pub dropped: Vec<Dropped>,
     /// The files read: the first, then those joined.
     pub files: Vec<FileReport>,
-    /// What the user should look at.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -64,11 +64,11 @@ pub struct FileReport {
     pub columns: usize,
     /// Rows that end before the last column.
     pub too_short: Excess,
-    /// How it was joined; `None` for the first file and for files joined row by row.
+    /// The join by time; `None` for the first file and for files joined row by row.
     pub join: Option<JoinReport>,
 }
 
-/// How a file was joined by time.
+/// Outcome of a join by time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct JoinReport {
     /// Largest time between partners, in the unit of the times.

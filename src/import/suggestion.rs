@@ -214,7 +214,7 @@ fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
     }
 }
 
-/// How much the name of a file speaks for targets: negative for readings.
+/// Points of a file's name for targets: negative for readings.
 fn score_of_file(path: &Path) -> i32 {
     let name = stem(path).to_lowercase();
     let targets = TARGET_WORDS

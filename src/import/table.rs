@@ -13,7 +13,7 @@ pub struct Table {
     pub rows: usize,
     /// Kind of the file.
     pub format: Format,
-    /// What a reader of the table should know: rows of other lengths, arrays left out.
+    /// Notes for a reader of the table: rows of other lengths, arrays left out.
     pub notes: Vec<String>,
     /// Rows of the file that are not in the table, because they have more cells than there are columns.
     pub too_long: Excess,

@@ -12,7 +12,7 @@ use crate::{
 /// Terms that belong together.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// What they are about.
+    /// Their subject.
     pub heading: &'static str,
     /// In the order of the pipeline.
     pub terms: Vec<Term>,

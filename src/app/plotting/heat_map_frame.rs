@@ -1,4 +1,4 @@
-//! What surrounds the cells of a heat map: names of rows and columns, and the scale of colours.
+//! The frame of a heat map: names of rows and columns, and the scale of colours.
 
 use std::f32::consts::FRAC_PI_2;
 

@@ -25,9 +25,9 @@ pub struct DrawnPlot<'a> {
     pub plot: &'a Plot,
     /// True while the pointer is over it.
     pub has_pointer: bool,
-    /// What the point or bar under the pointer stands for.
+    /// Meaning of the point or bar under the pointer.
     pub hovered: Option<usize>,
-    /// What a point or bar that was just clicked stands for.
+    /// Meaning of a point or bar that was just clicked.
     pub clicked: Option<usize>,
     transform: PlotTransform,
 }
@@ -39,7 +39,7 @@ impl DrawnPlot<'_> {
         Some(self.transform.position_from_point(&Place::new(x, y)))
     }
 
-    /// What stands for something at a point of the screen: the bar over it, or the nearest point in reach.
+    /// Meaning of a point of the screen: the bar over it, or the nearest point in reach.
     fn item_at(&self, at: Pos2) -> Option<usize> {
         /// Distance within which the pointer is at a point.
         const REACH: f32 = 12.0;

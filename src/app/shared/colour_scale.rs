@@ -56,7 +56,7 @@ pub fn colour_scale_ui(
     }
 }
 
-/// What can be chosen of a scale; changes `look`.
+/// The choices that a scale offers; changes `look`.
 fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) {
     let theme = Theme::of(ui);
     if scale.quantity.is_diverging() {

@@ -11,7 +11,7 @@ use crate::{
 /// A training as far as the window knows it.
 #[derive(Debug)]
 pub struct RunView {
-    /// Which it is.
+    /// Its identity.
     pub id: RunId,
     /// Settings it is trained with.
     pub settings: SimulatedSettings,

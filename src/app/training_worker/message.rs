@@ -99,7 +99,7 @@ impl RunId {
 /// Facts known when a training begins.
 #[derive(Debug)]
 pub struct Began {
-    /// Which it is.
+    /// Its identity.
     pub id: RunId,
     /// Settings asked for.
     pub settings: SimulatedSettings,

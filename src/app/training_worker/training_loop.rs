@@ -42,7 +42,7 @@ pub(super) struct TrainingLoop<'a> {
     test: Option<TestView>,
     /// Networks of its past epochs.
     past: PastNetworks,
-    /// Which training `run` is.
+    /// Identity of the training `run`.
     id: Option<RunId>,
     is_paused: bool,
     /// True once the window was told the result of the run that is to be kept.

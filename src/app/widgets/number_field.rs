@@ -30,7 +30,7 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
     }
 }
 
-/// What was typed and could not be taken, with the reason.
+/// Text that was typed and could not be taken, with the reason.
 #[derive(Clone, Debug, PartialEq)]
 struct Refusal {
     reason: String,

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::app::shared::{Action, Effect, Offers};
 
-/// What lies over the window for a moment.
+/// A card that lies over the window for a moment.
 #[derive(Debug, Default)]
 pub(super) enum Overlay {
     /// Nothing.

@@ -58,7 +58,7 @@ impl DecouplerWindow {
     }
 }
 
-/// What a right click on a part of the window offers: to copy the value under the pointer, and the pictures and tables of
+/// The menu at a right click on a part of the window: to copy the value under the pointer, and the pictures and tables of
 /// the view on show.
 pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
     let id = Id::unique("value to copy");

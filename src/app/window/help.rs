@@ -35,7 +35,7 @@ pub(super) enum Page {
 #[derive(Debug, Default)]
 pub(super) struct Help {
     pub(super) page: Page,
-    /// What the terms on show contain.
+    /// Text that the terms on show contain.
     pub(super) typed: String,
 }
 

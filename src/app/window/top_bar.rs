@@ -19,7 +19,7 @@ const NARROW: f32 = 1000.0;
 pub(super) const LIGHT: &str = "Light theme";
 pub(super) const DARK: &str = "Dark theme";
 
-/// What the user reaches for in the top bar.
+/// Click of the user in the top bar.
 pub(super) enum Reach {
     /// The view in this place.
     View(usize),

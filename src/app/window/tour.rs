@@ -13,7 +13,7 @@ use crate::app::{
 struct Step {
     title: &'static str,
     text: &'static str,
-    /// What it is about, which is ringed.
+    /// Its subject, which is ringed.
     landmark: Landmark,
     /// Name of the action that a button does.
     action: Option<&'static str>,

@@ -47,7 +47,7 @@ impl Row {
         pairs.join("\n")
     }
 
-    /// What the table of results is compared by: options and result.
+    /// The part by which tables of results are compared: options and result.
     pub(super) fn compared(&self) -> String {
         format!("{}\n{}", self.key(), sorted(&self.result))
     }

@@ -7,7 +7,7 @@ pub(super) struct Marginal {
     pub(super) mean: f64,
     pub(super) variance: f64,
     pub(super) range: Range,
-    /// What all says of the unknown but its range, to which it is cut.
+    /// Everything said of the unknown but its range, to which it is cut.
     pub(super) seen: Factor,
     /// Factor that stands for the range.
     pub(super) factor: Factor,

@@ -12,7 +12,7 @@ pub(super) struct Site<'a> {
     /// Variance of what is added to the unknown before it meets the range.
     noise: f64,
     pub(super) factor: Factor,
-    /// What the other factors and the equations say of the unknown.
+    /// The word of the other factors and of the equations on the unknown.
     seen: Factor,
     /// Moments of that within the range.
     moments: Moments,

@@ -42,7 +42,7 @@ pub struct TakagiSugeno {
     consequents: Array2<f64>,
     /// The middle of every target, which constant ones keep.
     middles: Vec<f64>,
-    /// Which targets vary.
+    /// The targets that vary.
     varying: Vec<usize>,
     /// Centred channels and a 1.
     values: Vec<f64>,

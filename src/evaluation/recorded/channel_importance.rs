@@ -7,7 +7,7 @@ use crate::{
     evaluation::{RunError, RunSettings},
 };
 
-/// How much the error of each target grows without a channel.
+/// Growth of the error of each target without a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelImportance {
     /// Channel, from 0.

@@ -13,7 +13,7 @@ pub struct Determination {
     pub units: usize,
 }
 
-/// How well readings tell a target.
+/// Degrees to which readings tell a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// Neither of the others.
@@ -80,7 +80,7 @@ impl Determination {
         })
     }
 
-    /// How well the readings tell the target.
+    /// Returns the degree to which the readings tell the target.
     pub fn standing(&self) -> Standing {
         if self.r2.value < 0.1 || self.r2.low <= 0.0 {
             Standing::NotTold

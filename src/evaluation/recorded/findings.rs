@@ -9,22 +9,22 @@ use crate::{
     evaluation::{CrossValidated, RunError, RunSettings},
 };
 
-/// What a recording tells: of each target, by each channel, and with more samples.
+/// Findings on a recording: of each target, by each channel, and with more samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// Model behind [`Self::importance`] and the learning curves.
     pub model: FittedModel,
-    /// What the readings tell of each target.
+    /// Findings on each target.
     pub targets: Vec<TargetFindings>,
     /// Constant, duplicated and saturated channels.
     pub remarks: Vec<ChannelRemark>,
-    /// What each channel is worth; empty if there is only one.
+    /// Worth of each channel; empty if there is only one.
     pub importance: Vec<ChannelImportance>,
-    /// What a random split would hide; `None` without networks.
+    /// Errors that a random split would hide; `None` without networks.
     pub comparison: Option<SplitComparison>,
 }
 
-/// What a recording tells of one target.
+/// Findings on one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFindings {
     /// R² of the network; `None` without networks, or for a constant target.

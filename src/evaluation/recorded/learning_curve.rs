@@ -14,7 +14,7 @@ pub struct LearningCurve {
     pub points: Vec<LearningPoint>,
     /// The law fitted to them; `None` with fewer than three numbers.
     pub law: Option<PowerLaw>,
-    /// What twice the training samples would bring; `None` without a law.
+    /// Gain from twice the training samples; `None` without a law.
     pub doubling: Option<Doubling>,
 }
 

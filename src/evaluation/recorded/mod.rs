@@ -1,4 +1,4 @@
-//! What recorded readings can tell: of each target, by each channel, and with more samples.
+//! Judges recordings by the knowledge in them: of each target, by each channel, and with more samples.
 //!
 //! Everything is judged on held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and every
 //! figure has a 95 % confidence interval from resampling blocks or groups of samples, because neighbouring samples of a

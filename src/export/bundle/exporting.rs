@@ -49,11 +49,11 @@ pub fn export_bundle<'a>(
     match precision {
         BundlePrecision::Fixed16 => bundle.export_fixed(path),
         BundlePrecision::Double => {
-            let vectors = bundle.vectors(|ohm| ohm)?;
+            let vectors = bundle.vectors(|_, reading| reading)?;
             bundle.export_floating(path, Arithmetic::DOUBLE, &vectors)
         }
         BundlePrecision::Single => {
-            let vectors = bundle.vectors(|ohm| Digits::Single.round(ohm))?;
+            let vectors = bundle.vectors(|_, reading| Digits::Single.round(reading))?;
             let arithmetic = single_arithmetic(&bundle.portable, &vectors);
             bundle.export_floating(path, arithmetic, &vectors)
         }
@@ -90,7 +90,7 @@ fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<Bun
         limit: 0.0,
         output_range_mm: portable.output_range_mm(),
         program_deviation: 0.0,
-        bound_mm: None,
+        bounds: Vec::new(),
         remarks: Vec::new(),
     })
 }
@@ -120,7 +120,7 @@ struct Bundle<'a> {
 }
 
 impl Bundle<'_> {
-    fn vectors(&self, representable: impl Fn(f64) -> f64) -> Result<Vectors, BundleError> {
+    fn vectors(&self, representable: impl Fn(usize, f64) -> f64) -> Result<Vectors, BundleError> {
         Vectors::of(self.exported, &self.portable, representable)
     }
 
@@ -185,19 +185,17 @@ impl Bundle<'_> {
 
     fn export_fixed(self, path: &Path) -> Result<BundleReport, BundleError> {
         let fixed = FixedNetworks::of(&self.portable)?;
-        let unit_ohm = fixed.unit_ohm();
-        let vectors = self.vectors(|ohm| f64::from(fixed.reading(ohm)) * unit_ohm)?;
+        let vectors = self.vectors(|channel, reading| fixed.representable(channel, reading))?;
         // The bound holds for these.
         let vectors = vectors.inside(&self.portable);
-        let limit = fixed.bound_mm / fixed.range_mm;
+        let limit = fixed.relative_bound;
         let files = c99::write_fixed(&self.name, &self.portable, &fixed, vectors.golden(), limit);
         for (name, text) in files {
             self.folder.write(&name, text)?;
         }
-        let in_mm = |nm: Vec<i32>| nm.into_iter().map(|nm| f64::from(nm) * 1e-6).collect();
         let deviation = vectors.deviation(|vector| {
-            let coordinates_nm = fixed.decode(vector.network, &vector.readings);
-            coordinates_nm.map(in_mm).unwrap_or_default()
+            let outputs = fixed.decode(vector.network, &vector.readings);
+            outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
         let mut checks = vec![BundleCheck {
             evaluator: "bit-exact model in whole numbers",
@@ -210,9 +208,10 @@ impl Bundle<'_> {
         }
         if limit > USUAL_BOUND {
             remarks.push(format!(
-                "the error is only known to be below {:.0} % of the range of the outputs; train with noise (--noise) for a \
-                 network that amplifies rounding errors less",
-                100.0 * limit
+                "the error is only known to be below {:.0} % of the range of the outputs; {} for a network that amplifies \
+                 rounding errors less",
+                100.0 * limit,
+                self.portable.meaning.smaller_weights()
             ));
         }
         match run_self_test(self.folder.path(), &self.name)? {
@@ -263,7 +262,7 @@ impl Bundle<'_> {
             limit,
             output_range_mm: portable.output_range_mm(),
             program_deviation: vectors.program_deviation,
-            bound_mm: fixed.map(|fixed| fixed.bound_mm),
+            bounds: fixed.map_or_else(Vec::new, |fixed| portable.meaning.named(&fixed.bounds)),
             remarks,
         };
         self.folder

@@ -1,6 +1,6 @@
 use crate::{import::Channel, sensor::ArrayScale};
 
-/// What the readings and outputs of an exported network are, and the words for them in its files.
+/// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Meaning {
     /// Resistances of a row-wire of an array in ohm, and the coordinates of its nodes in mm.
@@ -30,7 +30,7 @@ impl Meaning {
         self.either("coordinate", "target")
     }
 
-    /// What is decoded at once.
+    /// The unit of decoding.
     pub(super) fn sample(&self) -> &'static str {
         self.either("one row-wire", "one sample")
     }
@@ -48,12 +48,17 @@ impl Meaning {
         ]
     }
 
-    /// To what deviations are relative.
+    /// Name of the range to which deviations are relative.
     pub(super) fn scale(&self) -> &'static str {
         self.either(
             "the widest range of a coordinate in training",
             "the range of the target in training",
         )
+    }
+
+    /// A way to train a network with smaller weights, which amplifies less.
+    pub(super) fn smaller_weights(&self) -> &'static str {
+        self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
     }
 
     fn either(&self, array: &'static str, own: &'static str) -> &'static str {
@@ -80,6 +85,17 @@ impl Meaning {
                 .map(|output| named(format!("{}_{}", ["x", "y", "z"][output % 3], output / 3 + 1), "mm"))
                 .collect(),
             Self::Own { targets, .. } => targets.clone(),
+        }
+    }
+
+    /// Figures of the outputs with their names and units: the largest of all coordinates, or that of each target.
+    pub(super) fn named(&self, figures: &[f64]) -> Vec<(Channel, f64)> {
+        match self {
+            Self::Array(_) => {
+                let largest = figures.iter().fold(0.0_f64, |largest, &figure| largest.max(figure));
+                vec![(named("any coordinate".to_owned(), "mm"), largest)]
+            }
+            Self::Own { targets, .. } => targets.iter().cloned().zip(figures.iter().copied()).collect(),
         }
     }
 

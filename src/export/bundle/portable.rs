@@ -19,7 +19,7 @@ use crate::network::{DecouplingNetwork, InputScaling, Quantity};
 #[derive(Clone, Debug)]
 pub(super) struct Portable {
     pub(super) quantity: Quantity,
-    /// What readings and outputs are.
+    /// Meaning of readings and outputs.
     pub(super) meaning: Meaning,
     /// Number of readings of a row, M4 of an array.
     pub(super) channels: usize,
@@ -28,8 +28,8 @@ pub(super) struct Portable {
     pub(super) outputs: usize,
     /// One for all row-wires, or one for each, from the first.
     pub(super) networks: Vec<PortableNetwork>,
-    /// What deviations of each output are relative to: the widest range of any in training for the coordinates of an array,
-    /// and its own range for a target of own data, as units differ.
+    /// Range to which deviations of each output are relative: the widest of any in training for the coordinates of an array,
+    /// and its own for a target of own data, as units differ.
     pub(super) scales: Vec<f64>,
 }
 
@@ -196,6 +196,13 @@ impl PortableNetwork {
             output_biases,
             range,
         }
+    }
+
+    /// Largest size of an output, whatever the activations.
+    pub(super) fn reach(&self, output: usize) -> f64 {
+        let weights = self.output_weights.column(output);
+        let of_weights: f64 = weights.iter().map(|weight| weight.to_f64().abs()).sum();
+        self.output_biases[output].to_f64().abs() + of_weights
     }
 
     fn is_finite(&self, quantity: Quantity) -> bool {

@@ -60,12 +60,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
                 .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)))
         );
     }
-    if let Some(bound_mm) = report.bound_mm {
-        let _ = writeln!(
-            text,
-            "Proven bound on the error of the whole numbers, for readings that are not out of range: {} mm.",
-            format_number(bound_mm)
-        );
+    if let Some(bounds) = report.describe_bounds() {
+        let _ = writeln!(text, "{bounds}.");
     }
     for remark in &report.remarks {
         let _ = writeln!(text, "Note: {remark}.");
@@ -122,7 +118,12 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
         BundleFormat::C99 => {
             let row = if takes_row { "1, " } else { "" };
             let (reading, readings, coordinate, coordinates) = match (fixed, report.precision) {
-                (Some(fixed), _) => ("int32_t", c99::readings(fixed), "int32_t", "coordinates_nm"),
+                (Some(fixed), _) => (
+                    "int32_t",
+                    c99::readings(portable, fixed),
+                    "int32_t",
+                    c99::outputs(portable),
+                ),
                 (None, BundlePrecision::Single) => ("float", input, "float", output),
                 (None, _) => ("double", input, "double", output),
             };
@@ -135,6 +136,13 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                 String::new()
             };
             let library = if fixed.is_some() { "" } else { " -lm" };
+            let units = match (fixed, meaning) {
+                (Some(_), Meaning::Own { .. }) => format!(
+                    "\nReadings and targets are whole numbers of the units {upper}_READING_UNITS and {upper}_TARGET_UNITS \
+                     in the header:\nround(reading / unit) goes in, and unit * number comes out."
+                ),
+                _ => String::new(),
+            };
             format!(
                 "    #include \"{name}_decode.h\"\n    \
                  {reading} {readings}[{upper}_CHANNELS];\n    \
@@ -142,7 +150,7 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                  int status = {name}_decode({row}{readings}, {coordinates});\n\n\
                  The status is {upper}_OK, or tells what is wrong. Compile {name}_decode.c with your program{libm}. The\n\
                  self-test compares the golden vectors:\n\n    \
-                 cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{range}",
+                 cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}",
                 libm = if library.is_empty() { "" } else { ", and link with -lm" },
             )
         }

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use super::choice::{BundleFormat, BundlePrecision};
+use crate::{export::format_number, import::Channel};
 
 /// Files that an export wrote, and how far they are from the network.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +25,8 @@ pub struct BundleReport {
     pub output_range_mm: Option<f64>,
     /// Deviation of `decode` of this program from the same exact answers, relative as [`Self::limit`].
     pub program_deviation: f64,
-    /// Proven bound on the error in fixed point, in mm.
-    pub bound_mm: Option<f64>,
+    /// Proven bounds on the errors in fixed point: of any coordinate of an array, or of each target; empty otherwise.
+    pub bounds: Vec<(Channel, f64)>,
     /// Remarks for the user, with cause and cure.
     pub remarks: Vec<String>,
 }
@@ -33,9 +34,9 @@ pub struct BundleReport {
 /// Numbers of readings of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VectorCounts {
-    /// With which the bundle was verified.
+    /// Number with which the bundle was verified.
     pub verified: usize,
-    /// Which it contains as golden vectors.
+    /// Number in the bundle, as golden vectors.
     pub golden: usize,
 }
 
@@ -49,6 +50,21 @@ pub struct BundleCheck {
 }
 
 impl BundleReport {
+    /// The sentence on [`Self::bounds`], if there are any.
+    pub fn describe_bounds(&self) -> Option<String> {
+        let bound = |(output, bound): &(Channel, f64)| {
+            let unit = output.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+            format!("{}{unit} ({})", format_number(*bound), output.name)
+        };
+        let bounds: Vec<String> = self.bounds.iter().map(bound).collect();
+        (!bounds.is_empty()).then(|| {
+            format!(
+                "Proven bound on the error of the whole numbers, for readings that are not out of range: {}",
+                bounds.join(", ")
+            )
+        })
+    }
+
     /// Largest deviation of all checks.
     pub fn deviation(&self) -> f64 {
         self.checks.iter().map(|check| check.deviation).fold(0.0, f64::max)

@@ -10,7 +10,9 @@ use super::{
     export_bundle,
     exported_network::ExportedNetwork,
     fixed_point::{FixedNetworks, HiddenWidth},
-    matlab, numpy, onnx,
+    matlab,
+    meaning::Meaning,
+    numpy, onnx,
     portable::Portable,
     vectors::Vectors,
     weights::{Arithmetic, Weights},
@@ -18,6 +20,7 @@ use super::{
 use crate::{
     evaluation::{Run, SimulatedSettings},
     export::NetworkFile,
+    import::Channel,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Noise, Rows},
 };
@@ -61,7 +64,7 @@ fn networks() -> Vec<(String, NetworkFile)> {
 fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
     for (name, file) in networks() {
         let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, |ohm| Arithmetic::SINGLE.rest.round(ohm)).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, |_, ohm| Arithmetic::SINGLE.rest.round(ohm)).unwrap();
         assert!(
             vectors.program_deviation < 1e-11,
             "{name}: {}",
@@ -84,7 +87,7 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
 fn coordinates_that_did_not_vary_come_out_exactly() {
     for (name, file) in networks() {
         let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, |ohm| ohm).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, |_, ohm| ohm).unwrap();
         for vector in vectors.all() {
             let outputs = file.network.at(vector.network).outputs();
             for coordinate in 0..portable.outputs {
@@ -103,7 +106,7 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
             (BundlePrecision::Double, Arithmetic::DOUBLE, 1e-12),
             (BundlePrecision::Single, Arithmetic::MIXED, 2e-5),
         ] {
-            let vectors = Vectors::of((&file).into(), &portable, |ohm| arithmetic.rest.round(ohm)).unwrap();
+            let vectors = Vectors::of((&file).into(), &portable, |_, ohm| arithmetic.rest.round(ohm)).unwrap();
             let metadata = ExportedNetwork::from(&file).metadata(&portable, precision);
             let bytes = onnx::write(&portable, &Weights::of(&portable, arithmetic), &metadata);
             let graph = onnx::OnnxGraph::read(&bytes).unwrap();
@@ -148,46 +151,73 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
     }
 }
 
+/// The same network of own data: readings that may have any sign, in volts or newtons for all that is known.
+fn own_data(array: &Portable) -> Portable {
+    let channels = |count| {
+        let named = |index| Channel {
+            name: format!("c{index}"),
+            unit: None,
+        };
+        (0..count).map(named).collect()
+    };
+    Portable {
+        quantity: Quantity::Raw,
+        meaning: Meaning::Own {
+            inputs: channels(array.channels),
+            targets: channels(array.outputs),
+            row_wires: Vec::new(),
+        },
+        ..array.clone()
+    }
+}
+
 /// Overflow panics in tests, so that nothing wraps unnoticed.
 #[test]
 fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    for (name, file) in networks() {
-        let portable = Portable::of((&file).into()).unwrap();
+    let arrays = networks()
+        .into_iter()
+        .map(|(name, file)| (name, Portable::of((&file).into()).unwrap()));
+    let mut all: Vec<(String, Portable)> = arrays.collect();
+    let own = all.iter().filter(|(_, array)| array.quantity == Quantity::Resistance);
+    let own: Vec<_> = own
+        .map(|(name, array)| (format!("{name}, own"), own_data(array)))
+        .collect();
+    all.extend(own);
+    for (name, portable) in all {
         let fixed = FixedNetworks::of(&portable).unwrap();
-        assert!(fixed.bound_mm < 0.02, "{name}: {}", fixed.bound_mm);
+        let bound_mm = fixed.bounds.iter().fold(0.0_f64, |largest, &bound| largest.max(bound));
+        assert!(bound_mm < 0.02, "{name}: {bound_mm}");
         for index in 0..portable.networks.len() {
             let network = &portable.networks[index];
             let limits = &network.range.as_ref().unwrap().limits;
             let mut largest_mm = 0.0_f64;
             for _ in 0..300 {
-                let units = limits
+                let drawn = limits
                     .iter()
-                    .map(|&(low, high)| fixed.reading(rng.random_range(low..high)));
-                let readings: Vec<f64> = units.map(|units| f64::from(units) * fixed.unit_ohm()).collect();
+                    .map(|&(low, high)| rng.random_range(low..high))
+                    .enumerate();
+                let readings: Vec<f64> = drawn.map(|(channel, ohm)| fixed.representable(channel, ohm)).collect();
                 let exact = decode_exactly(&portable, network, &readings).answers;
                 let ours = fixed.decode(index, &readings).unwrap();
                 for (nm, mm) in ours.iter().zip(exact) {
                     largest_mm = largest_mm.max((f64::from(*nm) * 1e-6 - mm).abs());
                 }
             }
-            assert!(largest_mm <= fixed.bound_mm, "{name}: {largest_mm} {}", fixed.bound_mm);
-            assert!(
-                largest_mm > 0.005 * fixed.bound_mm,
-                "{name}: {largest_mm} {}",
-                fixed.bound_mm
-            );
+            assert!(largest_mm <= bound_mm, "{name}: {largest_mm} {bound_mm}");
+            assert!(largest_mm > 0.005 * bound_mm, "{name}: {largest_mm} {bound_mm}");
+            let is_signed = portable.quantity == Quantity::Raw;
+            let least = if is_signed { i32::MIN } else { 1 };
             for _ in 0..300 {
-                let readings: Vec<i32> = limits.iter().map(|_| rng.random_range(1..=i32::MAX)).collect();
+                let readings: Vec<i32> = limits.iter().map(|_| rng.random_range(least..=i32::MAX)).collect();
                 assert!(fixed.decode_whole(index, &readings).is_some(), "{name}");
             }
-            for reading in [1, i32::MAX] {
-                assert!(
-                    fixed.decode_whole(index, &vec![reading; limits.len()]).is_some(),
-                    "{name}"
-                );
+            for reading in [least, i32::MAX] {
+                let all = vec![reading; limits.len()];
+                assert!(fixed.decode_whole(index, &all).is_some(), "{name}");
             }
-            assert_eq!(fixed.decode_whole(index, &vec![0; limits.len()]), None, "{name}");
+            let zeros = fixed.decode_whole(index, &vec![0; limits.len()]);
+            assert_eq!(zeros.is_some(), is_signed, "{name}");
         }
     }
 }

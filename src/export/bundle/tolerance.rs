@@ -1,6 +1,5 @@
 use super::{
     exact::Growth,
-    meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, Digits},
 };
@@ -57,14 +56,13 @@ impl Tolerance {
             );
         }
         if self.limit > self.usual {
-            let cure = match portable.meaning {
-                Meaning::Array(_) => "train with noise (--noise) for a network that amplifies less",
-                Meaning::Own { .. } => "train with fewer hidden nodes or epochs for a network that amplifies less",
-            };
             remarks.push(format!(
                 "this network amplifies rounding errors up to {:.1e} times (relative to the range of its outputs), so two \
-                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; {cure}",
-                self.amplification, self.limit, self.usual
+                 programs that evaluate it may differ by up to {:.1e}, more than the usual {:.0e}; {} for a network that amplifies less",
+                self.amplification,
+                self.limit,
+                self.usual,
+                portable.meaning.smaller_weights()
             ));
         }
         remarks

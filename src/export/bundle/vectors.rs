@@ -30,14 +30,14 @@ pub(super) struct Vector {
 }
 
 impl Vectors {
-    /// Draws readings and answers them. `representable` gives the nearest reading that the bundle can take.
+    /// Draws readings and answers them. `representable` gives the nearest reading of a channel that the bundle can take.
     ///
     /// # Errors
     /// No readings could be drawn.
     pub(super) fn of(
         exported: ExportedNetwork<'_>,
         portable: &Portable,
-        representable: impl Fn(f64) -> f64,
+        representable: impl Fn(usize, f64) -> f64,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
         for (index, network) in portable.networks.iter().enumerate() {
@@ -54,7 +54,10 @@ impl Vectors {
         let mut program_deviation = 0.0_f64;
         let mut all = Vec::new();
         for (network, readings) in readings {
-            let readings: Vec<f64> = readings.into_iter().map(&representable).collect();
+            let readings = readings.into_iter().enumerate();
+            let readings: Vec<f64> = readings
+                .map(|(channel, reading)| representable(channel, reading))
+                .collect();
             let exact = decode_exactly(portable, &portable.networks[network], &readings);
             growth = growth.largest(exact.growth);
             let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);

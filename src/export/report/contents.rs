@@ -116,7 +116,7 @@ impl RunReport<'_> {
         }
     }
 
-    /// How the training went, in two sentences.
+    /// The course of the training in two sentences.
     fn summary(&self) -> String {
         let training = &self.file.training;
         let reason = training

@@ -48,7 +48,7 @@ fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
     (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
 }
 
-/// Where the ray, seen from above, crosses the lines of the grid, in its own units and order; `None` beside the grid.
+/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` beside the grid.
 fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     if ray.direction.truncate() == glam::DVec2::ZERO {
         // Straight down it stays over one cell.
@@ -80,7 +80,7 @@ fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     Some(crossings)
 }
 
-/// Where the ray meets a triangle, in its own units (Möller and Trumbore 1997).
+/// Share of the ray at which it meets a triangle, in its own units (Möller and Trumbore 1997).
 fn share_at(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let (ab, ac, from) = (b - a, c - a, ray.from_mm - a);
     let across = ray.direction.cross(ac);

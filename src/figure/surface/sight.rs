@@ -44,9 +44,9 @@ pub struct AboveSight {
 /// A line of sight, in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it begins.
+    /// Its begin.
     pub from_mm: DVec3,
-    /// Where it goes, of any length.
+    /// Its direction, of any length.
     pub direction: DVec3,
 }
 

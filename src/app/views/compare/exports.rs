@@ -1,4 +1,4 @@
-//! What two runs side by side can be taken away as, and each of them alone.
+//! Exports of two runs side by side, and of each of them alone.
 
 use std::sync::Arc;
 

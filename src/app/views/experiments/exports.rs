@@ -1,4 +1,4 @@
-//! What an experiment can be taken away as.
+//! Exports of an experiment.
 
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@ use crate::{
     evaluation::experiments::{Standing, Verdict},
 };
 
-/// Which claims hold in this run, with the numbers; below, what could not be carried out.
+/// The claims that hold in this run, with the numbers; below, those that could not be tried.
 pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
     for verdict in &outcome.verdicts {
         verdict_ui(ui, verdict);

@@ -119,7 +119,7 @@ impl View for ExperimentsView {
     }
 }
 
-/// What an experiment that was not run yet promises.
+/// The promise of an experiment that was not run yet.
 const INVITATION: &str = "Our figures appear beside the published ones as the trials finish.";
 
 /// Returns the hint shown while there is no figure yet, unless that is an invitation to run.

@@ -16,7 +16,7 @@ use crate::{
 pub struct Question {
     /// The sensor.
     pub sensor: SensorModel,
-    /// Which rows are read, what moves, and what disturbs the readings.
+    /// The rows that are read, the movement, and the noise of the readings.
     pub scene: Scene,
     /// The even compression at which the Jacobian is taken, as a fraction of the height.
     pub compression: f64,
@@ -158,7 +158,7 @@ impl Analysis {
     }
 }
 
-/// Which way a pattern points means nothing: turns each like that of its neighbour, so that a surface through all of them
+/// Turns each pattern like that of its neighbour, as the sign of one means nothing, so that a surface through all of them
 /// shows their shape.
 fn align(rows: &mut [Identifiability]) {
     for row in 1..rows.len() {

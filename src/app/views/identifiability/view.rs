@@ -226,7 +226,7 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Which coordinate is shown, where several are unknown.
+/// Choice of the coordinate on show, where several are unknown.
 fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     let axes = analysis.question.scene.movement.axes().indices();
     if axes.len() < 2 {

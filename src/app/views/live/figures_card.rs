@@ -32,7 +32,7 @@ pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &m
     ui.add_space(space(2));
 }
 
-/// What the user should weigh, above everything else.
+/// Warnings, above everything else.
 fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
     match &frame.watched {
         Watched::Named(diagnosis) => {

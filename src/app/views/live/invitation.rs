@@ -7,7 +7,7 @@ use crate::app::{
     widgets::{ghost_button, primary_button},
 };
 
-/// What an empty view says, and the one click that fills it.
+/// The text of an empty view, and the one click that fills it.
 pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let palette = Theme::of(ui).palette;
     ui.vertical_centered(|ui| {

@@ -30,7 +30,7 @@ pub struct NetworkChoice {
     loading: Job<Result<(PathBuf, Box<NetworkFile>), String>>,
 }
 
-/// Where the network is.
+/// Place of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum NetworkPick {
     /// The newest run of the list.

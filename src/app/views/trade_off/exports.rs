@@ -1,4 +1,4 @@
-//! What a measurement can be taken away as.
+//! Exports of a measurement.
 
 use super::TradeOffView;
 use crate::{

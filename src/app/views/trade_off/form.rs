@@ -32,7 +32,7 @@ pub struct TradeOffForm {
     pub test_samples: usize,
 }
 
-/// Which presets are measured.
+/// Presets that are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhichPresets {
     /// Both.

@@ -4,7 +4,8 @@ use super::{
 };
 use crate::{
     export::bundle::{
-        fixed_point::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, HiddenWidth, LogTable, TangentTable},
+        fixed_point::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, HiddenWidth, LogTable, TangentTable, Units},
+        meaning::Meaning,
         portable::Portable,
     },
     network::Quantity,
@@ -15,37 +16,80 @@ pub(super) fn header<'a>(
     name: &'a str,
     portable: &'a Portable,
     networks: &FixedNetworks,
-    units: &'a str,
+    [units, definitions]: [&'a str; 2],
 ) -> Header<'a> {
     Header {
         name,
         portable,
         reading: "int32_t",
-        readings: readings(networks),
+        readings: readings(portable, networks),
         coordinate: "int32_t",
-        coordinates: "coordinates_nm",
+        coordinates: outputs(portable),
         units,
+        definitions,
     }
 }
 
-/// Name of the readings, with their unit.
-pub(in crate::export::bundle) fn readings(networks: &FixedNetworks) -> &'static str {
-    match networks.decimals {
-        9 => "resistances_nanoohm",
-        6 => "resistances_microohm",
-        3 => "resistances_milliohm",
-        _ => "resistances_ohm",
+/// Name of the readings, with their unit where they share one.
+pub(in crate::export::bundle) fn readings(portable: &Portable, networks: &FixedNetworks) -> &'static str {
+    match (&portable.meaning, networks.readings.first_decimals()) {
+        (Meaning::Own { .. }, _) => portable.meaning.readings(),
+        (Meaning::Array(_), 9) => "resistances_nanoohm",
+        (Meaning::Array(_), 6) => "resistances_microohm",
+        (Meaning::Array(_), 3) => "resistances_milliohm",
+        (Meaning::Array(_), _) => "resistances_ohm",
     }
 }
 
-/// The sentence on units.
-pub(super) fn units(networks: &FixedNetworks) -> String {
+/// Name of the outputs, with their unit where they share one.
+pub(in crate::export::bundle) fn outputs(portable: &Portable) -> &'static str {
+    match portable.meaning {
+        Meaning::Array(_) => "coordinates_nm",
+        Meaning::Own { .. } => portable.meaning.outputs(),
+    }
+}
+
+/// The sentences on units.
+pub(super) fn units(portable: &Portable, networks: &FixedNetworks) -> String {
+    let saturation = "Any readings whatever are decoded without overflow: numbers out of range saturate.";
+    match portable.meaning {
+        Meaning::Array(_) => format!(
+            "Readings are whole numbers of {:e} ohm, coordinates whole numbers of\n   nanometres. {saturation}\n   Error \
+             bound for readings that are not out of range: {:.4} mm.",
+            networks.readings.unit(0),
+            networks
+                .bounds
+                .iter()
+                .fold(0.0_f64, |largest, &bound| largest.max(bound))
+        ),
+        Meaning::Own { .. } => {
+            let bounds: Vec<String> = networks.bounds.iter().map(|bound| format!("{bound:.2e}")).collect();
+            format!(
+                "Readings and targets are whole numbers of the units below.\n   {saturation}\n   Error bounds of the \
+                 targets for readings that are not out of range: {}.",
+                bounds.join(", ")
+            )
+        }
+    }
+}
+
+/// The units of own data as initialisers of arrays; nothing for an array, whose units the names tell.
+pub(super) fn unit_definitions(name: &str, portable: &Portable, networks: &FixedNetworks) -> String {
+    if let Meaning::Array(_) = portable.meaning {
+        return String::new();
+    }
+    let define = |what: &str, units: &Units| {
+        let units: Vec<String> = units.all().map(|unit| format!("{unit:e}")).collect();
+        format!(
+            "#define {}_{what}_UNITS {{ {} }}\n",
+            name.to_uppercase(),
+            units.join(", ")
+        )
+    };
     format!(
-        "Readings are whole numbers of {:e} ohm, coordinates whole numbers of\n   nanometres. Any readings whatever are \
-         decoded without overflow: numbers out of range saturate.\n   Error bound for readings that are not out of range: \
-         {:.4} mm.",
-        networks.unit_ohm(),
-        networks.bound_mm
+        "/* Units of the whole numbers, in those of the columns. */\n{}{}\n",
+        define("READING", &networks.readings),
+        define("TARGET", &networks.outputs)
     )
 }
 
@@ -127,7 +171,7 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
         );
     }
     text += &arithmetic(networks.quantity);
-    text += &decode(header, networks.hidden_width);
+    text += &decode(header, networks);
     let limits = networks
         .networks
         .iter()
@@ -210,19 +254,25 @@ fn arithmetic(quantity: Quantity) -> String {
     format!("{tangent}/* {about}. */\nstatic int64_t changed(int32_t reading, int32_t centre)\n{{\n{change}}}\n\n")
 }
 
-fn decode(header: &Header<'_>, width: HiddenWidth) -> String {
+fn decode(header: &Header<'_>, networks: &FixedNetworks) -> String {
+    let width = networks.hidden_width;
     let product = match width {
         HiddenWidth::Sixteen => "int32_t",
         HiddenWidth::TwentyFour => "int64_t",
     };
     let (upper, readings) = (header.upper(), header.readings);
+    let refusal = if networks.quantity == Quantity::Raw {
+        String::new()
+    } else {
+        format!("        if ({readings}[i] <= 0) {{\n            return {upper}_BAD_READING;\n        }}\n")
+    };
     format!(
         "{signature}\n{{\n    \
          int32_t changes[{upper}_CHANNELS];\n    \
          int32_t activations[HIDDEN];\n\
          {network}    \
-         for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n        \
-         if ({readings}[i] <= 0) {{\n            return {upper}_BAD_READING;\n        }}\n        \
+         for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n\
+         {refusal}        \
          changes[i] = (int32_t)clamped(\n            \
          shifted(changed({readings}[i], centres[network][i]) * factors[network][i], factor_shifts[network][i]),\n            \
          {largest_change});\n    }}\n    \
@@ -235,11 +285,12 @@ fn decode(header: &Header<'_>, width: HiddenWidth) -> String {
          int64_t sum = output_biases[network][k];\n        \
          for (int j = 0; j < HIDDEN; ++j) {{\n            \
          sum += (int32_t)output_weights[network][k][j] * activations[j];\n        }}\n        \
-         coordinates_nm[k] = (int32_t)clamped(shifted(sum, output_shifts[network][k]), INT32_MAX);\n    }}\n    \
+         {outputs}[k] = (int32_t)clamped(shifted(sum, output_shifts[network][k]), INT32_MAX);\n    }}\n    \
          return {upper}_OK;\n}}\n\n",
         signature = header.decode_signature(),
         network = header.network_of_row(),
         largest_change = width.largest_change(),
         largest = TangentTable::LARGEST,
+        outputs = header.coordinates,
     )
 }

@@ -4,6 +4,7 @@ use super::{
 };
 use crate::{
     export::bundle::{
+        meaning::Meaning,
         portable::Portable,
         weights::{Arithmetic, Digits, RoundedNetwork, Weights},
     },
@@ -19,7 +20,11 @@ pub(super) fn header<'a>(name: &'a str, portable: &'a Portable, arithmetic: Arit
         readings: portable.meaning.readings(),
         coordinate: type_name(arithmetic.rest),
         coordinates: portable.meaning.outputs(),
-        units: "Resistances are in ohm, coordinates in mm.",
+        units: match portable.meaning {
+            Meaning::Array(_) => "Resistances are in ohm, coordinates in mm.",
+            Meaning::Own { .. } => "",
+        },
+        definitions: "",
     }
 }
 

@@ -14,8 +14,10 @@ pub(super) struct Header<'a> {
     /// Type and name of the outputs.
     pub(super) coordinate: &'static str,
     pub(super) coordinates: &'static str,
-    /// A sentence on units.
+    /// Sentences on units; empty where the names of the columns have them.
     pub(super) units: &'a str,
+    /// Definitions of units.
+    pub(super) definitions: &'a str,
 }
 
 impl Header<'_> {
@@ -82,10 +84,11 @@ impl Header<'_> {
                 units = self.units,
                 channels = portable.channels,
             ),
-            own @ Meaning::Own { .. } => format!(
-                "/* Decodes readings into targets.\n   {} */\n",
-                own.legend().join("\n   ")
-            ),
+            own @ Meaning::Own { .. } => {
+                let mut lines = own.legend();
+                lines.extend(self.units.lines().map(|line| line.trim_start().to_owned()));
+                format!("/* Decodes readings into targets.\n   {} */\n", lines.join("\n   "))
+            }
         };
         let _ = write!(text, "#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n");
         if self.reading == "int32_t" {
@@ -94,11 +97,12 @@ impl Header<'_> {
         if portable.takes_row() {
             let _ = writeln!(text, "#define {upper}_ROWS {}", portable.networks.len());
         }
-        let (channels, outputs) = (portable.channels, portable.outputs);
+        let (channels, outputs, definitions) = (portable.channels, portable.outputs, self.definitions);
         let _ = write!(
             text,
             "#define {upper}_CHANNELS {channels}\n\
              #define {upper}_OUTPUTS {outputs}\n\n\
+             {definitions}\
              #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
              /* What the functions return. */\n\
              enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2\n}};\n\n"

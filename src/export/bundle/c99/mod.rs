@@ -12,7 +12,7 @@ use super::{fixed_point::FixedNetworks, portable::Portable, vectors::Vector, wei
 
 pub(super) use self::{
     compiler::{Compiled, run_self_test},
-    fixed::readings,
+    fixed::{outputs, readings},
 };
 
 /// Files of a bundle: names and contents.
@@ -31,14 +31,14 @@ pub(super) fn write_floating(
     let self_test = SelfTest {
         header: &header,
         vectors,
-        unit: 1.0,
+        units: Vec::new(),
         limit,
         bits: None,
     };
     files(
         &header,
         floating::source(&header, weights),
-        self_test.text(|ohm| literal::number(digits, ohm)),
+        self_test.text(|_, reading| literal::number(digits, reading)),
     )
 }
 
@@ -50,19 +50,20 @@ pub(super) fn write_fixed(
     vectors: &[Vector],
     limit: f64,
 ) -> Files {
-    let units = fixed::units(networks);
-    let header = fixed::header(name, portable, networks, &units);
+    let units = fixed::units(portable, networks);
+    let definitions = fixed::unit_definitions(name, portable, networks);
+    let header = fixed::header(name, portable, networks, [&units, &definitions]);
     let self_test = SelfTest {
         header: &header,
         vectors,
-        unit: 1e-6,
+        units: networks.outputs.all().collect(),
         limit,
         bits: Some(vectors.iter().flat_map(|vector| bits_of(networks, vector)).collect()),
     };
     files(
         &header,
         fixed::source(&header, networks),
-        self_test.text(|ohm| networks.reading(ohm).to_string()),
+        self_test.text(|channel, reading| networks.readings.whole(channel, reading).to_string()),
     )
 }
 

@@ -5,8 +5,8 @@ use crate::export::bundle::vectors::Vector;
 pub(super) struct SelfTest<'a> {
     pub(super) header: &'a Header<'a>,
     pub(super) vectors: &'a [Vector],
-    /// What one unit of the decoded outputs is, in mm where they are coordinates.
-    pub(super) unit: f64,
+    /// Unit of each decoded output, as the network has it; empty if they are decoded as such.
+    pub(super) units: Vec<f64>,
     /// Largest deviation allowed, relative to the range of the outputs.
     pub(super) limit: f64,
     /// Whole numbers that must come out bit for bit, vector by vector.
@@ -14,12 +14,12 @@ pub(super) struct SelfTest<'a> {
 }
 
 impl SelfTest<'_> {
-    /// Writes the program. `reading` writes a reading as a literal.
-    pub(super) fn text(&self, reading: impl Fn(f64) -> String) -> String {
+    /// Writes the program. `reading` writes a reading of a channel as a literal.
+    pub(super) fn text(&self, reading: impl Fn(usize, f64) -> String) -> String {
         let Self {
             header,
             vectors,
-            unit,
+            units,
             limit,
             bits,
         } = self;
@@ -39,8 +39,8 @@ impl SelfTest<'_> {
         let declaration = format!("static const {} readings[VECTORS][{upper}_CHANNELS]", header.reading);
         let readings = vectors
             .iter()
-            .flat_map(|vector| &vector.readings)
-            .map(|&ohm| reading(ohm));
+            .flat_map(|vector| vector.readings.iter().enumerate())
+            .map(|(channel, &value)| reading(channel, value));
         push_array(&mut text, &declaration, &[vectors.len(), portable.channels], readings);
         let declaration = format!("static const double expected[VECTORS][{upper}_OUTPUTS]");
         let expected = vectors
@@ -52,6 +52,14 @@ impl SelfTest<'_> {
         text += "/* Ranges to which deviations are relative. */\n";
         let declaration = format!("static const double scales[{upper}_OUTPUTS]");
         push_array(&mut text, &declaration, &[portable.outputs], scales);
+        let in_units = if units.is_empty() {
+            "(double)decoded[k]"
+        } else {
+            let declaration = format!("static const double units[{upper}_OUTPUTS]");
+            let units = units.iter().map(|unit| format!("{unit:e}"));
+            push_array(&mut text, &declaration, &[portable.outputs], units);
+            "(double)decoded[k] * units[k]"
+        };
         let same_bits = if let Some(bits) = bits {
             let declaration = format!("static const int32_t expected_bits[VECTORS][{upper}_OUTPUTS]");
             push_array(&mut text, &declaration, &[vectors.len(), portable.outputs], bits);
@@ -111,7 +119,7 @@ impl SelfTest<'_> {
              return 1;\n        }}\n\
              {outside}        \
              for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n            \
-             const double deviation = fabs((double)decoded[k] * {unit:e} - expected[v][k]) / scales[k];\n            \
+             const double deviation = fabs({in_units} - expected[v][k]) / scales[k];\n            \
              if (!(deviation <= largest)) {{\n                \
              largest = deviation;\n            }}\n{same_bits}        }}\n    }}\n\
              {bad_reading}{bad_row}    \

@@ -38,8 +38,7 @@ pub(super) struct Change {
 }
 
 impl Change {
-    pub(super) fn of(quantity: Quantity, decimals: i32, (low, high): (f64, f64), centre_ohm: f64) -> Self {
-        let units = 10.0_f64.powi(decimals);
+    pub(super) fn of(quantity: Quantity, units: f64, (low, high): (f64, f64), centre_ohm: f64) -> Self {
         let (low, high) = (low * units, high * units);
         let origin = Twofold::from(centre_ohm) * Twofold::from(units);
         let wide = |centre: f64| (high - centre).max(centre - low).max(0.5);

@@ -4,14 +4,14 @@ use super::{FixedNetworks, change::CONDUCTANCE_BITS, tangent::TangentTable};
 use crate::network::Quantity;
 
 impl FixedNetworks {
-    /// Decodes readings in units: coordinates in nm, or `None` if a reading is not above 0.
+    /// Decodes readings in units: outputs in units, or `None` if a resistance is not above 0.
     pub(in crate::export::bundle) fn decode_whole(&self, network: usize, readings: &[i32]) -> Option<Vec<i32>> {
         let network = &self.networks[network];
         let channels = readings.len();
         let largest_change = i64::from(self.hidden_width.largest_change());
         let mut changes = Vec::new();
         for (channel, &reading) in readings.iter().enumerate() {
-            if reading <= 0 {
+            if reading <= 0 && self.quantity != Quantity::Raw {
                 return None;
             }
             let change = self.change(reading, network.centres[channel]);
@@ -33,17 +33,17 @@ impl FixedNetworks {
             activations.push(i64::from(self.tangent.of(argument.clamp(-largest, largest) as i32)));
         }
         let hidden = activations.len();
-        let coordinates = network.output_biases.iter().enumerate().map(|(coordinate, &bias)| {
-            let weights = &network.output_weights[coordinate * hidden..][..hidden];
+        let outputs = network.output_biases.iter().enumerate().map(|(output, &bias)| {
+            let weights = &network.output_weights[output * hidden..][..hidden];
             let products = weights
                 .iter()
                 .zip(&activations)
                 .map(|(&weight, activation)| i64::from(weight) * activation);
-            let nm = shift(bias + products.sum::<i64>(), network.output_shifts[coordinate]);
+            let sum = shift(bias + products.sum::<i64>(), network.output_shifts[output]);
             // Proven to fit when the weights were rounded.
-            nm.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32
+            sum.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32
         });
-        Some(coordinates.collect())
+        Some(outputs.collect())
     }
 
     fn change(&self, reading: i32, centre: i32) -> i64 {

@@ -1,5 +1,5 @@
 //! Networks in whole numbers: 16-bit weights and activations, 64-bit sums; where the products of a hidden layer nearly
-//! cancel, its weights have 24 bits. Readings and coordinates are 32-bit numbers of small units.
+//! cancel, its weights have 24 bits. Readings and outputs are 32-bit numbers of small units.
 //!
 //! Every number has a range that holds for any readings whatever, because each step begins with a saturation; sums can
 //! therefore not wrap. The bound on the error is computed by interval analysis over the range of readings in training and
@@ -11,6 +11,7 @@ mod logarithm;
 mod quantise;
 mod scaled;
 mod tangent;
+mod units;
 
 use thiserror::Error;
 
@@ -19,6 +20,7 @@ pub(super) use self::{
     logarithm::LogTable,
     quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND},
     tangent::TangentTable,
+    units::Units,
 };
 
 /// Reasons for which a network cannot leave in fixed point.
@@ -30,28 +32,29 @@ pub enum FixedPointError {
         "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
     )]
     NoRange,
-    /// Readings of another kind than resistances.
-    #[error("fixed16 reads resistances only, and this network reads values in other units: give --precision f32")]
-    Raw,
-    /// Readings that no unit brings into 32 bits.
+    /// Resistances that no unit brings into 32 bits.
     #[error(
         "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
     )]
     Reading(f64),
-    /// Weights or coordinates beyond what the numbers hold.
-    #[error("fixed16 cannot hold {what}: train with noise, which keeps weights small, or give --precision f32")]
+    /// Weights or outputs beyond what the numbers hold.
+    #[error("fixed16 cannot hold {what}: {cure}, which keeps weights small, or give --precision f32")]
     Range {
+        /// A way to train a network with smaller weights.
+        cure: &'static str,
         /// Name of the value that is too large.
         what: &'static str,
     },
     /// An error bound that says nothing.
     #[error(
-        "in whole numbers the error is only known to be below {bound_mm:.2} mm, and the widest range of an output is {range_mm:.2} mm: train with noise (the network amplifies differences of its readings too much), or give --precision f32"
+        "in whole numbers the error is only known to be below {bound:.3} times {scale}: {cure} (the network amplifies differences of its readings too much), or give --precision f32"
     )]
     Coarse {
-        /// The bound in mm.
-        bound_mm: f64,
-        /// The widest range in mm.
-        range_mm: f64,
+        /// The bound, in proportion to the range.
+        bound: f64,
+        /// Name of the range.
+        scale: &'static str,
+        /// A way to train a network that amplifies less.
+        cure: &'static str,
     },
 }

@@ -4,9 +4,10 @@ use super::{
     logarithm::LogTable,
     scaled::ScaledRow,
     tangent::TangentTable,
+    units::Units,
 };
 use crate::{
-    export::bundle::portable::{ChannelRanges, Portable, PortableNetwork},
+    export::bundle::portable::{Portable, PortableNetwork},
     network::Quantity,
 };
 
@@ -14,22 +15,23 @@ use crate::{
 pub(in crate::export::bundle) const USUAL_BOUND: f64 = 0.01;
 /// Bits of an output weight with its sign.
 const OUTPUT_WIDTH: u32 = 16;
-/// Nanometres in a millimetre.
-const NM_PER_MM: f64 = 1e6;
+/// Size that an output in units stays below whatever the activations.
+const LARGEST_SUM: f64 = (1_u32 << 30) as f64;
+
 /// The networks of a file in whole numbers.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) quantity: Quantity,
-    /// Readings are in units of 10^−`decimals` ohm: 0, 3, 6 or 9.
-    pub(in crate::export::bundle) decimals: i32,
+    pub(in crate::export::bundle) readings: Units,
+    pub(in crate::export::bundle) outputs: Units,
     pub(in crate::export::bundle) hidden_width: HiddenWidth,
     pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
     pub(in crate::export::bundle) tangent: TangentTable,
     pub(in crate::export::bundle) logarithm: LogTable,
-    /// Bound on the error of a coordinate within the limits of the readings, in mm.
-    pub(in crate::export::bundle) bound_mm: f64,
-    /// Widest range of a coordinate in training, in mm.
-    pub(in crate::export::bundle) range_mm: f64,
+    /// Bound on the error of each output within the limits of the readings, as the network has the output.
+    pub(in crate::export::bundle) bounds: Vec<f64>,
+    /// The largest of them, in proportion to the scale of the output.
+    pub(in crate::export::bundle) relative_bound: f64,
 }
 
 /// One network in whole numbers.
@@ -44,9 +46,9 @@ pub(in crate::export::bundle) struct FixedNetwork {
     pub(in crate::export::bundle) hidden_weights: Vec<i32>,
     pub(in crate::export::bundle) hidden_biases: Vec<i64>,
     pub(in crate::export::bundle) hidden_shifts: Vec<u8>,
-    /// Coordinates × hidden nodes.
+    /// Outputs × hidden nodes.
     pub(in crate::export::bundle) output_weights: Vec<i32>,
-    /// In nm, times 2 to the power of the shift.
+    /// In units of the output, times 2 to the power of the shift.
     pub(in crate::export::bundle) output_biases: Vec<i64>,
     pub(in crate::export::bundle) output_shifts: Vec<u8>,
     /// Limits beyond which a reading counts as outside.
@@ -60,90 +62,93 @@ impl FixedNetworks {
     /// The range of the readings is not known, a number does not fit, or the bound on the error is as large as the range
     /// of the outputs.
     pub(in crate::export::bundle) fn of(portable: &Portable) -> Result<Self, FixedPointError> {
-        let range_mm = portable.output_range_mm().ok_or(FixedPointError::Raw)?;
-        let sixteen = Self::with_width(portable, range_mm, HiddenWidth::Sixteen);
-        if sixteen
-            .as_ref()
-            .is_ok_and(|fixed| fixed.bound_mm <= USUAL_BOUND * range_mm)
-        {
+        let sixteen = Self::with_width(portable, HiddenWidth::Sixteen);
+        if sixteen.as_ref().is_ok_and(|fixed| fixed.relative_bound <= USUAL_BOUND) {
             return sixteen;
         }
-        let wide = Self::with_width(portable, range_mm, HiddenWidth::TwentyFour)?;
-        if wide.bound_mm < range_mm {
+        let wide = Self::with_width(portable, HiddenWidth::TwentyFour)?;
+        if wide.relative_bound < 1.0 {
             return Ok(wide);
         }
-        let bound_mm = wide.bound_mm;
-        Err(FixedPointError::Coarse { bound_mm, range_mm })
+        Err(FixedPointError::Coarse {
+            bound: wide.relative_bound,
+            scale: portable.meaning.scale(),
+            cure: portable.meaning.smaller_weights(),
+        })
     }
 
-    fn with_width(portable: &Portable, range_mm: f64, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
-        if portable.quantity == Quantity::Raw {
-            return Err(FixedPointError::Raw);
-        }
+    fn with_width(portable: &Portable, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
         let ranges = portable.ranges().ok_or(FixedPointError::NoRange)?;
-        let limits = ranges.iter().flat_map(|range| &range.limits);
-        let largest_ohm = limits.fold(0.0_f64, |largest, limits| largest.max(limits.1));
-        // A factor of 2 for readings outside.
-        let fits = |decimals: &i32| largest_ohm * 10.0_f64.powi(*decimals) <= f64::from(1 << 30);
-        let decimals = [9, 6, 3, 0]
-            .into_iter()
-            .find(fits)
-            .ok_or(FixedPointError::Reading(largest_ohm))?;
+        let (readings, outputs) = (Units::of_readings(portable, &ranges)?, Units::of_outputs(portable));
         let (tangent, logarithm) = (TangentTable::new(), LogTable::new());
         let tangent_error = tangent.error();
         let mut networks = Vec::new();
-        let mut bound_mm = 0.0_f64;
+        let mut bounds = vec![0.0_f64; portable.outputs];
         for (network, range) in portable.networks.iter().zip(ranges) {
-            let changes: Vec<_> = (range.limits.iter().zip(&network.centre))
-                .map(|(&limits, &centre_ohm)| Change::of(portable.quantity, decimals, limits, centre_ohm))
+            let changes: Vec<_> = (range.limits.iter().zip(&network.centre).enumerate())
+                .map(|(channel, (&limits, &centre))| {
+                    Change::of(portable.quantity, readings.per_one(channel), limits, centre)
+                })
                 .collect();
-            let (fixed, bound_nm) = FixedNetwork::of(network, range, &changes, decimals, hidden_width, tangent_error)?;
-            bound_mm = bound_mm.max(bound_nm / NM_PER_MM);
+            let mut fixed = FixedNetwork::reading(&changes, hidden_width);
+            fixed.limits = (range.limits.iter().enumerate())
+                .map(|(channel, &(low, high))| {
+                    let units = readings.per_one(channel);
+                    ((low * units).ceil() as i32, (high * units).floor() as i32)
+                })
+                .collect();
+            let of_network = fixed.round(network, &changes, &outputs, hidden_width, tangent_error);
+            let of_network = of_network.map_err(|what| FixedPointError::Range {
+                what,
+                cure: portable.meaning.smaller_weights(),
+            })?;
+            for (index, (bound, in_units)) in bounds.iter_mut().zip(of_network).enumerate() {
+                *bound = bound.max(in_units * outputs.unit(index));
+            }
             networks.push(fixed);
         }
+        let relative_bound = bounds
+            .iter()
+            .zip(&portable.scales)
+            .map(|(bound, scale)| bound / scale)
+            .fold(0.0, f64::max);
         Ok(Self {
             quantity: portable.quantity,
-            decimals,
+            readings,
+            outputs,
             hidden_width,
             networks,
             tangent,
             logarithm,
-            bound_mm,
-            range_mm,
+            bounds,
+            relative_bound,
         })
     }
 
-    /// Unit of the readings in ohm.
-    pub(in crate::export::bundle) fn unit_ohm(&self) -> f64 {
-        10.0_f64.powi(-self.decimals)
+    /// The reading of a channel that comes nearest.
+    pub(in crate::export::bundle) fn representable(&self, channel: usize, reading: f64) -> f64 {
+        f64::from(self.readings.whole(channel, reading)) * self.readings.unit(channel)
     }
 
-    /// A reading in units, at most the largest number.
-    pub(in crate::export::bundle) fn reading(&self, ohm: f64) -> i32 {
-        (ohm * 10.0_f64.powi(self.decimals)).round() as i32
-    }
-
-    /// Decodes a row: coordinates in nm, or `None` if a reading is not above 0.
+    /// Decodes a row: outputs in units, or `None` if a resistance is not above 0.
     pub(in crate::export::bundle) fn decode(&self, network: usize, readings: &[f64]) -> Option<Vec<i32>> {
-        let readings: Vec<_> = readings.iter().map(|&ohm| self.reading(ohm)).collect();
+        let whole = |(channel, &reading)| self.readings.whole(channel, reading);
+        let readings: Vec<_> = readings.iter().enumerate().map(whole).collect();
         self.decode_whole(network, &readings)
+    }
+
+    /// The outputs that [`Self::decode`] gives, as the network has them.
+    pub(in crate::export::bundle) fn in_own_units(&self, outputs: &[i32]) -> Vec<f64> {
+        let of_units = |(&whole, unit)| f64::from(whole) * unit;
+        outputs.iter().zip(self.outputs.all()).map(of_units).collect()
     }
 }
 
 impl FixedNetwork {
-    /// Rounds a network. Also returns the bound on its error in nm.
-    fn of(
-        network: &PortableNetwork,
-        range: &ChannelRanges,
-        changes: &[Change],
-        decimals: i32,
-        width: HiddenWidth,
-        tangent_error: f64,
-    ) -> Result<(Self, f64), FixedPointError> {
-        let (hidden, outputs) = network.output_weights.dim();
-        let units = 10.0_f64.powi(decimals);
+    /// A network without nodes, which takes these changes of its readings.
+    fn reading(changes: &[Change], width: HiddenWidth) -> Self {
         let multipliers: Vec<_> = changes.iter().map(|change| change.multiplier(width)).collect();
-        let mut fixed = Self {
+        Self {
             centres: changes.iter().map(|change| change.centre).collect(),
             factors: multipliers.iter().map(|multiplier| multiplier.factor).collect(),
             factor_shifts: multipliers.iter().map(|multiplier| multiplier.shift).collect(),
@@ -153,23 +158,36 @@ impl FixedNetwork {
             output_weights: Vec::new(),
             output_biases: Vec::new(),
             output_shifts: Vec::new(),
-            limits: range
-                .limits
-                .iter()
-                .map(|&(low, high)| ((low * units).ceil() as i32, (high * units).floor() as i32))
-                .collect(),
-        };
+            limits: Vec::new(),
+        }
+    }
+
+    /// Adds the nodes and outputs of `network`, rounded. Returns the bounds on the errors of the outputs in their units, or
+    /// the name of the number that does not fit.
+    fn round(
+        &mut self,
+        network: &PortableNetwork,
+        changes: &[Change],
+        units: &Units,
+        width: HiddenWidth,
+        tangent_error: f64,
+    ) -> Result<Vec<f64>, &'static str> {
+        let (hidden, outputs) = network.output_weights.dim();
         let mut activation_errors = Vec::new();
         for node in 0..hidden {
-            let error = fixed.push_node(network, changes, width, node)?;
-            activation_errors.push(error + tangent_error);
+            let error = self.push_node(network, changes, width, node);
+            activation_errors.push(error.ok_or("the weights of a hidden node")? + tangent_error);
         }
-        let mut bound_nm = 0.0_f64;
-        for coordinate in 0..outputs {
-            let error = fixed.push_coordinate(network, coordinate, &activation_errors)?;
-            bound_nm = bound_nm.max(error);
-        }
-        Ok((fixed, bound_nm))
+        (0..outputs)
+            .map(|output| {
+                let per_one = units.per_one(output);
+                if network.reach(output) * per_one > LARGEST_SUM {
+                    return Err("an output");
+                }
+                let bound = self.push_output(network, output, per_one, &activation_errors);
+                bound.ok_or("the weights of an output")
+            })
+            .collect()
     }
 
     /// Adds a hidden node. Returns the bound on the error that it passes on to the tangent's result.
@@ -179,8 +197,7 @@ impl FixedNetwork {
         changes: &[Change],
         width: HiddenWidth,
         node: usize,
-    ) -> Result<f64, FixedPointError> {
-        let what = "the weights of a hidden node";
+    ) -> Option<f64> {
         let mut bias = network.hidden_biases[node];
         let (mut weights, mut spread, mut error) = (Vec::new(), 0.0, 0.0);
         let input_bits = width.bits() as i32 - 1;
@@ -194,9 +211,9 @@ impl FixedNetwork {
             error += scaled.abs() * change.scaled_error(width);
         }
         let argument_bits = TangentTable::FRACTION_BITS as i32;
-        let row = ScaledRow::of(&weights, width.bits(), argument_bits - input_bits, what)?;
+        let row = ScaledRow::of(&weights, width.bits(), argument_bits - input_bits)?;
         let sum_bits = row.bits + input_bits;
-        let (sum_bias, of_bias) = whole_bias(bias.to_f64(), sum_bits, &row.weights, input_bits, what)?;
+        let (sum_bias, of_bias) = whole_bias(bias.to_f64(), sum_bits, &row.weights, input_bits)?;
         error += row.error + of_bias + 0.5 / f64::from(1 << argument_bits);
         // Within the limits the sum is at least this far from 0, where the tangent is steepest.
         let nearest = (bias.to_f64().abs() - spread - error).max(0.0);
@@ -204,29 +221,25 @@ impl FixedNetwork {
         self.hidden_weights.extend(row.weights);
         self.hidden_biases.push(sum_bias);
         self.hidden_shifts.push((sum_bits - argument_bits) as u8);
-        Ok((slope * error).min(2.0))
+        Some((slope * error).min(2.0))
     }
 
-    /// Adds a coordinate. Returns the bound on its error in nm.
-    fn push_coordinate(
+    /// Adds an output with so many units in 1. Returns the bound on its error in units, unless a weight is too large.
+    fn push_output(
         &mut self,
         network: &PortableNetwork,
-        coordinate: usize,
+        output: usize,
+        per_one: f64,
         activation_errors: &[f64],
-    ) -> Result<f64, FixedPointError> {
-        let what = "the weights of a coordinate";
+    ) -> Option<f64> {
         let activation_bits = TangentTable::ACTIVATION_BITS as i32;
-        let weights = network.output_weights.column(coordinate);
-        let weights_nm: Vec<_> = weights.iter().map(|weight| weight.to_f64() * NM_PER_MM).collect();
-        let row = ScaledRow::of(&weights_nm, OUTPUT_WIDTH, -activation_bits, what)?;
+        let weights = network.output_weights.column(output);
+        let weights: Vec<_> = weights.iter().map(|weight| weight.to_f64() * per_one).collect();
+        let row = ScaledRow::of(&weights, OUTPUT_WIDTH, -activation_bits)?;
         let sum_bits = row.bits + activation_bits;
-        let bias_nm = network.output_biases[coordinate].to_f64() * NM_PER_MM;
-        let (sum_bias, of_bias) = whole_bias(bias_nm, sum_bits, &row.weights, activation_bits, what)?;
-        let reach_nm = bias_nm.abs() + weights_nm.iter().map(|weight| weight.abs()).sum::<f64>();
-        if reach_nm > f64::from(1 << 30) {
-            return Err(FixedPointError::Range { what: "a coordinate" });
-        }
-        let of_activations = weights_nm
+        let bias = network.output_biases[output].to_f64() * per_one;
+        let (sum_bias, of_bias) = whole_bias(bias, sum_bits, &row.weights, activation_bits)?;
+        let of_activations = weights
             .iter()
             .zip(activation_errors)
             .map(|(weight, error)| weight.abs() * error);
@@ -234,19 +247,13 @@ impl FixedNetwork {
         self.output_weights.extend(row.weights);
         self.output_biases.push(sum_bias);
         self.output_shifts.push(sum_bits as u8);
-        Ok(error)
+        Some(error)
     }
 }
 
 /// A bias with so many bits after the point, and its rounding error. The sum with products of the weights and numbers
-/// below 2^`input_bits` stays within 64 bits.
-fn whole_bias(
-    bias: f64,
-    bits: i32,
-    weights: &[i32],
-    input_bits: i32,
-    what: &'static str,
-) -> Result<(i64, f64), FixedPointError> {
+/// below 2^`input_bits` stays within 64 bits; `None` otherwise.
+fn whole_bias(bias: f64, bits: i32, weights: &[i32], input_bits: i32) -> Option<(i64, f64)> {
     let scale = 2.0_f64.powi(bits);
     let whole = (bias * scale).round();
     let products = weights
@@ -254,8 +261,8 @@ fn whole_bias(
         .map(|&weight| f64::from(weight).abs() * 2.0_f64.powi(input_bits));
     // One bit is left for the rounding of the shift.
     if whole.abs() + products.sum::<f64>() < 2.0_f64.powi(61) {
-        Ok((whole as i64, (bias - whole / scale).abs()))
+        Some((whole as i64, (bias - whole / scale).abs()))
     } else {
-        Err(FixedPointError::Range { what })
+        None
     }
 }

@@ -1,5 +1,3 @@
-use super::FixedPointError;
-
 /// A row of weights as whole numbers with a common power of two.
 #[derive(Clone, Debug)]
 pub(super) struct ScaledRow {
@@ -16,16 +14,15 @@ const MOST_BITS: i32 = 20;
 impl ScaledRow {
     /// Scales `weights` so that the largest takes `width` bits with its sign. `fewest` limits the power of two.
     ///
-    /// # Errors
-    /// A weight that is too large even with the fewest bits.
-    pub(super) fn of(weights: &[f64], width: u32, fewest: i32, what: &'static str) -> Result<Self, FixedPointError> {
+    /// `None` for a weight that is too large even with the fewest bits.
+    pub(super) fn of(weights: &[f64], width: u32, fewest: i32) -> Option<Self> {
         let largest = weights
             .iter()
             .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
         let fitting = (f64::from((1 << (width - 1)) - 1) / largest).log2().floor();
         // Not a number for a weight that is none, and infinite for zeros.
         if fitting.is_nan() || fitting < f64::from(fewest) {
-            return Err(FixedPointError::Range { what });
+            return None;
         }
         let bits = fitting.min(f64::from(MOST_BITS)) as i32;
         let scale = 2.0_f64.powi(bits);
@@ -34,7 +31,7 @@ impl ScaledRow {
             .iter()
             .zip(&rounded)
             .map(|(weight, &rounded)| (weight - f64::from(rounded) / scale).abs());
-        Ok(Self {
+        Some(Self {
             error: errors.sum(),
             weights: rounded,
             bits,
@@ -69,12 +66,12 @@ mod tests {
 
     #[test]
     fn weights_take_all_bits_and_tell_their_error() {
-        let row = ScaledRow::of(&[1.0, -0.3, 0.1], 16, 0, "weights").unwrap();
+        let row = ScaledRow::of(&[1.0, -0.3, 0.1], 16, 0).unwrap();
         assert_eq!((row.bits, &row.weights[..]), (14, &[16384, -4915, 1638][..]));
         assert!((row.error - (0.3 - 4915.0 / 16384.0_f64).abs() - (0.1 - 1638.0 / 16384.0_f64).abs()).abs() < 1e-15);
-        assert_eq!(ScaledRow::of(&[0.0], 16, 0, "weights").unwrap().bits, 20);
-        assert!(ScaledRow::of(&[40_000.0], 16, 0, "weights").is_err());
-        assert!(ScaledRow::of(&[f64::INFINITY], 24, 0, "weights").is_err());
+        assert_eq!(ScaledRow::of(&[0.0], 16, 0).unwrap().bits, 20);
+        assert!(ScaledRow::of(&[40_000.0], 16, 0).is_none());
+        assert!(ScaledRow::of(&[f64::INFINITY], 24, 0).is_none());
     }
 
     #[test]

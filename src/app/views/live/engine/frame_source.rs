@@ -22,7 +22,7 @@ pub(super) enum FrameSource {
     Stream(Box<StreamFrames>),
 }
 
-/// What a source has at present.
+/// The answer of a source that is asked for a frame.
 #[derive(Debug)]
 pub(super) enum Next {
     /// A frame.

@@ -111,7 +111,7 @@ pub struct Recorded {
     pub seconds: f64,
 }
 
-/// How decoding stands.
+/// State of decoding.
 #[derive(Clone, Debug, Default)]
 pub struct LiveShown {
     /// The last frame with an answer; `None` before the first.
@@ -124,7 +124,7 @@ pub struct LiveShown {
     pub replay: Option<ReplayState>,
 }
 
-/// What one frame comes to, ready to be drawn.
+/// One decoded frame, ready to be drawn.
 #[derive(Clone, Debug)]
 pub struct LiveFrame {
     /// Sensor whose frames these are.
