@@ -54,6 +54,12 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
     driver.click("Regression");
     driver.settle();
     assert!(driver.says("decoupled x (mm) against actual x (mm)"));
+    driver.click("Sample");
+    driver.settle();
+    assert!(
+        driver.has("Test sample") && driver.says("value (mm)"),
+        "all targets of one sample"
+    );
 }
 
 #[test]
@@ -330,7 +336,7 @@ fn a_column_of_groups_divides_the_samples_by_them() {
         let (u, v) = (f64::from(row % 7), f64::from(row % 5));
         writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
     }
-    let (mut driver, ..) = opened_text(&text);
+    let (mut driver, _path, _folder) = opened_text(&text);
     assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
     // Another group takes its place, and without one the samples are divided in time.

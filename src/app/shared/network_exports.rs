@@ -78,8 +78,6 @@ pub fn network_exports<'a>(
 /// A network of own data in every form that it can have, in files named after `stem`; `file` gives it, or the reason why
 /// there is none.
 pub fn own_network_exports<'a>(stem: &str, file: &Result<Arc<MeasuredNetworkFile>, String>) -> Vec<Export<'a>> {
-    // Whole numbers need readings in ohm and answers in mm.
-    let bundles = bundles().filter(|(_, precision)| *precision != BundlePrecision::Fixed16);
     let export = |(format, precision)| {
         let words = own_bundle_words(format);
         let ask = file.clone().map(|file| -> Ask<'a> {
@@ -94,7 +92,7 @@ pub fn own_network_exports<'a>(stem: &str, file: &Result<Arc<MeasuredNetworkFile
         });
         bundle_export("", (format, precision), words, ask)
     };
-    bundles.map(export).collect()
+    bundles().map(export).collect()
 }
 
 /// Every form of a network with its precisions.
@@ -185,7 +183,7 @@ fn own_bundle_words(format: BundleFormat) -> FileWords {
         }
         BundleFormat::C99 => {
             "A folder with one header and one source in C99 and a self-test: readings in, targets out, in the units of the \
-             recording."
+             recording. fixed16 computes in whole numbers only, for microcontrollers."
         }
         BundleFormat::Matlab => {
             "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out, in the \
