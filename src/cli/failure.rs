@@ -11,7 +11,9 @@ use super::{interruption, specification_error::SpecificationError};
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
     evaluation::{Preset, RunError, experiments::ExperimentError},
-    export::{DocumentError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError},
+    export::{
+        DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
+    },
     import::{Cure, ImportError},
     live::{LineError, Source, SourceError},
     scene::Rows,
@@ -66,8 +68,8 @@ pub(super) enum Failure {
     InterruptedSweep { done: usize, trials: usize, status: u8 },
     #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
     FailedTrials { failed: usize, trials: usize },
-    #[error("no sweep in '{}': give a folder that decoupler sweep has filled", .0.display())]
-    NoSweep(PathBuf),
+    #[error(transparent)]
+    SweepFolder(#[from] SweepFolderError),
     #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
     IncompleteSweep {
         missing: usize,

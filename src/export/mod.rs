@@ -27,7 +27,7 @@ mod samples;
 mod sealed;
 mod sensor_file;
 mod soundness;
-#[cfg(feature = "cli")]
+#[cfg(any(feature = "cli", feature = "gui"))]
 mod sweep;
 mod table;
 mod tables;
@@ -54,8 +54,17 @@ pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};
 pub use sensor_file::SensorFile;
+#[cfg(any(feature = "cli", feature = "gui"))]
+pub(crate) use sweep::MergedSweep;
+#[cfg(any(test, feature = "gui"))]
+pub(crate) use sweep::sweep_specification;
 #[cfg(feature = "cli")]
-pub(crate) use sweep::{PlanAxis, SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
+pub(crate) use sweep::{
+    PlanAxis, SweepFolderError, SweepPlan, SweepTableFormat, Trial, TrialId, TrialOptions, decoders_in_order,
+    train_options,
+};
+#[cfg(feature = "gui")]
+pub(crate) use sweep::{SweepFiles, SweepRow};
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{decoder_table, error_table, write_loss_curves};
 #[cfg(feature = "figures")]

@@ -11,6 +11,8 @@ use decoupler::{
 use eframe::egui::vec2;
 
 use crate::driver::Driver;
+#[path = "../support/terminal.rs"]
+mod terminal;
 
 fn open() -> Driver {
     let mut driver = Driver::open();
@@ -268,4 +270,67 @@ fn the_form_keeps_to_its_panel_in_a_narrow_window() {
             }
         }
     }
+}
+
+/// The window writes the sweep, the terminal trains it in two parts, and the window shows what is there after each.
+#[cfg(feature = "cli")]
+#[test]
+fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
+    let home = tempfile::tempdir().unwrap();
+    let mut driver = open();
+    driver.click("Sweep");
+    driver.type_into("Values across", "2, 3");
+    driver.type_into("Values down", "40");
+    driver.enter("Seeds", "2");
+    driver.enter("Epochs", "3");
+    driver.click("Save specification…");
+    driver.type_into("File", &home.path().join("sweep.json").display().to_string());
+    driver.click_button("Save");
+    driver.wait("the file", |driver| driver.notice().is_some());
+
+    let train = |shard: &str| {
+        let arguments = format!("sweep --spec sweep.json --out trials --shard {shard}");
+        let output = terminal::decoupler(&arguments, home.path());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    train("1/2");
+    driver.click("Open sweep folder…");
+    driver.type_into("File", &home.path().join("trials").display().to_string());
+    driver.click_button("Open");
+    driver.wait("the first trials", |driver| {
+        driver.says("2 of 4 trials finished; new ones")
+    });
+    train("2/2");
+    driver.wait("the other trials", |driver| driver.says("All 4 trials finished."));
+    assert!(
+        driver.says("Sweep folder trials: 4 of 4 trials finished"),
+        "{:#?}",
+        driver.texts()
+    );
+
+    // The figures are those of the files.
+    for entry in fs::read_dir(home.path().join("trials")).unwrap() {
+        let path = entry.unwrap().path();
+        let is_trial = !path.file_name().unwrap().to_string_lossy().starts_with("sweep-");
+        let document: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        let run = &document["run"];
+        if !is_trial || path.extension().is_none_or(|extension| extension != "json") {
+            continue;
+        }
+        let of = |option: &str| run["options"][option].to_string();
+        let z = decoupler::export::format_number(run["report"]["errors"]["z_percent"].as_f64());
+        let shown = format!("hidden {}, samples 40, seed {}, Z %: {z}", of("hidden"), of("seed"));
+        assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
+    }
+    fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();
+    driver.wait("the damaged file", |driver| driver.says("00000000"));
+    driver.click("Close folder");
+    assert!(driver.has("▶ Run") && !driver.has("Close folder"));
+
+    driver.click("Open sweep folder…");
+    driver.type_into("File", &home.path().display().to_string());
+    driver.click_button("Open");
+    driver.wait("the refusal", |driver| {
+        driver.says("give a folder that decoupler sweep has filled")
+    });
 }

@@ -101,7 +101,9 @@ fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + 
     if let Some(folder) = suggestion.parent() {
         dialog = dialog.set_directory(folder);
     }
-    if task.is_read() {
+    if task.is_read() && task.words.extensions.is_empty() {
+        Box::pin(dialog.pick_folder())
+    } else if task.is_read() {
         // The terminal gives checkpoints any name.
         Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
     } else {

@@ -12,10 +12,8 @@ use serde::Serialize;
 use super::{
     filling::{Filled, fill},
     job_script::Engine,
-    merging::Merged,
     shard::Shard,
     stop::Stop,
-    table::TableFormat,
     trials::Trials,
 };
 use crate::{
@@ -25,7 +23,7 @@ use crate::{
         parsers::count,
     },
     evaluation::experiments::worker_threads,
-    export::{atomic_write, check_writable, format_duration},
+    export::{MergedSweep, SweepTableFormat, atomic_write, check_writable, format_duration},
 };
 
 /// Train every combination of options, on one machine or on many
@@ -160,7 +158,7 @@ impl Sweep {
 
     fn merge(&self) -> Result<(), Failure> {
         let out = &self.out;
-        let format = TableFormat::of(out).ok_or_else(|| {
+        let format = SweepTableFormat::of(out).ok_or_else(|| {
             let message = format!(
                 "--out '{}': with --merge give a file that ends in .csv or .json",
                 out.display()
@@ -168,7 +166,7 @@ impl Sweep {
             Failure::Arguments(message)
         })?;
         check_writable(out)?;
-        let merged = Merged::read(&self.merge)?;
+        let merged = MergedSweep::read(&self.merge)?;
         atomic_write(out, |writer| format.write(&merged, writer))?;
         if self.json {
             print_object(&merged)?;

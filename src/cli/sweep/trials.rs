@@ -1,14 +1,11 @@
 use std::{collections::HashMap, path::Path};
 
-use super::{
-    specification::Specification,
-    train_options::{TrainOptions, canonical, in_order},
-};
+use super::{specification::Specification, train_options::TrainOptions};
 use crate::{
     cli::{failure::Failure, specification_error::SpecificationError, training_arguments::TrainingArguments},
     decoupling::DecoderKind,
     evaluation::{SimulatedSettings, Workload},
-    export::{PlanAxis, SweepPlan, Trial, TrialId, TrialOptions},
+    export::{PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, decoders_in_order, train_options},
 };
 
 /// All trials of a specification, each of which `train` accepts and none of which is there twice.
@@ -61,8 +58,8 @@ impl Trials {
         let settings = arguments.settings()?;
         // The array has the rows of the scene.
         Workload::of(&settings)?;
-        let decoders = in_order(&arguments.scene.decoders());
-        let options = canonical(&settings, &decoders);
+        let decoders = decoders_in_order(&arguments.scene.decoders());
+        let options = train_options(&settings, &decoders);
         Ok(PlannedTrial {
             id: Trial::id_of(&options),
             settings,
@@ -92,5 +89,74 @@ impl Trials {
 
     fn error(&self, position: usize, message: String) -> SpecificationError {
         self.specification.error(self.describe(position), message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, fs};
+
+    use super::*;
+    use crate::{
+        dataset::Seed,
+        evaluation::experiments::{Axis, Experiment, PaperTable},
+        export::sweep_specification,
+        scene::Noise,
+        training::Method,
+    };
+
+    /// The trials of a specification that the window writes are those that the window runs.
+    #[test]
+    fn an_experiment_of_the_window_is_specified_trial_by_trial() {
+        let mut template = PaperTable::HiddenNodes.experiment();
+        template.base.source.scene.noise = Noise::relative(1e-3);
+        template.base.seed = Seed(7);
+        let experiments = [
+            (Axis::Hidden(vec![3, 5]), Some(Axis::Samples(vec![40, 60]))),
+            (
+                Axis::Method(Method::all()[..3].to_vec()),
+                Some(Axis::Epochs(vec![2, 3])),
+            ),
+            (Axis::Array(vec!["4x3_2x6".parse().unwrap()]), None),
+            (Axis::Seed(vec![Seed(1), Seed(u64::MAX)]), None),
+        ];
+        for (axis, second_axis) in experiments {
+            let experiment = Experiment {
+                axis,
+                second_axis,
+                seeds: 2,
+                ..template.clone()
+            };
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("sweep.json");
+            fs::write(&path, sweep_specification(&experiment).unwrap().to_string()).unwrap();
+            let trials = Trials::read(&path).unwrap();
+            let mut train = TrainOptions::new();
+            let specified = (0..trials.count()).map(|position| trials.get(position, &mut train).unwrap().settings);
+            let specified: Vec<_> = specified.collect();
+            let run: Vec<_> = experiment
+                .cells()
+                .into_iter()
+                .flat_map(|cell| {
+                    let seeds = experiment.seeds_of(&cell.settings);
+                    seeds.map(move |seed| SimulatedSettings { seed, ..cell.settings })
+                })
+                .collect();
+            let texts = |settings: &[SimulatedSettings]| -> BTreeSet<String> {
+                settings.iter().map(|settings| format!("{settings:?}")).collect()
+            };
+            assert_eq!(specified.len(), run.len());
+            assert_eq!(texts(&specified), texts(&run), "{:?}", experiment.axis);
+        }
+    }
+
+    #[test]
+    fn experiments_that_the_terminal_cannot_sweep_say_why() {
+        let folds = sweep_specification(&PaperTable::CrossValidation.experiment());
+        assert!(folds.unwrap_err().to_string().contains("no cross-validation"));
+        let mut squeezed = PaperTable::HiddenNodes.experiment();
+        squeezed.base.source.scene.largest_compression = 0.3;
+        let message = sweep_specification(&squeezed).unwrap_err().to_string();
+        assert!(message.contains("the largest compression"), "{message}");
     }
 }

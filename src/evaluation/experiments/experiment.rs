@@ -109,7 +109,7 @@ impl Experiment {
     }
 
     /// Returns the seeds of the cell with these settings.
-    pub(super) fn seeds_of(&self, settings: &SimulatedSettings) -> impl Iterator<Item = Seed> + use<> {
+    pub(crate) fn seeds_of(&self, settings: &SimulatedSettings) -> impl Iterator<Item = Seed> + use<> {
         let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
             1
         } else {

@@ -2,7 +2,13 @@
 //! trained. Both are named by the hash of what they stand for and never change, so any number of programs may write to
 //! one folder.
 
+mod merging;
 mod plan_file;
+mod row;
+mod specification;
+#[cfg(feature = "cli")]
+mod table;
+mod train_options;
 mod trial_file;
 mod trial_id;
 
@@ -17,11 +23,20 @@ use serde_json::value::to_raw_value;
 use super::{AtomicFile, DocumentError, DocumentKind, WriteError, sealed::Sealed};
 use crate::dataset::system_cause;
 
-pub(crate) use plan_file::{PlanAxis, SweepPlan};
-pub(crate) use trial_file::{Trial, TrialOptions};
-pub(crate) use trial_id::TrialId;
+pub(crate) use self::{
+    merging::{MergedSweep, SweepFolderError},
+    plan_file::SweepPlan,
+    row::SweepRow,
+    specification::sweep_specification,
+    train_options::train_options,
+    trial_file::{Trial, TrialOptions},
+    trial_id::TrialId,
+};
+#[cfg(feature = "cli")]
+pub(crate) use self::{plan_file::PlanAxis, table::SweepTableFormat, train_options::decoders_in_order};
 
 /// Trial and plan files of a folder.
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) struct SweepFiles {
     pub(crate) trials: Vec<PathBuf>,
     pub(crate) plans: Vec<PathBuf>,

@@ -10,6 +10,7 @@ mod panel;
 mod results_card;
 mod state;
 mod status;
+mod sweep_folder;
 mod table;
 mod verdict_list;
 mod view;

@@ -1,6 +1,6 @@
 use eframe::egui::{Button, ComboBox, TextEdit, Ui, vec2};
 
-use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic};
+use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic, sweep_folder::folder_form_ui};
 use crate::{
     app::{
         shared::{Effect, Shared},
@@ -59,6 +59,10 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
         }
         if form != *experiments.form() {
             experiments.edit(form);
+        }
+        if experiments.topic == Topic::Sweep {
+            let experiment = experiments.form().experiment().ok();
+            folder_form_ui(ui, &mut experiments.folder, experiment.as_ref(), effects);
         }
         ui.add_space(space(4));
     });

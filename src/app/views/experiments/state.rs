@@ -6,6 +6,7 @@ use std::{
 
 use super::{
     Form,
+    sweep_folder::{OpenFolder, SweepFolder},
     worker::{self, ExperimentEvent},
 };
 use crate::{
@@ -70,6 +71,7 @@ pub struct ExperimentsView {
     /// Experiment that is running.
     pub running: Option<Running>,
     pub(super) job: Job<ExperimentEvent>,
+    pub(super) folder: SweepFolder,
     forms: HashMap<Topic, CheckedForm>,
     outcomes: HashMap<Topic, Outcome>,
 }
@@ -193,6 +195,7 @@ impl ExperimentsView {
             topic: Topic::ALL[0],
             look: ExperimentLook::default(),
             running: None,
+            folder: SweepFolder::new(Arc::clone(&wake)),
             job: Job::new("experiments", wake),
             forms: HashMap::new(),
             outcomes: HashMap::new(),
@@ -294,6 +297,11 @@ impl ExperimentsView {
         } else {
             Ending::Cut
         });
+    }
+
+    /// Returns the sweep folder on show, in whose place no experiment is.
+    pub(super) fn shown_folder(&self) -> Option<&OpenFolder> {
+        self.folder.shown().filter(|_| self.topic == Topic::Sweep)
     }
 
     /// Returns the results of the experiment on show.

@@ -9,6 +9,7 @@ use super::{
     panel,
     results_card::{results_card_height, results_card_ui},
     status,
+    sweep_folder::folder_card_ui,
     verdict_list::verdicts_ui,
     worker::ExperimentEvent,
 };
@@ -46,6 +47,7 @@ impl View for ExperimentsView {
         if !finished.is_empty() {
             self.record(finished);
         }
+        self.folder.take_news();
     }
 
     fn is_working(&self) -> bool {
@@ -77,6 +79,11 @@ impl View for ExperimentsView {
     /// The table above, picture and verdicts below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
+        if self.shown_folder().is_some() {
+            card_ui(ui, whole, |ui| folder_card_ui(ui, &mut self.folder));
+            ui.allocate_rect(whole, Sense::hover());
+            return;
+        }
         let mut look = self.look;
         let Some(outcome) = self.shown() else {
             card_ui(ui, whole, |ui| {

@@ -14,8 +14,8 @@ pub(in crate::export::bundle) struct Units {
 const LARGEST_READING: f64 = (1_u32 << 30) as f64;
 /// Units in the range of an output of own data: more than a network in whole numbers can tell.
 const OUTPUT_UNITS: f64 = 1e7;
-/// Size that the sums of own outputs stay below whatever the activations.
-const LARGEST_OUTPUT: f64 = (1_u32 << 29) as f64;
+/// Size that outputs of own data stay below whatever the activations, so that their sums fit with all bits of a weight.
+const LARGEST_OUTPUT: f64 = (1_u32 << 24) as f64;
 
 impl Units {
     /// Units of the readings. Those of an array share one, with a name of its own.

@@ -5,30 +5,47 @@ use std::{
 
 use serde::Serialize;
 
-use super::row::Row;
-use crate::{
-    cli::failure::Failure,
-    export::{SweepFiles, SweepPlan, Trial, TrialId},
-};
+use thiserror::Error;
+
+use super::{SweepFiles, SweepPlan, Trial, TrialId, row::SweepRow};
+use crate::export::DocumentError;
+
+/// Reasons for which a folder has no table.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub(crate) enum SweepFolderError {
+    /// No sweep has begun to fill it.
+    #[error("no sweep in '{}': give a folder that decoupler sweep has filled", .0.display())]
+    NoSweep(PathBuf),
+    /// It cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] DocumentError),
+}
 
 /// The trials of several folders.
 #[derive(Default, Serialize)]
-pub(super) struct Merged {
+pub(crate) struct MergedSweep {
+    /// Options that plans of the folders vary, each once.
+    #[serde(skip)]
+    pub(crate) axes: Vec<String>,
     /// Identifies the options and results of all rows, without times: two merges with the same digest have the same
     /// results to the last bit.
-    pub(super) digest: String,
+    pub(crate) digest: String,
     /// Trials that are planned in one of the folders and finished in none.
-    pub(super) missing: Vec<String>,
+    pub(crate) missing: Vec<String>,
     /// Trials with the same options and different results, none of which is in the table.
-    pub(super) conflicting: Vec<String>,
+    pub(crate) conflicting: Vec<String>,
     /// Files that cannot be read.
-    pub(super) damaged: Vec<String>,
-    pub(super) trials: Vec<Row>,
+    pub(crate) damaged: Vec<String>,
+    pub(crate) trials: Vec<SweepRow>,
 }
 
-impl Merged {
+impl MergedSweep {
     /// Reads all trials of `folders`.
-    pub(super) fn read(folders: &[PathBuf]) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    /// A folder cannot be read, or no sweep has begun to fill it.
+    pub(crate) fn read(folders: &[PathBuf]) -> Result<Self, SweepFolderError> {
         let mut merged = Self::default();
         let mut found: BTreeMap<String, Vec<Found>> = BTreeMap::new();
         let mut finished = BTreeSet::new();
@@ -36,7 +53,7 @@ impl Merged {
         for folder in folders {
             let files = SweepFiles::list(folder)?;
             if files.trials.is_empty() && files.plans.is_empty() {
-                return Err(Failure::NoSweep(folder.clone()));
+                return Err(SweepFolderError::NoSweep(folder.clone()));
             }
             for path in files.plans {
                 match SweepPlan::load(&path) {
@@ -48,19 +65,24 @@ impl Merged {
                 match Trial::load(&path) {
                     Ok(trial) => {
                         finished.insert(trial.id());
-                        let row = Row::from(trial);
+                        let row = SweepRow::from(trial);
                         found.entry(row.key()).or_default().push(Found { path, row });
                     }
                     Err(error) => merged.damaged.push(error.to_string()),
                 }
             }
         }
+        for axis in plans.iter().flat_map(|plan| &plan.axes) {
+            if !merged.axes.contains(&axis.option) {
+                merged.axes.push(axis.option.clone());
+            }
+        }
         merged.missing = missing(&plans, &finished);
         for same in found.into_values() {
             merged.add(same);
         }
-        merged.trials.sort_by(Row::order);
-        let compared: Vec<_> = merged.trials.iter().map(Row::compared).collect();
+        merged.trials.sort_by(SweepRow::order);
+        let compared: Vec<_> = merged.trials.iter().map(SweepRow::compared).collect();
         merged.digest = TrialId::of(&compared.join("\n\n\n")).to_string();
         Ok(merged)
     }
@@ -84,7 +106,7 @@ impl Merged {
     }
 
     /// Returns true if the table has every trial.
-    pub(super) fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.missing.is_empty() && self.conflicting.is_empty() && self.damaged.is_empty()
     }
 }
@@ -92,7 +114,7 @@ impl Merged {
 #[derive(Clone)]
 struct Found {
     path: PathBuf,
-    row: Row,
+    row: SweepRow,
 }
 
 impl Found {

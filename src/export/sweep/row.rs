@@ -3,24 +3,24 @@ use std::{cmp::Ordering, collections::BTreeMap};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::export::{Trial, TrialId, TrialOptions};
+use super::{Trial, TrialId, TrialOptions};
 
 /// Fields of a report that are times: they differ from run to run, and nothing is compared by them.
 const TIMES: [&str; 3] = ["epoch_ms", "frame_us", "fit_seconds"];
 
 /// A trial in a table: what it was, what came out, and how long it took.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Row {
-    pub(super) trial: TrialId,
-    pub(super) program: String,
-    pub(super) options: TrialOptions,
+pub(crate) struct SweepRow {
+    pub(crate) trial: TrialId,
+    pub(crate) program: String,
+    pub(crate) options: TrialOptions,
     /// The report without its times.
-    pub(super) result: Value,
+    pub(crate) result: Value,
     /// Times by their place in the report, and the whole time as `seconds`.
-    pub(super) time: BTreeMap<String, Value>,
+    pub(crate) time: BTreeMap<String, Value>,
 }
 
-impl From<Trial> for Row {
+impl From<Trial> for SweepRow {
     fn from(trial: Trial) -> Self {
         let mut time = BTreeMap::from([("seconds".to_owned(), Value::from(trial.seconds))]);
         let trial_id = trial.id();
@@ -36,7 +36,7 @@ impl From<Trial> for Row {
     }
 }
 
-impl Row {
+impl SweepRow {
     /// The options as one text: the same for the same options.
     pub(super) fn key(&self) -> String {
         let pairs: Vec<_> = self
@@ -212,9 +212,9 @@ mod tests {
 
     use super::*;
 
-    fn row(options: Value, report: Value) -> Row {
+    fn row(options: Value, report: Value) -> SweepRow {
         let options = serde_json::from_value(options).unwrap();
-        Row::from(Trial::new(options, report, 1.5))
+        SweepRow::from(Trial::new(options, report, 1.5))
     }
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
             with(6, 18_446_744_073_709_551_614),
             with(8, 0),
         ];
-        rows.sort_by(Row::order);
+        rows.sort_by(SweepRow::order);
         let options = rows.map(|row| (row.options["hidden"].as_u64(), row.options["seed"].as_u64()));
         assert_eq!(
             options,

@@ -5,20 +5,20 @@ use std::{
     path::Path,
 };
 
-use super::merging::Merged;
+use super::merging::MergedSweep;
 
 /// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum TableFormat {
+pub(crate) enum SweepTableFormat {
     /// A line for each trial.
     Csv,
     /// One object with every field of the results, and the missing and conflicting trials.
     Json,
 }
 
-impl TableFormat {
+impl SweepTableFormat {
     /// The format that belongs to the ending of `path`.
-    pub(super) fn of(path: &Path) -> Option<Self> {
+    pub(crate) fn of(path: &Path) -> Option<Self> {
         let ending = path.extension().and_then(OsStr::to_str)?;
         match ending.to_ascii_lowercase().as_str() {
             "csv" => Some(Self::Csv),
@@ -27,7 +27,7 @@ impl TableFormat {
         }
     }
 
-    pub(super) fn write(self, merged: &Merged, writer: &mut dyn Write) -> io::Result<()> {
+    pub(crate) fn write(self, merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
         match self {
             Self::Csv => write_csv(merged, writer),
             Self::Json => {
@@ -38,7 +38,7 @@ impl TableFormat {
     }
 }
 
-fn write_csv(merged: &Merged, writer: &mut dyn Write) -> io::Result<()> {
+fn write_csv(merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
     let rows: Vec<_> = merged.trials.iter().map(|row| row.cells()).collect();
     let columns: BTreeSet<_> = rows.iter().flat_map(|cells| cells.keys()).collect();
     let mut table = csv::Writer::from_writer(writer);

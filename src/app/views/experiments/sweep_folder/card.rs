@@ -1,0 +1,156 @@
+use std::cmp::Ordering;
+
+use eframe::egui::{Align, Label, Layout, RichText, Ui, vec2};
+
+use super::{SweepFolder, state::OpenFolder, table::SweepTable};
+use crate::{
+    app::{
+        theme::{Theme, semibold, space, type_size},
+        widgets::{
+            ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, dim_ui, ghost_button, note_ui,
+            placeholder_ui, progress_bar_ui, scrolled_table_ui,
+        },
+    },
+    sensor::counted,
+};
+
+/// Most problems that are spelled out.
+const MOST_PROBLEMS: usize = 3;
+
+/// Shows the folder: how far it is filled, and the table of its trials.
+pub(in crate::app::views::experiments) fn folder_card_ui(ui: &mut Ui, folder: &mut SweepFolder) {
+    let Some(open) = &mut folder.open else { return };
+    let mut is_closed = false;
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            is_closed = ui.add(ghost_button("Close folder")).clicked();
+            let heading = RichText::new(format!("Sweep folder {}", open.name())).font(semibold(type_size().title));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let heading = ui.add(Label::new(heading).truncate());
+                heading.on_hover_text(open.path.display().to_string());
+            });
+        });
+    });
+    let OpenFolder { table, sort, .. } = open;
+    match table {
+        None => placeholder_ui(ui, "Reading the folder …"),
+        Some(Err(reason)) => {
+            note_ui(ui, reason);
+        }
+        Some(Ok(table)) => trials_ui(ui, table, sort),
+    }
+    if is_closed {
+        folder.close();
+    }
+}
+
+fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
+    let (finished, trials) = (table.finished(), table.trials);
+    let how_far = if finished == trials {
+        format!("All {} finished.", counted(trials, "trial"))
+    } else {
+        format!(
+            "{finished} of {} finished; new ones appear here by themselves.",
+            counted(trials, "trial")
+        )
+    };
+    dim_ui(ui, &how_far);
+    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32);
+    ui.add_space(space(1));
+    for problem in table.problems.iter().take(MOST_PROBLEMS) {
+        note_ui(ui, problem);
+    }
+    if table.problems.len() > MOST_PROBLEMS {
+        let rest = table.problems.len() - MOST_PROBLEMS;
+        note_ui(ui, &format!("and {} more", counted(rest, "problem")));
+    }
+    if finished == 0 {
+        return placeholder_ui(ui, "No trial has finished yet.");
+    }
+    ui.allocate_ui(vec2(ui.available_width(), ui.available_height()), |ui| {
+        table_ui(ui, table, sort)
+    });
+}
+
+fn table_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
+    let palette = &Theme::of(ui).palette;
+    let columns: Vec<TableColumn<'_>> = table
+        .headings
+        .iter()
+        .enumerate()
+        .map(|(column, heading)| TableColumn {
+            heading,
+            is_figure: table.rows.iter().any(|row| row[column].value.is_some()),
+            width: ColumnWidth::Fits(longest(table, column)),
+        })
+        .collect();
+    let order = order(table, *sort);
+    let row = |place: usize| {
+        let cells = &table.rows[order[place]];
+        let options: Vec<String> = (cells[..table.options].iter().zip(&table.headings))
+            .map(|(cell, option)| format!("{option} {}", cell.text))
+            .collect();
+        let name = options.join(", ");
+        TableRow {
+            label: format!("Trial {name}"),
+            is_marked: false,
+            meaning: "",
+            dot: None,
+            cells: cells
+                .iter()
+                .enumerate()
+                .map(|(column, cell)| TableCell {
+                    text: cell.text.clone(),
+                    colour: if column == table.options {
+                        palette.accent
+                    } else {
+                        palette.text
+                    },
+                    is_strong: column <= table.options,
+                    label: (column >= table.options)
+                        .then(|| format!("{name}, {}: {}", table.headings[column], cell.text)),
+                    meaning: "",
+                })
+                .collect(),
+        }
+    };
+    if let Some(TableClick::Sort(chosen)) =
+        scrolled_table_ui(ui, "sweep folder", &columns, Some(*sort), order.len(), row)
+    {
+        *sort = chosen;
+    }
+}
+
+/// Returns the longest text of a column.
+fn longest(table: &SweepTable, column: usize) -> &str {
+    let texts = table.rows.iter().map(|row| row[column].text.as_str());
+    texts.max_by_key(|text| text.chars().count()).unwrap_or_default()
+}
+
+/// The trials in the order of the table; those without the figure come last, texts by the alphabet.
+fn order(table: &SweepTable, sort: SortBy) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..table.rows.len()).collect();
+    if let Some(column) = sort.column {
+        let cell = |row: usize| &table.rows[row][column];
+        order.sort_by(|&one, &other| {
+            let (one, other) = (cell(one), cell(other));
+            let ordering = match (one.value, other.value) {
+                (Some(one), Some(other)) => one.total_cmp(&other),
+                (None, None) => one.text.cmp(&other.text),
+                (one, _) => {
+                    return if one.is_some() {
+                        Ordering::Less
+                    } else {
+                        Ordering::Greater
+                    };
+                }
+            };
+            if sort.is_descending {
+                ordering.reverse()
+            } else {
+                ordering
+            }
+        });
+    }
+    order
+}
