@@ -58,7 +58,7 @@ impl Measuring {
         self.told = None;
         self.start(
             UnderWay::Findings(None),
-            Task::Findings(Box::new(plan), settings, folds, self.model),
+            Task::Findings(Box::new(plan), Box::new(settings), folds, self.model),
         );
     }
 

@@ -19,7 +19,7 @@ use crate::{
 #[derive(Debug)]
 pub enum Task {
     /// Find out what the recording of this plan tells, with so many folds.
-    Findings(Box<Plan>, RunSettings, usize, Option<FittedModel>),
+    Findings(Box<Plan>, Box<RunSettings>, usize, Option<FittedModel>),
     /// Measure decoders beside this network, on the samples with which it was trained and tested.
     Decoders(Arc<MeasuredNetworkFile>),
 }
@@ -68,7 +68,7 @@ pub struct Decoders {
 /// Does a task; ends early if it is cancelled.
 pub fn work(task: Task, report: &Report<News>) -> Result<(), String> {
     match task {
-        Task::Findings(plan, settings, folds, model) => find(*plan, settings, folds, model, report),
+        Task::Findings(plan, settings, folds, model) => find(*plan, *settings, folds, model, report),
         Task::Decoders(file) => measure(file, report),
     }
 }
