@@ -101,7 +101,7 @@ mod tests {
         assert_eq!(heights(&apart), [50.0, 75.0, 40.0, 0.0]);
         assert_eq!(
             apart.plots[0].series[1].points[1].note.as_deref(),
-            Some("f\ndecoded: −1.00 mm")
+            Some("f\ndecoded: -1.00 mm")
         );
     }
 }

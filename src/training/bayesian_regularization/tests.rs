@@ -49,27 +49,25 @@ fn correlated_errors_determine_fewer_weights_once_that_is_measured() {
     assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
 }
 
-/// Readings that tell nothing: what is left to answer is the mean of the targets, wherever their zero lies, and that
-/// takes no parameter from the data.
+/// The training error is least where the weights fit the noise; the regularised error falls on.
 #[test]
-fn a_network_that_is_told_nothing_answers_the_mean() {
+fn where_nothing_is_held_out_the_latest_weights_are_the_best() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let inputs = Array2::from_shape_fn((20, 3), |_| rng.random_range(-1.0..1.0));
-    let targets = Array2::from_shape_fn((20, 2), |(_, output)| rng.random_range(-0.3..0.3) + [0.6, -0.4][output]);
-    let mean = targets.mean_axis(ndarray::Axis(0)).unwrap();
+    let targets = Array2::from_shape_fn((20, 2), |_| rng.random_range(-0.3..0.9));
     let shape = Shape {
         inputs: 3,
         hidden: 6,
         outputs: 2,
     };
-    let spread_of = |groups: f64| {
+    for groups in [1.0, 2.0, 3.0, 4.0] {
         let settings = TrainingSettings {
             method: Method::BayesianRegularization(RegularizationSettings {
                 groups,
                 ..RegularizationSettings::default()
             }),
             stopping: StoppingRules {
-                epochs: 200,
+                epochs: 100,
                 ..StoppingRules::default()
             },
         };
@@ -81,14 +79,6 @@ fn a_network_that_is_told_nothing_answers_the_mean() {
         let start = nguyen_widrow(shape, &mut ChaCha8Rng::seed_from_u64(1));
         let mut trainer = Trainer::new(start, problem, settings).unwrap();
         while trainer.step().is_none() {}
-        assert_eq!(
-            trainer.best().weights(),
-            trainer.present().weights(),
-            "the latest is the best"
-        );
-        let answers = trainer.best().forward(inputs.view()) - &mean;
-        answers.iter().fold(0.0, |largest: f64, off| largest.max(off.abs()))
-    };
-    assert!(spread_of(4.0) < 0.02, "{}", spread_of(4.0));
-    assert!(spread_of(1.0) > 0.05, "{}", spread_of(1.0));
+        assert_eq!(trainer.best().weights(), trainer.present().weights(), "{groups}");
+    }
 }
