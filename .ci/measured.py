@@ -1,7 +1,8 @@
 """Cross-validates own data of few, noisy samples beside scikit-learn's ridge. Usage: measured.py PROGRAM FOLDER.
 
 R² is over all samples, each answered by a model that has not seen its fold, and averaged over seeds: 20 samples in random
-folds give another R² with every seed. scikit-learn's ridge has standardised inputs and a penalty chosen by its own
+folds give another R² with every seed, 0.1 apart (standard deviation), so that the mean of fewer seeds would tell nothing of a
+margin of 0.03. scikit-learn's ridge has standardised inputs and a penalty chosen by its own
 cross-validation.
 """
 
@@ -19,7 +20,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 PROGRAM, HOME = sys.argv[1], pathlib.Path(sys.argv[2])
-FOLDS, SEEDS, MARGIN = 10, 5, 0.03
+FOLDS, SEEDS, MARGIN = 10, 20, 0.03
 failures = []
 
 
@@ -60,7 +61,7 @@ for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
         print(f"{name:<10} y{target + 1:<6} {means['network']:8.3f} {means['ridge']:8.3f} {means['mean']:8.3f} {named:8.3f} {limit[target]:8.3f}  {words}")
         if named < limit[target] - MARGIN:
             failures.append(f"{name} y{target + 1}: {named:.3f} is below scikit-learn's ridge, {limit[target]:.3f}")
-        if name == "diabetes" and means["network"] < limit[target] - MARGIN:
+        if means["network"] < limit[target] - MARGIN:
             failures.append(f"{name} y{target + 1}: the network has {means['network']:.3f}, scikit-learn's ridge {limit[target]:.3f}")
         said = [warning for report in reports for warning in report["warnings"] if f" y{target + 1} " in warning]
         if sum("do not support more than a linear map" in warning for warning in said) < SEEDS:

@@ -9,7 +9,7 @@ use decoupler::{
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
     network::Networks,
     scene::{Loading, Noise},
-    sensor::Calibration,
+    sensor::{Calibration, SensorModel, Standing},
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -39,6 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for parameter in &calibration.parameters {
         println!("{parameter}");
     }
+    println!("{}", coverage(&nominal, &real, recorded)?);
     let before = train(settings)?;
     settings.source.sensor = calibration.model;
     let calibrated = train(settings)?;
@@ -60,6 +61,27 @@ fn main() -> Result<(), Box<dyn Error>> {
         z_mm(&after, &tuned.expect("nothing cancels it"))
     );
     Ok(())
+}
+
+/// Counts the recordings of 50 seeds whose calibration has the truth within all its intervals.
+fn coverage(
+    nominal: &SensorModel,
+    real: &SensorModel,
+    recorded: impl Fn(usize, u64) -> Result<Dataset, Box<dyn Error>>,
+) -> Result<String, Box<dyn Error>> {
+    const SEEDS: u64 = 50;
+    let mut within = 0;
+    for seed in 0..SEEDS {
+        let calibration = Calibration::fit(nominal, &pressed_rows(&recorded(60, seed)?, nominal)?)?;
+        let holds = calibration.parameters.iter().all(|fitted| match fitted.standing {
+            Standing::Told(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
+            Standing::Held => true,
+        });
+        within += u64::from(holds);
+    }
+    Ok(format!(
+        "All parameters are within their intervals in {within} of {SEEDS} recordings"
+    ))
 }
 
 fn train(settings: SimulatedSettings) -> Result<Networks, Box<dyn Error>> {

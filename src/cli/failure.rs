@@ -14,7 +14,7 @@ use crate::{
     export::{
         DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
     },
-    import::ImportError,
+    import::{Cure, ImportError},
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::{CalibrationError, SensorError},
@@ -42,7 +42,7 @@ pub(super) enum Failure {
     Resume { path: PathBuf, source: RunError },
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    #[error(transparent)]
+    #[error("{}", .0.with_cure(in_arguments))]
     Import(#[from] ImportError),
     #[error("'{}': the samples of '{}' are not those of the checkpoint; restore the file, or start a new training", .path.display(), .data.display())]
     OtherSamples { path: PathBuf, data: PathBuf },
@@ -154,6 +154,18 @@ impl From<ExperimentError> for Failure {
             ExperimentError::Threads(_) => Self::Threads(error),
             _ => Self::Arguments(error.to_string()),
         }
+    }
+}
+
+/// The cure of an import in arguments.
+fn in_arguments(cure: &Cure) -> String {
+    match cure {
+        Cure::CallMissing(text) => format!("correct it, or say that it means missing with --missing \"{text}\""),
+        Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
+        Cure::NameJoinedTime => "name it with --join-time".to_owned(),
+        Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
+        Cure::GiveTestFiles => "give one --test-join for each --join".to_owned(),
+        other => other.to_string(),
     }
 }
 

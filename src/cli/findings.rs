@@ -70,12 +70,7 @@ impl StudyArguments {
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
         let begin = |stage: Stage| {
             bar.inc(1);
-            bar.set_message(match stage {
-                Stage::Folds => "cross-validation",
-                Stage::OtherFolds => "cross-validation by another split",
-                Stage::Channels => "fits without each channel",
-                _ => "fits to fewer samples",
-            });
+            bar.set_message(stage.to_string());
         };
         let divided = (&plan.division, folds);
         let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, &|| false);

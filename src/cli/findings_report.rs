@@ -13,7 +13,7 @@ use crate::{
         RunSettings, TargetErrors,
         recorded::{ChannelImportance, Determination, Findings, FittedModel, Interval, LearningCurve, Standing},
     },
-    export::format_number,
+    export::{describe_target, describe_warnings, format_number},
     import::{Channel, Dropped, Plan, Recording},
 };
 
@@ -120,12 +120,8 @@ impl<'a> Report<'a> {
         findings: &Findings,
     ) -> Self {
         let channels = &recording.inputs;
-        let name = |channel: usize| channels[channel].name.clone();
         let mut warnings = recording.warnings.clone();
-        warnings.extend(findings.remarks.iter().map(|remark| remark.sentence(name)));
-        for (target, of) in recording.targets.iter().zip(&findings.targets) {
-            warnings.extend(of.gain.and_then(|gain| gain.remark(&target.name)));
-        }
+        warnings.extend(describe_warnings(channels, &recording.targets, findings));
         let worth = |of: &ChannelImportance| Worth {
             name: &channels[of.channel].name,
             unit: channels[of.channel].unit.as_deref(),
@@ -292,16 +288,7 @@ impl<'a> Target<'a> {
                 Standing::HardlyTold => "hardly told",
                 Standing::NotTold => "not told",
             }),
-            sentence: best.map_or_else(
-                || format!("{name} is constant, or all its samples are one stretch or group: nothing can be judged"),
-                |(_, determination)| {
-                    let sentence = determination.sentence(name);
-                    match of.network {
-                        Some(_) => sentence,
-                        None => format!("{sentence}, as far as a linear map goes"),
-                    }
-                },
-            ),
+            sentence: describe_target(name, of),
             r2_network: r2(of.network),
             r2_ridge: r2(of.ridge),
             network_to_ridge: of.gain.map(|gain| gain.ratio.into()),

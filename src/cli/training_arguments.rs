@@ -10,8 +10,7 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MOST_STARTS, Measured, RunSettings, SimulatedSettings, Simulation},
-    export::MeasuredSettings,
+    evaluation::{MOST_STARTS, Measured, MeasuredSettings, RunSettings, SimulatedSettings, Simulation},
     network::{InputChoice, LARGEST_HIDDEN},
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},

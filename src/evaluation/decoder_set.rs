@@ -201,6 +201,12 @@ impl DecoderSet {
         }))
     }
 
+    /// Decoders that need no model of the sensor, with the precisions of each, in the order offered to the user.
+    pub fn of_targets() -> impl Iterator<Item = (DecoderKind, Precision)> {
+        let kinds = DecoderKind::ALL.into_iter().filter(|kind| !kind.needs_sensor());
+        kinds.flat_map(|kind| kind.precisions().iter().map(move |&precision| (kind, precision)))
+    }
+
     /// Fits a decoder and measures its speed and its errors on each target of `test`. Returns `None` as
     /// [`Self::decoder`] does.
     ///

@@ -68,13 +68,15 @@ pub use remark::{Cause, Remark, error_remarks};
 pub use run::{NodeScores, Run};
 pub use run_error::RunError;
 pub use run_flaw::RunFlaw;
-pub use settings::{CountError, MOST_STARTS, RunSettings, SimulatedSettings};
+pub use settings::{CountError, MOST_STARTS, MeasuredSettings, RunSettings, SimulatedSettings};
 pub use source::{Measured, ModelSize, Simulation, Source};
 pub use spread::Spread;
 pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
 pub use target_errors::{TargetErrors, TargetRow};
+#[cfg(feature = "figures")]
+pub(crate) use trade::pareto_front;
 pub use trade::{TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
 pub use trade_level::{TradeOffCost, TradeOffLevel, TradeOffLimits};
 pub use workload::{Workload, WorkloadTime};

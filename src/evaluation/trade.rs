@@ -111,7 +111,7 @@ pub fn measure_trade_off(
 
 /// Marks the points (cost, error) on the Pareto front: those that no other beats in one and equals or beats in the
 /// other.
-pub(super) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
+pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     let is_beaten = |&(cost, error): &(f64, f64)| {
         let beats = |other: &(f64, f64)| other.0 <= cost && other.1 <= error && (other.0 < cost || other.1 < error);
         points.iter().any(beats)

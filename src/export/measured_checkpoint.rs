@@ -3,10 +3,10 @@ use std::{path::Path, time::Duration};
 use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
-use super::{AtomicFile, DocumentError, DocumentKind, MeasuredSettings, document::PROGRAM, sealed::Sealed};
+use super::{AtomicFile, DocumentError, DocumentKind, document::PROGRAM, sealed::Sealed};
 use crate::{
     dataset::Dataset,
-    evaluation::{Run, RunError},
+    evaluation::{MeasuredSettings, Run, RunError},
     import::{Plan, PlannedSets},
     training::TrainerState,
 };
@@ -51,7 +51,7 @@ impl MeasuredCheckpointFile {
     pub fn from_run(run: &Run, plan: &Plan, samples_crc32: &str) -> Result<Self, DocumentError> {
         Ok(Self {
             program: PROGRAM.to_owned(),
-            settings: MeasuredSettings::of(run.settings()).ok_or(DocumentError::Simulated(KIND))?,
+            settings: run.settings().measured().ok_or(DocumentError::Simulated(KIND))?,
             plan: plan.clone(),
             samples_crc32: samples_crc32.to_owned(),
             wall_time: run.wall_time(),

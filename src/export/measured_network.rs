@@ -8,32 +8,12 @@ use super::{
     sealed::Sealed,
 };
 use crate::{
-    dataset::Seed,
-    evaluation::{Measured, Run, RunSettings, Source, TargetErrors},
+    evaluation::{MeasuredSettings, Run, TargetErrors},
     import::{Channel, Plan},
-    network::{InputChoice, Networks},
-    training::TrainingSettings,
+    network::Networks,
 };
 
 const KIND: DocumentKind = DocumentKind::MeasuredNetwork;
-
-/// Settings of a run on measured samples as files hold them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeasuredSettings {
-    /// One network for all row-wires, or one for each.
-    pub source: Measured,
-    /// Input quantity and its scaling.
-    pub inputs: InputChoice,
-    /// Number of hidden nodes.
-    pub hidden: usize,
-    /// Number of starts.
-    pub starts: usize,
-    /// Training method and stopping rules.
-    pub training: TrainingSettings,
-    /// Seed of all randomness.
-    pub seed: Seed,
-}
 
 /// A network trained on measured samples, with the names and units of its readings and targets, the record of its training and
 /// its errors. The file is JSON; a network that is read back gives bit-identical results.
@@ -78,52 +58,6 @@ struct RunDocument {
     ridge: Vec<TargetErrors>,
 }
 
-impl From<MeasuredSettings> for RunSettings {
-    fn from(settings: MeasuredSettings) -> Self {
-        let MeasuredSettings {
-            source,
-            inputs,
-            hidden,
-            starts,
-            training,
-            seed,
-        } = settings;
-        Self {
-            source: source.into(),
-            inputs,
-            hidden,
-            starts,
-            training,
-            seed,
-        }
-    }
-}
-
-impl MeasuredSettings {
-    /// Takes the settings of a run; `None` if its samples are simulated.
-    pub fn of(settings: &RunSettings) -> Option<Self> {
-        let &RunSettings {
-            source,
-            inputs,
-            hidden,
-            starts,
-            training,
-            seed,
-        } = settings;
-        match source {
-            Source::Simulated(_) => None,
-            Source::Measured(source) => Some(Self {
-                source,
-                inputs,
-                hidden,
-                starts,
-                training,
-                seed,
-            }),
-        }
-    }
-}
-
 impl MeasuredNetworkFile {
     /// Takes the best network of `run` so far, with its record and errors. The paths of `plan` should not depend on the working
     /// folder; `channels` are the names and units of readings and targets.
@@ -131,7 +65,7 @@ impl MeasuredNetworkFile {
     /// # Errors
     /// [`DocumentError::Simulated`] if the samples are simulated.
     pub fn from_run(run: &Run, plan: Plan, channels: (&[Channel], &[Channel])) -> Result<Self, DocumentError> {
-        let settings = MeasuredSettings::of(run.settings()).ok_or(DocumentError::Simulated(KIND))?;
+        let settings = run.settings().measured().ok_or(DocumentError::Simulated(KIND))?;
         let mut table = run.target_table().into_iter().map(|row| row.targets);
         let mut next = || table.next().unwrap_or_default();
         let (mean, ridge, errors) = (next(), next(), next());

@@ -45,10 +45,10 @@ pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use measured_checkpoint::MeasuredCheckpointFile;
-pub use measured_network::{MeasuredNetworkFile, MeasuredSettings};
+pub use measured_network::MeasuredNetworkFile;
 pub use network_file::{NetworkFile, TrainingRecord};
 pub use recipe_file::RecipeFile;
-pub use recorded_words::{describe_standings, describe_worse_than_ridge};
+pub use recorded_words::{describe_standings, describe_target, describe_warnings, describe_worse_than_ridge};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};

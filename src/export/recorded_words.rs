@@ -2,7 +2,7 @@ use super::format_number;
 use crate::{
     evaluation::{
         TargetErrors,
-        recorded::{Determination, Standing},
+        recorded::{Determination, Findings, Standing, TargetFindings},
     },
     import::Channel,
 };
@@ -17,6 +17,25 @@ pub fn describe_standings(targets: &[Channel], told: &[Option<Determination>]) -
         Some(told) => (told.standing() != Standing::Told).then(|| told.sentence(&target.name)),
     };
     targets.iter().zip(told).filter_map(of).collect()
+}
+
+/// Says how well the readings tell a target, by the better of network and ridge.
+pub fn describe_target(name: &str, found: &TargetFindings) -> String {
+    match (found.best(), found.network) {
+        (None, _) => format!("{name} is constant, or all its samples are one stretch or group: nothing can be judged"),
+        (Some((_, best)), Some(_)) => best.sentence(name),
+        (Some((_, best)), None) => format!("{}, as far as a linear map goes", best.sentence(name)),
+    }
+}
+
+/// Warns of channels that tell less than they should, and of targets for which a network is no better than ridge.
+pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
+    let name = |channel: usize| inputs[channel].name.clone();
+    let mut warnings: Vec<String> = findings.remarks.iter().map(|remark| remark.sentence(name)).collect();
+    for (target, found) in targets.iter().zip(&findings.targets) {
+        warnings.extend(found.gain.and_then(|gain| gain.remark(&target.name)));
+    }
+    warnings
 }
 
 /// Warns of targets on which the network is worse than ridge.

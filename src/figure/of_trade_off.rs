@@ -171,13 +171,17 @@ fn line(name: &str, at: LineAt, look: Look) -> ReferenceLine {
     ReferenceLine::new(name, at, look.hue, look.line.unwrap_or(LineStyle::Solid))
 }
 
-/// From point to point that no other beats, in steps: between them nothing better was measured.
+/// The points that no other beats, joined.
 fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
     let chosen = level.points.iter().zip(level.front(cost));
-    let places = chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
+    steps(chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
         let (x, y) = cost.of(point);
         [x, y]
-    });
+    }))
+}
+
+/// From point to point of a Pareto front, in steps: between them nothing better was measured.
+pub(super) fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let mut places: Vec<[f64; 2]> = places
         .filter(|place| place.iter().all(|part| part.is_finite()))
         .collect();

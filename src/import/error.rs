@@ -2,6 +2,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
+use super::Cure;
 use crate::dataset::{DatasetError, DivisionError, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
@@ -59,7 +60,7 @@ pub enum ImportError {
     #[error("no column is {0}; name at least one")]
     NoColumns(&'static str),
     /// A cell of a column that is used is no number.
-    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; correct it, or say that it means missing with --missing \"{text}\"", .path.display())]
+    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
     NotANumber {
         /// The file.
         path: PathBuf,
@@ -93,12 +94,14 @@ pub enum ImportError {
         reason: String,
     },
     /// Two files cannot be joined.
-    #[error("'{}' cannot be joined: {reason}", .path.display())]
+    #[error("'{}' cannot be joined: {reason}; {cure}", .path.display())]
     Join {
         /// The joined file.
         path: PathBuf,
-        /// Cause and cure.
+        /// Cause.
         reason: String,
+        /// Cure.
+        cure: Cure,
     },
     /// No row is left.
     #[error("none of the {rows} rows is left: {reasons}")]
@@ -125,6 +128,22 @@ pub enum ImportError {
     /// The caller ended the import.
     #[error("the import was cancelled")]
     Cancelled,
+}
+
+impl ImportError {
+    /// The message with its cure in other words than the library's, which know no window and no arguments.
+    pub fn with_cure(&self, words: impl Fn(&Cure) -> String) -> String {
+        let text = self.to_string();
+        let cure = match self {
+            Self::NotANumber { text, .. } => Cure::CallMissing(text.clone()),
+            Self::Join { cure, .. } => cure.clone(),
+            _ => return text,
+        };
+        match text.strip_suffix(&cure.to_string()) {
+            Some(cause) => format!("{cause}{}", words(&cure)),
+            None => text,
+        }
+    }
 }
 
 /// Defect in the contents of a file. Lines and columns are counted from 1.

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Cells, Channel, ImportError, Joined, Missing, Recipe, Recording, Table, Watch,
+    Cells, Channel, Cure, ImportError, Joined, Missing, Recipe, Recording, Table, Watch,
     csv_table::Reading,
     gather::{Source, gather},
     join::{Partners, median_interval, nearest},
@@ -138,17 +138,16 @@ impl Recipe {
         warnings: &mut Vec<String>,
     ) -> Result<Option<Partners>, ImportError> {
         let (path, table) = &files[number];
-        let refuse = |reason: String| ImportError::Join {
+        let refuse = |reason: String, cure: Cure| ImportError::Join {
             path: path.clone(),
             reason,
+            cure,
         };
         let main = &files[0].1;
         let Some(time) = meanings.time else {
             if table.rows != main.rows {
-                return Err(refuse(format!(
-                    "it has {} rows and the other file {}; name the columns of their times with --time and --join-time",
-                    table.rows, main.rows
-                )));
+                let reason = format!("it has {} rows and the other file {}", table.rows, main.rows);
+                return Err(refuse(reason, Cure::NameTimes));
             }
             return Ok(None);
         };
@@ -161,10 +160,8 @@ impl Recipe {
                 .map(|column| column.name.as_str())
                 .take(30)
                 .collect();
-            return Err(refuse(format!(
-                "it has no column '{wanted}' for its times, but {}; name it with --join-time",
-                all.join(", ")
-            )));
+            let reason = format!("it has no column '{wanted}' for its times, but {}", all.join(", "));
+            return Err(refuse(reason, Cure::NameJoinedTime));
         };
         let id = ColumnId { file: number, column };
         for id in [time, id] {
@@ -173,14 +170,11 @@ impl Recipe {
         let (Cells::Numbers(times), Cells::Numbers(joined_times)) =
             (&main.columns[time.column].cells, &table.columns[column].cells)
         else {
-            return Err(refuse(
-                "its times are a group as well; give the column one meaning".to_owned(),
-            ));
+            let reason = "its times are a group as well".to_owned();
+            return Err(refuse(reason, Cure::GiveOneMeaning));
         };
         let Some(limit) = joined.limit.or_else(|| Some(median_interval(joined_times)? / 2.0)) else {
-            return Err(refuse(
-                "its times are all the same; give the limit with --join-limit".to_owned(),
-            ));
+            return Err(refuse("its times are all the same".to_owned(), Cure::GiveLimit));
         };
         let partners = nearest(times, joined_times, limit);
         let mut uses = vec![0_usize; table.rows];

@@ -8,6 +8,7 @@ mod arrays;
 mod column;
 mod condition;
 mod csv_table;
+mod cure;
 mod detection;
 mod dialect;
 mod element;
@@ -39,6 +40,7 @@ mod watch;
 
 pub use column::{Cells, Column, Fault, Faults};
 pub use condition::Condition;
+pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
 pub use inputs::InputTable;

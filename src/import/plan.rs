@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{ImportError, Joined, Recipe, Recording, Watch};
+use super::{Cure, ImportError, Joined, Recipe, Recording, Watch};
 use crate::dataset::{Dataset, Division, Seed, Split, SplitBy, Stream};
 
 /// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
@@ -133,10 +133,11 @@ impl Recipe {
             return Err(ImportError::Join {
                 path: files.data.clone(),
                 reason: format!(
-                    "the test data need {} joined files and have {}; give one --test-join for each --join",
+                    "the test data need {} joined files and have {}",
                     self.join.len(),
                     files.join.len()
                 ),
+                cure: Cure::GiveTestFiles,
             });
         }
         let joined = self.join.iter().zip(&files.join).zip(self.stems());

@@ -142,6 +142,17 @@ impl Examples {
         (self.samples * self.outputs) as f64
     }
 
+    /// Mean of each target.
+    pub(super) fn target_means(&self) -> Vec<f64> {
+        let sum = |index| -> f64 {
+            let of_block = |block: BlockRef<'_>| column(block.targets.as_ref(), index).iter().sum::<f64>();
+            self.blocks().map(of_block).sum()
+        };
+        (0..self.outputs)
+            .map(|index| sum(index) / self.samples.max(1) as f64)
+            .collect()
+    }
+
     /// The blocks that are held.
     pub(super) fn held(&self) -> &[Block] {
         &self.data.blocks

@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     AdaptiveDescentSettings, Damping, Evaluation, Examples, GradientDescentSettings, MomentumSettings,
-    ResilientSettings, ScaledConjugateGradientSettings, Setting, SettingError, StepMomentumSettings, StopReason,
+    RegularizationSettings, ResilientSettings, ScaledConjugateGradientSettings, Setting, SettingError,
+    StepMomentumSettings, StopReason,
     adaptive_descent::{AdaptiveDescent, AdaptiveState},
     algorithm::{Algorithm, Checked, Description},
-    bayesian_regularization::{BayesianRegularization, BayesianState, RegularizationSettings},
+    bayesian_regularization::{BayesianRegularization, BayesianState},
     gradient_descent::GradientDescent,
     levenberg_marquardt::{DampedState, LevenbergMarquardt},
     momentum::Momentum,

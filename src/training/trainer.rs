@@ -115,7 +115,8 @@ pub struct Trainer {
     pub(super) activations: Activations,
 }
 
-/// The weights with the lowest validation error, or training error where nothing is held out.
+/// The weights with the lowest validation error, or training error where nothing is held out; the latest where the method
+/// then needs no validation.
 #[derive(Debug)]
 pub(super) struct Best {
     pub(super) mlp: Mlp,
@@ -204,7 +205,14 @@ impl Trainer {
         let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
         let deciding = validation_mse.unwrap_or(mse);
         let epoch = self.history.len();
-        if deciding < self.best.mse {
+        // Regularised weights are best where the regularised error is least, not the training error.
+        let is_regularized = validation_mse.is_none() && !self.settings.method.needs_validation();
+        let is_best = if is_regularized {
+            deciding.is_finite()
+        } else {
+            deciding < self.best.mse
+        };
+        if is_best {
             self.best.mse = deciding;
             self.best.epoch = epoch;
             self.best.mlp.weights_mut().copy_from_slice(self.mlp.weights());
@@ -259,7 +267,8 @@ impl Trainer {
         &self.mlp
     }
 
-    /// The best weights so far: those with the lowest validation error, or training error where nothing is held out.
+    /// The best weights so far: those with the lowest validation error, or training error where nothing is held out; the
+    /// latest ones of Bayesian regularisation then, which keeps the training error from its minimum.
     pub fn best(&self) -> &Mlp {
         &self.best.mlp
     }

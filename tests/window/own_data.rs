@@ -1,146 +1,25 @@
 //! Recordings out of files, in the window: dropped, looked at, trained on, saved and opened again.
 
-use std::{
-    fmt::Write as _,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write as _, fs, path::Path};
 
 use decoupler::{
     app::Notice,
-    dataset::{Division, Folds, Seed, SplitBy, Stream},
-    evaluation::{CrossValidated, Measured, Run, RunSettings},
+    dataset::{Folds, Seed, SplitBy, Stream},
+    evaluation::CrossValidated,
     export::{MeasuredNetworkFile, RecipeFile, format_number},
-    import::{Plan, Recipe},
-    scene::RowModel,
 };
 use eframe::egui::{self, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
-use tempfile::TempDir;
 
-use crate::{closing::close, driver::Driver};
-
-/// A file dropped on the window.
-#[derive(Debug)]
-struct Dropped(PathBuf);
-
-impl egui::DroppedFile for Dropped {
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn bytes(&self) -> Result<Vec<u8>, String> {
-        fs::read(&self.0).map_err(|error| error.to_string())
-    }
-}
-
-impl Driver {
-    /// Drops files on the window and waits until their columns are shown.
-    #[track_caller]
-    fn drop_files(&mut self, paths: &[&Path]) {
-        for path in paths {
-            let file = std::sync::Arc::new(Dropped((*path).to_owned()));
-            self.harness().input_mut().dropped_files.push(file);
-        }
-        self.harness().step();
-    }
-
-    /// As [`Self::drop_files`]; waits until the window has tried the import out.
-    #[track_caller]
-    fn open_recordings(&mut self, paths: &[&Path]) {
-        self.drop_files(paths);
-        self.wait("the samples", |driver| driver.says("Test: "));
-    }
-
-    /// Gives a column another meaning by its list.
-    #[track_caller]
-    fn mean(&mut self, column: &str, meaning: &str) {
-        self.click(&format!("Meaning of {column}"));
-        self.click_button(meaning);
-        self.settle();
-    }
-
-    /// Limits the training to so many epochs.
-    #[track_caller]
-    fn limit_epochs(&mut self, epochs: &str) {
-        // What is unfolded in one view is in the others too.
-        if !self.has("Epochs") {
-            self.click("When to stop");
-        }
-        self.enter("Epochs", epochs);
-    }
-
-    /// Presses Train and waits for the end.
-    #[track_caller]
-    fn train_own_data(&mut self) {
-        self.click("▶ Train");
-        self.wait("the end of the training", |driver| driver.says("Finished: "));
-        self.settle();
-    }
-}
-
-/// Readings of two channels and a target that is nearly linear in them, in the order of time.
-fn recording(rows: usize) -> String {
-    let mut text = "time (s),u1 (V),u2 (V),x (mm),y (mm)\n".to_owned();
-    for row in 0..rows {
-        let t = row as f64;
-        let (x, y) = (10.0 + 5.0 * (0.37 * t).sin(), 4.0 * (0.23 * t).cos());
-        let (u1, u2) = (0.2 * x + 0.05 * y + 0.01 * x * y / 40.0, 0.3 * y - 0.02 * x);
-        writeln!(text, "{},{u1:.6},{u2:.6},{x:.6},{y:.6}", 0.1 * t).unwrap();
-    }
-    text
-}
-
-fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
-    let path = folder.path().join(name);
-    fs::write(&path, text).unwrap();
-    path
-}
-
-/// The plan that the window makes of [`recording`].
-fn plan(path: &Path) -> Plan {
-    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    Plan {
-        import: Recipe {
-            data: path.to_owned(),
-            inputs: names(&["u1", "u2"]),
-            targets: names(&["x", "y"]),
-            time: Some("time".to_owned()),
-            ..Recipe::default()
-        },
-        division: Division::default(),
-        ..Plan::default()
-    }
-}
-
-/// The library's settings for measured samples, with five epochs.
-fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
-    settings.training.stopping.epochs = 5;
-    settings
-}
-
-/// What the library makes of the plan with these settings.
-fn trained(plan: &Plan) -> Run {
-    let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
-    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
-    while run.step().is_none() {}
-    run
-}
-
-/// Cells of the error tables on show: `x (mm), network, RMSE: 0.1`.
-fn cells(driver: &Driver) -> Vec<String> {
-    let is_cell = |text: &String| text.contains(", RMSE: ") || text.contains(", MAE: ") || text.contains(", worst: ");
-    driver.texts().into_iter().filter(is_cell).collect()
-}
+use crate::{
+    closing::close,
+    driver::Driver,
+    recordings::{cells, opened, opened_text, plan, recording, settings, trained, written},
+};
 
 #[test]
 fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(120));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, path, _folder) = opened(120);
     assert_eq!(driver.shown(), "Own data");
     for (column, meaning) in [
         ("time", "time"),
@@ -175,19 +54,22 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
     driver.click("Regression");
     driver.settle();
     assert!(driver.says("decoupled x (mm) against actual x (mm)"));
+    driver.click("Sample");
+    driver.settle();
+    assert!(
+        driver.has("Test sample") && driver.says("value (mm)"),
+        "all targets of one sample"
+    );
 }
 
 #[test]
 fn a_network_is_saved_and_opened_again_with_its_charts() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(60));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, path, folder) = opened(60);
     driver.limit_epochs("3");
     driver.train_own_data();
     let shown = cells(&driver);
     let saved = folder.path().join("network.json");
-    driver.save("Network, JSON", &saved);
+    driver.save("Network file, JSON", &saved);
     assert!(
         matches!(driver.notice(), Some(Notice::Done(_))),
         "{:?}",
@@ -314,10 +196,7 @@ fn bad_cells_are_told_by_line_and_column_and_can_be_called_missing() {
 
 #[test]
 fn a_random_split_is_said_to_flatter() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(40));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("flatters"));
     driver.click("Split");
     driver.click_button("random");
@@ -328,10 +207,7 @@ fn a_random_split_is_said_to_flatter() {
 
 #[test]
 fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(60));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, path, folder) = opened(60);
     driver.limit_epochs("3");
     driver.train_own_data();
     let saved = folder.path().join("half.checkpoint");
@@ -430,10 +306,7 @@ fn networks_are_listed_compared_and_kept_from_session_to_session() {
 
 #[test]
 fn a_cross_validation_has_the_errors_of_the_library() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(60));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, path, _folder) = opened(60);
     driver.limit_epochs("5");
     driver.click("Cross-validation");
     driver.enter("Folds", "3");
@@ -458,15 +331,12 @@ fn a_cross_validation_has_the_errors_of_the_library() {
 
 #[test]
 fn a_column_of_groups_divides_the_samples_by_them() {
-    let folder = tempfile::tempdir().unwrap();
     let mut text = "session,u,v,force (N)\n".to_owned();
     for row in 0..50 {
         let (u, v) = (f64::from(row % 7), f64::from(row % 5));
         writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
     }
-    let path = written(&folder, "sessions.csv", &text);
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, _path, _folder) = opened_text(&text);
     assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
     // Another group takes its place, and without one the samples are divided in time.
@@ -481,10 +351,7 @@ fn a_column_of_groups_divides_the_samples_by_them() {
 
 #[test]
 fn closing_asks_about_a_training_on_own_data() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(60));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&path]);
+    let (mut driver, _path, _folder) = opened(60);
     driver.limit_epochs("100000");
     driver.click("▶ Train");
     driver.wait("an epoch", |driver| !cells(driver).is_empty());

@@ -26,7 +26,7 @@ pub use export::{
 };
 pub use file_task::{Contents, FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
-pub use network_exports::{NetworkSource, file_stem, network_exports};
+pub use network_exports::{NetworkSource, file_stem, network_exports, own_network_exports};
 pub use notice::{Matter, Notice};
 pub use offers::{Action, Offers};
 pub use opening::opening_settings;

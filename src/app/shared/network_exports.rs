@@ -7,8 +7,8 @@ use crate::{
     app::training_worker::RunId,
     evaluation::{DecoderReport, PastNetworks, Run, SimulatedSettings},
     export::{
-        NetworkFile,
-        bundle::{BundleFormat, BundlePrecision, BundleReport, export_bundle},
+        MeasuredNetworkFile, NetworkFile,
+        bundle::{BundleError, BundleFormat, BundlePrecision, BundleReport, export_bundle},
         format_number,
         report::RunReport,
     },
@@ -68,28 +68,15 @@ pub fn network_exports<'a>(
     source: &Result<NetworkSource, String>,
     decoders: impl Fn() -> Vec<DecoderReport> + Clone + 'a,
 ) -> Vec<Export<'a>> {
-    let bundles = BundleFormat::ALL.into_iter().flat_map(|format| {
-        let precisions = format.precisions().iter();
-        precisions.map(move |&precision| (format, precision))
-    });
     let ask = |task: Box<dyn FnOnce(NetworkSource) -> FileTask + 'a>| {
         source
             .clone()
             .map(|source| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task(source))) })
     };
-    let mut exports: Vec<Export<'a>> = bundles
+    let mut exports: Vec<Export<'a>> = bundles()
         .map(|(format, precision)| {
-            let words = bundle_words(format);
-            Export {
-                group: ExportGroup::Network,
-                name: format!("{prefix}{}", bundle_name(format)),
-                form: match format {
-                    BundleFormat::Json => "JSON".to_owned(),
-                    _ => precision.to_string(),
-                },
-                description: words.description,
-                ask: ask(Box::new(move |source| bundle_task(&source, format, precision))),
-            }
+            let task = move |source| bundle_task(&source, format, precision);
+            bundle_export(prefix, (format, precision), bundle_words(format), ask(Box::new(task)))
         })
         .collect();
     exports.push(Export {
@@ -100,6 +87,61 @@ pub fn network_exports<'a>(
         ask: ask(Box::new(move |source| report_task(&source, decoders()))),
     });
     exports
+}
+
+/// A network of own data in every form that it can have, in files named after `stem`; `file` gives it, or the reason why
+/// there is none.
+pub fn own_network_exports<'a>(stem: &str, file: &Result<Arc<MeasuredNetworkFile>, String>) -> Vec<Export<'a>> {
+    let export = |(format, precision)| {
+        let words = own_bundle_words(format);
+        let ask = file.clone().map(|file| -> Ask<'a> {
+            let (name, contents) = match format {
+                BundleFormat::Json => (format!("{stem}-network"), Contents::new(move |path| file.save(path))),
+                _ => (
+                    format!("{stem}-{format}-{precision}"),
+                    bundle_contents(move |path| export_bundle(&*file, format, precision, path)),
+                ),
+            };
+            Box::new(move || Effect::ChooseFile(FileTask::save(words, &name, contents)))
+        });
+        bundle_export("", (format, precision), words, ask)
+    };
+    bundles().map(export).collect()
+}
+
+/// Every form of a network with its precisions.
+fn bundles() -> impl Iterator<Item = (BundleFormat, BundlePrecision)> {
+    BundleFormat::ALL.into_iter().flat_map(|format| {
+        let precisions = format.precisions().iter();
+        precisions.map(move |&precision| (format, precision))
+    })
+}
+
+fn bundle_export<'a>(
+    prefix: &str,
+    (format, precision): (BundleFormat, BundlePrecision),
+    words: FileWords,
+    ask: Result<Ask<'a>, String>,
+) -> Export<'a> {
+    Export {
+        group: ExportGroup::Network,
+        name: format!("{prefix}{}", bundle_name(format)),
+        form: match format {
+            BundleFormat::Json => "JSON".to_owned(),
+            _ => precision.to_string(),
+        },
+        description: words.description,
+        ask,
+    }
+}
+
+/// The contents that `export` writes and verifies.
+fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
+    Contents::telling(move |path| {
+        export(path)
+            .map(|report| told(&report))
+            .map_err(|error| error.to_string())
+    })
 }
 
 fn bundle_name(format: BundleFormat) -> &'static str {
@@ -147,26 +189,54 @@ fn bundle_words(format: BundleFormat) -> FileWords {
     }
 }
 
+fn own_bundle_words(format: BundleFormat) -> FileWords {
+    let description = match format {
+        BundleFormat::Onnx => {
+            "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out, in the units \
+             of the recording."
+        }
+        BundleFormat::C99 => {
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out, in the units of the \
+             recording. fixed16 computes in whole numbers only, for microcontrollers."
+        }
+        BundleFormat::Matlab => {
+            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out, in the \
+             units of the recording."
+        }
+        BundleFormat::NumPy => {
+            "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out, in the units \
+             of the recording."
+        }
+        BundleFormat::Json => {
+            "The network with its settings, record and errors, and the recipe of its import. It opens here again, and the \
+             terminal commands decode and export read it."
+        }
+    };
+    FileWords {
+        description,
+        ..bundle_words(format)
+    }
+}
+
 fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePrecision) -> FileTask {
     let words = bundle_words(format);
     if format == BundleFormat::Json {
         return source.task(words, "network", |file, _| Contents::new(move |path| file.save(path)));
     }
     source.task(words, &format!("{format}-{precision}"), move |file, _| {
-        Contents::telling(move |path| {
-            let report = export_bundle(&*file, format, precision, path).map_err(|error| error.to_string())?;
-            Ok(told(&report))
-        })
+        bundle_contents(move |path| export_bundle(&*file, format, precision, path))
     })
 }
 
 /// Sentence that tells of a bundle that was written.
 fn told(report: &BundleReport) -> String {
-    let deviation_mm = report.deviation() * report.output_range_mm.unwrap_or_default();
+    let deviation = match report.output_range_mm {
+        Some(range_mm) => format!("{} mm", format_number(report.deviation() * range_mm)),
+        None => format!("{:.1e} of the range of a target", report.deviation()),
+    };
     let mut text = format!(
-        "{} written and read back: largest deviation {} mm. Saved {}",
+        "{} written and read back: largest deviation {deviation}. Saved {}",
         bundle_name(report.format),
-        format_number(deviation_mm),
         report.path.display()
     );
     for remark in &report.remarks {

@@ -1,3 +1,5 @@
+use std::fmt;
+
 use super::{
     ChannelImportance, ChannelRemark, Determination, FittedModel, LearningCurve, NonlinearGain, SplitComparison,
     channel_importance, channel_remarks,
@@ -49,7 +51,23 @@ pub enum Stage {
     Samples,
 }
 
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Folds => "cross-validation",
+            Self::OtherFolds => "cross-validation by another split",
+            Self::Channels => "fits without each channel",
+            Self::Samples => "fits to fewer samples",
+        })
+    }
+}
+
 impl Findings {
+    /// Largest number of networks that [`Self::measure`] trains for so many channels, with so many folds.
+    pub fn most_trainings(channels: usize, folds: usize) -> usize {
+        (2 + channels + 1) * folds + LearningCurve::MOST_FITS
+    }
+
     /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
     /// curve; `None` if cancelled. `model` is what is fitted without each channel and to fewer samples: if it is not given, the
     /// network where it is worth more than ridge regression for a target, else ridge; with ridge, no network is trained at all.

@@ -24,6 +24,10 @@ use serde_json::value::to_raw_value;
 use super::{AtomicFile, DocumentError, DocumentKind, WriteError, sealed::Sealed};
 use crate::dataset::system_cause;
 
+#[cfg(feature = "gui")]
+pub(crate) use self::row::SweepRow;
+#[cfg(any(test, feature = "gui"))]
+pub(crate) use self::specification::sweep_specification;
 pub(crate) use self::{
     merging::{MergedSweep, SweepFolderError},
     plan_file::SweepPlan,
@@ -31,10 +35,6 @@ pub(crate) use self::{
     trial_file::{Trial, TrialOptions},
     trial_id::TrialId,
 };
-#[cfg(feature = "gui")]
-pub(crate) use self::row::SweepRow;
-#[cfg(any(test, feature = "gui"))]
-pub(crate) use self::specification::sweep_specification;
 #[cfg(feature = "cli")]
 pub(crate) use self::{plan_file::PlanAxis, table::SweepTableFormat, train_options::decoders_in_order};
 

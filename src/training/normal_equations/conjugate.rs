@@ -13,6 +13,7 @@ use super::{
     cost::Cost,
     elimination::output_weights,
     hidden_solver::{HiddenSolver, System},
+    weight_classes::PerClass,
 };
 use crate::{
     network::Shape,
@@ -229,7 +230,15 @@ impl ConjugateGradient {
             let mut sum = sum.as_mut().subcols_mut(node, 1);
             let (f, mixed) = (f(node), mixed.as_ref().subcols(node, 1));
             matmul(sum.as_mut(), Accum::Add, f, mixed, -1.0, Par::Seq);
-            add_scaled(column_mut(sum, 0), system.damping, column(direction, node));
+            let (sum, direction) = (column_mut(sum, 0), column(direction, node));
+            let PerClass {
+                hidden_weights,
+                hidden_biases,
+                ..
+            } = system.damping;
+            let bias = direction.len() - 1;
+            add_scaled(&mut sum[..bias], hidden_weights, &direction[..bias]);
+            add_scaled(&mut sum[bias..], hidden_biases, &direction[bias..]);
         }
     }
 
@@ -259,7 +268,7 @@ impl ConjugateGradient {
             );
             for index in 0..n1 {
                 scale(&mut column_mut(block.as_mut(), index)[index..], weight);
-                block[(index, index)] += system.damping + RIDGE * weight * largest;
+                block[(index, index)] += system.damping.of_input(index, n1 - 1) + RIDGE * weight * largest;
             }
             self.cholesky.factor(block)?;
         }
@@ -311,7 +320,7 @@ mod tests {
     use super::*;
     use crate::training::{
         examples::tests::{random_examples, random_mlp},
-        normal_equations::{elimination::Elimination, products::Products},
+        normal_equations::{Decay, elimination::Elimination, products::Products},
     };
 
     /// Solves at damping 1e-3 within so many iterations.
@@ -324,14 +333,14 @@ mod tests {
         let mut kept = KeptActivations::new(shape, &examples, 1);
         products.gather(&solver, &mlp, &examples, &mut kept);
         let (mut elimination, mut right) = (Elimination::new(shape), vec![0.0; shape.hidden_weights()]);
-        elimination.factor(products.sums(), 1e-3)?;
-        elimination.reduce(products.sums(), &mlp, 0.0, &mut right);
+        elimination.factor(products.sums(), PerClass::all(1e-3))?;
+        elimination.reduce(products.sums(), &mlp, Decay::NONE, &mut right);
         let system = System {
             mlp: &mlp,
             examples: &examples,
             sums: products.sums(),
             elimination: &elimination,
-            damping: 1e-3,
+            damping: PerClass::all(1e-3),
         };
         solver.solve(system, &mut kept, &mut right)
     }

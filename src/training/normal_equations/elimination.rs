@@ -5,6 +5,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 use super::{
     cholesky::{Cholesky, solve_rows, substitute},
     sums::Sums,
+    weight_classes::{Decay, PerClass},
 };
 use crate::network::{Mlp, Shape};
 
@@ -36,11 +37,11 @@ impl Elimination {
         }
     }
 
-    /// Factors G = H̃ᵀH̃ + `damping`·I; `None` if it is not positive definite in the arithmetic.
-    pub(super) fn factor(&mut self, sums: &Sums, damping: f64) -> Option<()> {
+    /// Factors G = H̃ᵀH̃ + `damping` on the diagonal; `None` if it is not positive definite in the arithmetic.
+    pub(super) fn factor(&mut self, sums: &Sums, damping: PerClass) -> Option<()> {
         self.g_factor.copy_from(&sums.g);
         for node in 0..self.g_factor.nrows() {
-            self.g_factor[(node, node)] += damping;
+            self.g_factor[(node, node)] += damping.of_node(node, self.shape.hidden);
         }
         self.cholesky.factor(self.g_factor.as_mut())?;
         self.f.copy_from(sums.c());
@@ -50,12 +51,13 @@ impl Elimination {
 
     /// Writes the negative right-hand side of the hidden layer, (Jwᵀe + decay·w) − Σₜ diag(V̄ₜ ⊗ 1) C G⁻¹ (Jvᵀe +
     /// decay·v)ₜ.
-    pub(super) fn reduce(&mut self, sums: &Sums, mlp: &Mlp, decay: f64, right: &mut [f64]) {
-        let n1 = self.shape.inputs + 1;
+    pub(super) fn reduce(&mut self, sums: &Sums, mlp: &Mlp, decay: Decay<'_>, right: &mut [f64]) {
+        let Shape { inputs, hidden, .. } = self.shape;
+        let n1 = inputs + 1;
         let mut right = MatMut::from_column_major_slice_mut(right, n1, self.shape.hidden);
         let (w, v) = layers(mlp);
         fill(self.output.as_mut(), |row, column| {
-            sums.gradient_v[(row, column)] + decay * v[(row, column)]
+            sums.gradient_v[(row, column)] + decay.pull_in_output((row, hidden), column, v[(row, column)])
         });
         substitute(self.g_factor.as_ref(), self.output.as_mut());
         let v = v.subrows(0, self.shape.hidden);
@@ -69,7 +71,7 @@ impl Elimination {
             alone,
         );
         fill(right.as_mut(), |input, node| {
-            sums.gradient_w[(input, node)] + decay * w[(input, node)]
+            sums.gradient_w[(input, node)] + decay.pull_in_hidden((input, inputs), w[(input, node)])
         });
         for node in 0..self.shape.hidden {
             let (c, small) = (sums.c().subrows(node * n1, n1), self.small.as_ref().subcols(node, 1));
@@ -79,7 +81,7 @@ impl Elimination {
 
     /// Writes the whole step in the order of [`Mlp::weights`], given the hidden layer's negative step `d`:
     /// δV = −G⁻¹ (Jvᵀe + decay·v − K V̄), column i of K being Cᵢᵀ dᵢ.
-    pub(super) fn complete(&mut self, sums: &Sums, mlp: &Mlp, decay: f64, d: &[f64], step: &mut [f64]) {
+    pub(super) fn complete(&mut self, sums: &Sums, mlp: &Mlp, decay: Decay<'_>, d: &[f64], step: &mut [f64]) {
         let n1 = self.shape.inputs + 1;
         let d = MatRef::from_column_major_slice(d, n1, self.shape.hidden);
         for node in 0..self.shape.hidden {
@@ -88,8 +90,9 @@ impl Elimination {
             matmul(k, Accum::Replace, c, d.subcols(node, 1), -1.0, Par::Seq);
         }
         let (_, v) = layers(mlp);
+        let hidden = self.shape.hidden;
         fill(self.output.as_mut(), |row, column| {
-            sums.gradient_v[(row, column)] + decay * v[(row, column)]
+            sums.gradient_v[(row, column)] + decay.pull_in_output((row, hidden), column, v[(row, column)])
         });
         let v = v.subrows(0, self.shape.hidden);
         matmul(self.output.as_mut(), Accum::Add, self.small.as_ref(), v, 1.0, Par::Seq);

@@ -11,6 +11,7 @@ use super::{
     output_layer::{OutputLayer, ridge},
     products::Products,
     schur::SchurComplement,
+    weight_classes::{Decay, PerClass},
 };
 use crate::{
     network::{Mlp, Shape},
@@ -98,10 +99,20 @@ impl NormalEquations<SchurComplement> {
     /// the arithmetic.
     pub(in crate::training) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
         let (sums, v) = (self.products.sums(), output_weights(mlp));
+        let damping = PerClass::all(damping);
         self.elimination.factor(sums, damping)?;
         self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
         let trace = self.solver.trace_of_inverse(&mut self.elimination, v);
         trace.is_finite().then_some(trace)
+    }
+
+    /// As [`Self::trace_of_inverse`], the part of each class of weights, which each have their damping.
+    pub(in crate::training) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: PerClass) -> Option<PerClass> {
+        let (sums, v) = (self.products.sums(), output_weights(mlp));
+        self.elimination.factor(sums, damping)?;
+        self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
+        let traces = self.solver.traces_of_inverse(&mut self.elimination, v);
+        traces.values().iter().all(|trace| trace.is_finite()).then_some(traces)
     }
 }
 
@@ -141,17 +152,17 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         mu: f64,
         step: &mut [f64],
     ) -> Option<()> {
-        self.solve_with_decay(mlp, examples, mu, 0.0, step)
+        self.solve_with_decay(mlp, examples, PerClass::all(mu), Decay::NONE, step)
     }
 
-    /// As [`Self::solve`], with `decay`·Σw² added to the sum of squared errors: solves
+    /// As [`Self::solve`], with `decay`·Σw² of each class added to the sum of squared errors: solves
     /// `(JᵀJ + damping·I) δ = −(Jᵀe + decay·w)`. The `damping` includes the `decay`.
     pub(in crate::training) fn solve_with_decay(
         &mut self,
         mlp: &Mlp,
         examples: &Examples,
-        damping: f64,
-        decay: f64,
+        damping: PerClass,
+        decay: Decay<'_>,
         step: &mut [f64],
     ) -> Option<()> {
         let sums = self.products.sums();
@@ -172,13 +183,13 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         step: &mut [f64],
     ) -> Option<()> {
         let sums = self.products.sums();
-        self.elimination.factor(sums, ridge(&sums.g))?;
+        self.elimination.factor(sums, PerClass::all(ridge(&sums.g)))?;
         let gradient = sums.gradient_w.col_iter().flat_map(|column| column.iter());
         self.right
             .iter_mut()
             .zip(gradient)
             .for_each(|(right, gradient)| *right = *gradient);
-        self.solve_for_hidden(mlp, examples, mu)?;
+        self.solve_for_hidden(mlp, examples, PerClass::all(mu))?;
         let shape = mlp.shape();
         let right = MatRef::from_column_major_slice(&self.right, shape.inputs + 1, shape.hidden);
         write_negative(right, step);
@@ -186,7 +197,7 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     }
 
     /// Replaces the right-hand side of the hidden layer by its solution.
-    fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: f64) -> Option<()> {
+    fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: PerClass) -> Option<()> {
         let system = System {
             mlp,
             examples,
@@ -198,19 +209,26 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     }
 
     /// Returns the length of Jᵀe + decay·w from the products last gathered.
-    pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: f64) -> f64 {
+    pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: Decay<'_>) -> f64 {
         let (w, v) = mlp.layers();
+        let Shape { inputs, hidden, .. } = mlp.shape();
         // By `hypot`, since the squares overflow where the error weighs next to nothing against the weights.
-        let length = |gradient: MatRef<'_, f64>, weights: &[f64]| -> f64 {
+        let length = |gradient: MatRef<'_, f64>, weights: &[f64], pull: &dyn Fn(usize, usize, f64) -> f64| -> f64 {
             let weights = MatRef::from_row_major_slice(weights, gradient.nrows(), gradient.ncols());
-            let columns = gradient.col_iter().zip(weights.col_iter());
-            columns
-                .flat_map(|(gradient, weights)| gradient.iter().zip(weights.iter()))
-                .map(|(gradient, weight)| gradient + decay * weight)
-                .fold(0.0, f64::hypot)
+            let columns = gradient.col_iter().zip(weights.col_iter()).enumerate();
+            let entries = columns.flat_map(|(column, (gradient, weights))| {
+                let entries = gradient.iter().zip(weights.iter()).enumerate();
+                entries.map(move |(row, (gradient, weight))| gradient + pull(row, column, *weight))
+            });
+            entries.fold(0.0, f64::hypot)
         };
-        let w = length(self.products.sums().gradient_w.as_ref(), w);
-        w.hypot(length(self.products.sums().gradient_v.as_ref(), v))
+        let sums = self.products.sums();
+        let w = length(sums.gradient_w.as_ref(), w, &|row, _, weight| {
+            decay.pull_in_hidden((row, inputs), weight)
+        });
+        w.hypot(length(sums.gradient_v.as_ref(), v, &|row, column, weight| {
+            decay.pull_in_output((row, hidden), column, weight)
+        }))
     }
 
     /// Gives `mlp` the output layer of least squared error for its hidden layer; `None` if there is none in the
@@ -221,126 +239,4 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{
-        super::dense::{DampedLeastSquares, distance},
-        *,
-    };
-    use crate::training::{
-        backpropagation::Backpropagation,
-        examples::tests::{random_examples, random_mlp},
-    };
-
-    /// Every solver, with its name.
-    fn solvers(shape: Shape, examples: &Examples) -> [(&'static str, NormalEquations); 2] {
-        let samples = examples.samples();
-        let factored = NormalEquations::<dyn HiddenSolver>::with_solver(
-            Box::new(SchurComplement::new(shape, examples)),
-            &SchurComplement::cost(shape, samples),
-            examples,
-        );
-        let iterated = NormalEquations::<dyn HiddenSolver>::with_solver(
-            Box::new(ConjugateGradient::new(shape, examples)),
-            &ConjugateGradient::cost(shape, samples),
-            examples,
-        );
-        [("factored", factored), ("conjugate gradients", iterated)]
-    }
-
-    /// The step at damping `mu`, solved as after a rejected step: another network was evaluated since.
-    fn step(equations: &mut NormalEquations, mlp: &Mlp, examples: &Examples, mu: f64) -> Option<Vec<f64>> {
-        equations.gather(mlp, examples);
-        equations.mse(&Mlp::zeros(mlp.shape()), examples);
-        let mut step = vec![0.0; mlp.weights().len()];
-        equations.solve(mlp, examples, mu, &mut step)?;
-        Some(step)
-    }
-
-    /// Rounding is amplified by the condition number κ of the normal equations, and so is the residual that conjugate
-    /// gradients leave. The directions in which the step is then uncertain hardly change the linearised error: at least
-    /// its decrease is found to six digits.
-    #[test]
-    fn the_step_is_that_of_the_dense_jacobian() {
-        for (inputs, hidden, outputs, samples) in [
-            (5, 4, 3, 300),
-            (1, 1, 1, 3),
-            (7, 2, 1, 40),
-            (12, 6, 5, 513),
-            (8, 12, 2, 40),
-            (10, 16, 3, 90),
-        ] {
-            let mlp = random_mlp(inputs, hidden, outputs, 1);
-            let examples = random_examples(samples, inputs, outputs, 2);
-            for mu in [1e-14, 1e-10, 1e-6, 1e-3, 1.0, 1e6] {
-                let dense = DampedLeastSquares::new(&mlp, &examples, mu);
-                let (expected, condition) = (dense.step(), dense.normal_condition());
-                let [(_, mut factored), (_, mut iterated)] = solvers(mlp.shape(), &examples);
-                let what = format!("{inputs}-{hidden}-{outputs}, mu {mu:e}, condition {condition:.1e}");
-                let rounding = 30.0 * f64::EPSILON * condition;
-                match step(&mut factored, &mlp, &examples, mu) {
-                    Some(step) => {
-                        let distance = distance(&step, &expected);
-                        assert!(distance < rounding.max(1e-12), "{what}, factored: {distance:e}");
-                    }
-                    // Lost in rounding.
-                    None => assert!(rounding > 1.0, "{what}, factored"),
-                }
-                match step(&mut iterated, &mlp, &examples, mu) {
-                    Some(step) => {
-                        let distance = distance(&step, &expected);
-                        let missed = dense.missed(&step, &expected);
-                        assert!(missed < 1e-6, "{what}, iterated: {missed:e}");
-                        let close = rounding + 1e-8 * condition;
-                        assert!(distance < close || condition > 1e6, "{what}, iterated: {distance:e}");
-                    }
-                    None => assert!(rounding > 1.0, "{what}, iterated"),
-                }
-            }
-        }
-    }
-
-    /// Enough samples that they are divided into parts.
-    #[test]
-    fn parts_of_the_samples_add_up() {
-        let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
-        let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
-        let blocks = examples.block_count();
-        assert!(SchurComplement::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
-        assert!(ConjugateGradient::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
-        let [factored, iterated] = solvers(mlp.shape(), &examples).map(|(name, mut equations)| {
-            let ours = equations.gather(&mlp, &examples);
-            assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-13, "{name}");
-            step(&mut equations, &mlp, &examples, 1.0).unwrap()
-        });
-        for (a, b) in factored.iter().zip(&iterated) {
-            assert!((a - b).abs() < 1e-6 * a.abs().max(1e-3), "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn it_evaluates_as_back_propagation_does() {
-        let mlp = random_mlp(6, 5, 4, 3);
-        let examples = random_examples(400, 6, 4, 4);
-        let ours = NormalEquations::cheapest(mlp.shape(), &examples).gather(&mlp, &examples);
-        let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
-        assert!((ours.mse - expected.mse).abs() < 1e-14);
-        assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-14);
-    }
-
-    #[test]
-    fn a_singular_system_is_refused_or_solved_but_never_nan() {
-        let mlp = Mlp::zeros(Shape {
-            inputs: 3,
-            hidden: 2,
-            outputs: 2,
-        });
-        let examples = random_examples(2, 3, 2, 5);
-        for (name, mut equations) in solvers(mlp.shape(), &examples) {
-            for mu in [0.0, 1e-300, 1e-3, 1e300] {
-                if let Some(step) = step(&mut equations, &mlp, &examples, mu) {
-                    assert!(step.iter().all(|value| value.is_finite()), "{name}, mu {mu}");
-                }
-            }
-        }
-    }
-}
+mod tests;

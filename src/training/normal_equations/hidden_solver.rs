@@ -2,7 +2,7 @@
 
 use faer::{Mat, MatMut, MatRef};
 
-use super::{cost::Cost, elimination::Elimination, sums::Sums};
+use super::{cost::Cost, elimination::Elimination, sums::Sums, weight_classes::PerClass};
 use crate::{
     network::{Mlp, Shape},
     training::{
@@ -50,12 +50,12 @@ pub(in crate::training) trait HiddenSolver: Send + Sync {
     fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()>;
 }
 
-/// The matrix S = damping·I + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ), by the parts it is made of.
+/// The matrix S = damping on the diagonal + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ), by the parts it is made of.
 #[derive(Clone, Copy)]
 pub(in crate::training) struct System<'a> {
     pub(super) mlp: &'a Mlp,
     pub(super) examples: &'a Examples,
     pub(super) sums: &'a Sums,
     pub(super) elimination: &'a Elimination,
-    pub(super) damping: f64,
+    pub(super) damping: PerClass,
 }

@@ -27,5 +27,7 @@ mod output_layer;
 mod products;
 mod schur;
 mod sums;
+mod weight_classes;
 
 pub(super) use equations::{FactoredEquations, NormalEquations};
+pub(super) use weight_classes::{Decay, PerClass, class_sizes, class_squares};

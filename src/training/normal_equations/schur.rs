@@ -20,6 +20,7 @@ use super::{
     elimination::{Elimination, fill, output_weights},
     hidden_solver::{HiddenSolver, System},
     sums::Sums,
+    weight_classes::PerClass,
 };
 use crate::{
     network::Shape,
@@ -126,7 +127,13 @@ impl HiddenSolver for SchurComplement {
 impl SchurComplement {
     /// Factors S for a damping of W, with V̄ (h × outputs) and F; `None` if it is not positive definite in the
     /// arithmetic.
-    pub(super) fn factor(&mut self, sums: &Sums, f: MatRef<'_, f64>, v: MatRef<'_, f64>, damping: f64) -> Option<()> {
+    pub(super) fn factor(
+        &mut self,
+        sums: &Sums,
+        f: MatRef<'_, f64>,
+        v: MatRef<'_, f64>,
+        damping: PerClass,
+    ) -> Option<()> {
         let terms = Terms {
             gram: sums.gram.as_ref(),
             v,
@@ -135,7 +142,7 @@ impl SchurComplement {
         };
         fill_schur(&terms, 0, self.s.as_mut(), &mut self.squares);
         for index in 0..self.s.nrows() {
-            self.s[(index, index)] += damping;
+            self.s[(index, index)] += damping.of_input(index % (self.shape.inputs + 1), self.shape.inputs);
         }
         self.cholesky.factor(self.s.as_mut())
     }
@@ -144,22 +151,73 @@ impl SchurComplement {
     /// `tr S⁻¹ + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ that
     /// is `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius).
     pub(super) fn trace_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> f64 {
-        let (n1, h1) = (self.shape.inputs + 1, self.shape.hidden + 1);
-        let Elimination { g_factor, f, .. } = elimination;
-        let inverse = self.inverse.get_or_insert_with(|| Inverse::new(self.s.nrows(), h1));
+        let outputs = self.shape.outputs as f64;
+        let inverse = self.invert(elimination);
+        let mut trace = squared_lower(&inverse.s) + outputs * squared_lower(&inverse.g);
+        self.for_each_output(elimination, v, |r| trace += r.squared_norm_l2());
+        trace
+    }
+
+    /// As [`Self::trace_of_inverse`], class by class: entry k of the diagonal is the square of column k of L⁻¹, or of Lg⁻¹
+    /// and all L⁻¹ Rₜ.
+    pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> PerClass {
+        let Shape {
+            inputs,
+            hidden,
+            outputs,
+        } = self.shape;
+        let inverse = self.invert(elimination);
+        let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+        let mut traces = PerClass::all(0.0);
+        for index in 0..inverse.s.ncols() {
+            let square = squares(&column(inverse.s.as_ref(), index)[index..]);
+            if index % (inputs + 1) == inputs {
+                traces.hidden_biases += square;
+            } else {
+                traces.hidden_weights += square;
+            }
+        }
+        let mut of_nodes: Vec<f64> = (0..=hidden)
+            .map(|node| outputs as f64 * squares(&column(inverse.g.as_ref(), node)[node..]))
+            .collect();
+        self.for_each_output(elimination, v, |r| {
+            for (node, sum) in of_nodes.iter_mut().enumerate() {
+                *sum += squares(column(r, node));
+            }
+        });
+        traces.output_biases = of_nodes[hidden];
+        traces.output_weights = of_nodes[..hidden].iter().sum();
+        traces
+    }
+
+    /// Inverts the factors of S and G.
+    fn invert(&mut self, elimination: &Elimination) -> &Inverse {
+        let (order, h1) = (self.s.nrows(), self.shape.hidden + 1);
+        let inverse = self.inverse.get_or_insert_with(|| Inverse::new(order, h1));
         invert_lower_triangular(inverse.s.as_mut(), self.s.as_ref(), Par::Seq);
-        invert_lower_triangular(inverse.g.as_mut(), g_factor.as_ref(), Par::Seq);
-        let mut trace = squared_lower(&inverse.s) + self.shape.outputs as f64 * squared_lower(&inverse.g);
+        invert_lower_triangular(inverse.g.as_mut(), elimination.g_factor.as_ref(), Par::Seq);
+        inverse
+    }
+
+    /// Calls `add` with L⁻¹ Rₜ of every output, after [`Self::invert`].
+    fn for_each_output(
+        &mut self,
+        elimination: &mut Elimination,
+        v: MatRef<'_, f64>,
+        mut add: impl FnMut(MatRef<'_, f64>),
+    ) {
+        let n1 = self.shape.inputs + 1;
+        let Elimination { g_factor, f, .. } = elimination;
+        let Some(Inverse { r, .. }) = &mut self.inverse else {
+            return;
+        };
         // F = C Lg⁻ᵀ becomes C G⁻¹.
         solve_upper_triangular_in_place(g_factor.as_ref().transpose(), f.as_mut().transpose_mut(), Par::Seq);
         for output in 0..self.shape.outputs {
-            fill(inverse.r.as_mut(), |index, column| {
-                v[(index / n1, output)] * f[(index, column)]
-            });
-            solve_lower_triangular_in_place(self.s.as_ref(), inverse.r.as_mut(), Par::Seq);
-            trace += inverse.r.squared_norm_l2();
+            fill(r.as_mut(), |index, column| v[(index / n1, output)] * f[(index, column)]);
+            solve_lower_triangular_in_place(self.s.as_ref(), r.as_mut(), Par::Seq);
+            add(r.as_ref());
         }
-        trace
     }
 }
 

@@ -3,7 +3,8 @@ use ndarray::Axis;
 use super::model::{Trained, position_pair};
 use crate::{
     figure::{
-        Figure, HeatMap, PlotFigure, loss_figure, position_error_map, target_regression_figure, training_state_figure,
+        Figure, HeatMap, PlotFigure, loss_figure, position_error_map, sample_figure, target_regression_figure,
+        training_state_figure,
     },
     import::Channel,
 };
@@ -18,6 +19,8 @@ pub(super) enum ChartTab {
     TrainingState,
     /// Decoded against actual values of a target.
     Regression,
+    /// All targets of one sample.
+    Sample,
     /// Error over the position.
     Map,
 }
@@ -28,6 +31,8 @@ pub(super) struct ChartChoice {
     pub(super) tab: ChartTab,
     /// Target of the regression.
     pub(super) target: usize,
+    /// Test sample of which all targets are shown, from 0.
+    pub(super) sample: usize,
 }
 
 /// A chart, or why there is none.
@@ -38,10 +43,11 @@ pub(super) enum Chart {
 }
 
 impl ChartTab {
-    pub(super) const ALL: [(Self, &'static str); 4] = [
+    pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Loss, "Loss"),
         (Self::TrainingState, "Training state"),
         (Self::Regression, "Regression"),
+        (Self::Sample, "Sample"),
         (Self::Map, "Error map"),
     ];
 
@@ -51,6 +57,7 @@ impl ChartTab {
             Self::Loss => "loss",
             Self::TrainingState => "training-state",
             Self::Regression => "regression",
+            Self::Sample => "sample",
             Self::Map => "error-map",
         }
     }
@@ -81,6 +88,12 @@ impl ChartChoice {
                 let channel = &targets[target];
                 let pairs = tested.pairs(target);
                 Chart::Plots(target_regression_figure(&pairs, &channel.name, channel.unit.as_deref()))
+            }
+            (ChartTab::Sample, Some(tested)) => {
+                let sample = self.sample.min(tested.set().samples().saturating_sub(1));
+                let actual = tested.set().targets().row(sample).to_vec();
+                let decoded = tested.answers.row(sample).to_vec();
+                Chart::Plots(sample_figure(targets, &actual, &decoded, &tested.ranges))
             }
             (ChartTab::Map, Some(tested)) => {
                 let Some(pair) = position_pair(targets) else {

@@ -2,6 +2,7 @@
 
 use std::{ops::ControlFlow, path::Path};
 
+use super::remarks::in_window;
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     dataset::{Dataset, Seed},
@@ -82,7 +83,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     };
     let sets = plan
         .sets(Path::new(""), seed, &mut watch)
-        .map_err(|error| error.to_string())?;
+        .map_err(|error| in_window(&error))?;
     let recordings = || std::iter::once(&sets.recording).chain(&sets.test_recording);
     let mut warnings: Vec<String> = recordings()
         .flat_map(|recording| recording.warnings.iter().cloned())

@@ -78,7 +78,10 @@ fn meaning(name: &str) -> &'static str {
     match name {
         "training mean" => "Always answers the mean of the training samples.",
         "ridge" => "Best affine map from the readings to the targets, with a little regularisation.",
-        "network" => "The network with the lowest validation error so far (training error if nothing is held out).",
+        "network" => {
+            "The network with the lowest validation error so far. If nothing is held out: with the lowest training error, or \
+             the latest of Bayesian regularisation."
+        }
         _ => "",
     }
 }

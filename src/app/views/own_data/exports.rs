@@ -2,21 +2,18 @@
 
 use std::sync::Arc;
 
-use super::{model::Trained, state::OwnDataView};
+use super::{
+    judging::{channel_table, decoders_table, shown_curve_figure, shown_decoders_figure},
+    model::Trained,
+    state::{OwnDataView, Tab},
+};
 use crate::{
     app::shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Phase, copy_exports, error_table_export,
-        loss_export, picture_exports,
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Phase, copy_exports, csv_export,
+        error_table_export, loss_export, own_network_exports, picture_exports,
     },
     export::{Cell, RecipeFile, Table, TableColumn},
     figure::Figure,
-};
-
-const NETWORK: FileWords = FileWords {
-    kind: "network",
-    description: "The network with its settings, record and errors, and the recipe of its import. It opens here again, and \
-                  the terminal command decode decodes files with it.",
-    extensions: &["json"],
 };
 
 const CHECKPOINT: FileWords = FileWords {
@@ -33,6 +30,18 @@ const RECIPE: FileWords = FileWords {
     extensions: &["json"],
 };
 
+const CHANNELS: FileWords = FileWords {
+    kind: "channel table",
+    description: "How much the error of each target grows without each channel, with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+const DECODERS: FileWords = FileWords {
+    kind: "decoder table",
+    description: "Errors and times of the decoders with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
 /// Everything that can be exported.
 pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
     let nothing = || "Nothing is trained yet: press Train first.".to_owned();
@@ -45,22 +54,36 @@ pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
         description: words.description,
         ask,
     };
-    let network = shown.clone().map(|shown| {
-        let file = Arc::clone(&shown.file);
-        save(NETWORK, stem("network"), Contents::new(move |path| file.save(path)))
-    });
-    let mut exports = vec![one(ExportGroup::Network, "Network", NETWORK, "JSON", network)];
-    let chart = shown.clone().and_then(|shown| {
-        let figure: Option<Figure> = view.chart.chart(shown).into_figure();
-        let figure = figure.ok_or_else(|| "This chart has nothing to show.".to_owned())?;
-        Ok(move || figure.clone())
-    });
-    exports.extend(picture_exports("Chart", stem(view.chart.tab.file_word()), chart));
+    let file = shown.clone().map(|shown| Arc::clone(&shown.file));
+    let mut exports = own_network_exports(&view.stem(), &file);
+    let (chart, word) = shown_chart(view);
+    let chart = chart.map(|figure| move || figure.clone());
+    exports.extend(picture_exports("Chart", stem(word), chart));
     let errors = shown.clone().map(|shown| move || error_table(shown));
     exports.push(error_table_export(stem("errors"), errors.clone()));
     let history = shown.clone().map(|shown| shown.file.training.history.as_slice());
     exports.push(loss_export(stem("loss"), history));
     exports.extend(copy_exports("Error table", errors));
+    let told = view.measuring.told.as_deref();
+    let told = told.ok_or_else(|| "Nothing is measured yet: see the card “Findings”.".to_owned());
+    let channels = told.map(|told| move || channel_table(told));
+    exports.push(csv_export(
+        "Channel table",
+        CHANNELS,
+        stem("channels"),
+        channels.clone(),
+    ));
+    exports.extend(copy_exports("Channel table", channels));
+    let decoders = view.measuring.decoders.as_deref();
+    let decoders = decoders.ok_or_else(|| "No decoder is measured yet: see the card “Decoders”.".to_owned());
+    let decoders = decoders.map(|decoders| move || decoders_table(decoders));
+    exports.push(csv_export(
+        "Decoder table",
+        DECODERS,
+        stem("decoders"),
+        decoders.clone(),
+    ));
+    exports.extend(copy_exports("Decoder table", decoders));
     let checkpoint = shown.and_then(|shown| match (&shown.checkpoint, view.phase) {
         (Some(file), _) => {
             let file = Arc::clone(file);
@@ -99,6 +122,17 @@ pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
         recipe,
     ));
     exports
+}
+
+/// The chart in the card on show, and the word for it in names of files.
+fn shown_chart(view: &OwnDataView) -> (Result<Figure, String>, &'static str) {
+    let (figure, word) = match (view.tab, &view.shown) {
+        (Tab::Findings, _) => (shown_curve_figure(&view.measuring).map(Figure::from), "learning-curve"),
+        (Tab::Decoders, _) => (shown_decoders_figure(&view.measuring).map(Figure::from), "decoders"),
+        (_, Some(shown)) => (view.chart.chart(shown).into_figure(), view.chart.tab.file_word()),
+        (_, None) => (None, "chart"),
+    };
+    (figure.ok_or_else(|| "This chart has nothing to show.".to_owned()), word)
 }
 
 fn save<'a>(words: FileWords, stem: String, contents: Contents) -> Ask<'a> {

@@ -18,6 +18,7 @@ use crate::{
     import::Meaning,
     network::{HiddenSuggestions, LARGEST_HIDDEN, ScalingChoice},
     scene::RowModel,
+    sensor::counted,
 };
 
 /// Largest number of folds offered.
@@ -81,7 +82,9 @@ fn hidden_ui(ui: &mut Ui, view: &mut OwnDataView) {
         let suggestions = HiddenSuggestions::new(inputs, targets);
         let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
         let text = format!(
-            "{inputs} inputs, {targets} targets. Rules of thumb: {}, or {low} to {high}",
+            "{}, {}. Rules of thumb: {}, or {low} to {high}",
+            counted(inputs, "input"),
+            counted(targets, "target"),
             suggestions.logarithm
         );
         dim_ui(ui, &text);

@@ -1,7 +1,8 @@
 //! The Own data view: recordings out of files, what their columns mean, and networks trained on them.
 //!
 //! [`opening`] reads files in the background; a [`draft`] says what is to be made of them, which [`checking`] tries out
-//! whenever it changes; [`training`] makes networks of it.
+//! whenever it changes; [`training`] makes networks of it, and
+//! [`judging`] finds out what the readings tell.
 
 mod charts;
 mod checking;
@@ -13,6 +14,7 @@ mod exports;
 mod form;
 mod histogram;
 mod import_form;
+mod judging;
 mod keeping;
 mod layout_form;
 mod model;

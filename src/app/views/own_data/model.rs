@@ -39,13 +39,22 @@ pub(super) struct Tested {
     set: Arc<Dataset>,
     /// Samples × targets.
     pub(super) answers: Array2<f64>,
+    /// Least and largest value of each target.
+    pub(super) ranges: Vec<(f64, f64)>,
 }
 
 impl Tested {
     pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>) -> Self {
+        let set: Arc<Dataset> = set.into();
+        let range = |target| {
+            let values = set.targets();
+            let extreme = |pick: fn(f64, f64) -> f64, none| values.column(target).iter().copied().fold(none, pick);
+            (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY))
+        };
         Self {
-            set: set.into(),
+            ranges: (0..set.outputs()).map(range).collect(),
             answers,
+            set,
         }
     }
 

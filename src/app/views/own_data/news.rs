@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::{
     keeping::KeepingEvent,
     opening::Opened,
-    remarks::in_window,
     state::{OwnDataView, Tab},
     training::{Task, TrainingEvent},
 };
@@ -49,6 +48,9 @@ impl OwnDataView {
                 }
                 Err(reason) => effects.push(failed(&reason)),
             }
+        }
+        if let Some(reason) = self.measuring.follow() {
+            effects.push(failed(&reason));
         }
         while let Some(event) = self.trainer.next_event() {
             self.take_training(event, effects);
@@ -140,5 +142,5 @@ impl OwnDataView {
 }
 
 fn failed(reason: &str) -> Effect {
-    Effect::Tell(Matter::OwnData, Notice::Failed(in_window(reason)))
+    Effect::Tell(Matter::OwnData, Notice::Failed(reason.to_owned()))
 }

@@ -8,6 +8,7 @@ use std::{
 use super::{
     draft::{Draft, file_name},
     model::{Tested, Trained},
+    remarks::in_window,
 };
 use crate::{
     app::job::{Job, JobError, Report, Wake},
@@ -157,7 +158,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         ..Recipe::default()
     };
     let inspected_files = recipe.inspect(Path::new(""), &mut watch);
-    let mut plan = suggested_plan(&inspected_files.map_err(|error| error.to_string())?);
+    let mut plan = suggested_plan(&inspected_files.map_err(|error| in_window(&error))?);
     plan.import.dialect = recipe.dialect;
     plan.import.missing = recipe.missing;
     Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
@@ -170,7 +171,7 @@ fn inspected(
     watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Box<Draft>, String> {
     let files = plan.import.inspect(Path::new(""), watch);
-    Ok(Box::new(draft(plan, files.map_err(|error| error.to_string())?)))
+    Ok(Box::new(draft(plan, files.map_err(|error| in_window(&error))?)))
 }
 
 fn open_document(
@@ -212,7 +213,7 @@ fn open_document(
 /// The network of a file, with its answers to the test samples if the recording can be read again.
 fn opened_network(file: MeasuredNetworkFile, watch: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Trained {
     let sets = file.plan.sets(Path::new(""), file.settings.seed, watch);
-    let tested = sets.map_err(|error| error.to_string()).and_then(|sets| {
+    let tested = sets.map_err(|error| in_window(&error)).and_then(|sets| {
         if (sets.test.channels(), sets.test.outputs()) != (file.inputs.len(), file.targets.len()) {
             return Err("it has other columns now".to_owned());
         }

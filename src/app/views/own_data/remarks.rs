@@ -1,6 +1,10 @@
 //! Sentences about splits and imports.
 
-use crate::{app::widgets::fields::capitalised, dataset::SplitBy};
+use crate::{
+    app::widgets::fields::capitalised,
+    dataset::SplitBy,
+    import::{Cure, ImportError},
+};
 
 /// What a rule of division does to the errors.
 pub(super) fn flattery(by: SplitBy) -> &'static str {
@@ -14,38 +18,24 @@ pub(super) fn flattery(by: SplitBy) -> &'static str {
     }
 }
 
-/// An error of the import in words for the window, which has fields where the terminal has arguments.
-pub(super) fn in_window(error: &str) -> String {
-    const WORDS: [(&str, &str); 5] = [
-        (
-            "name the columns of their times with --time and --join-time",
-            "make the columns of their times “time” in both",
-        ),
-        ("name it with --join-time", "make the column of its times “time”"),
-        (
-            "give the limit with --join-limit",
-            "give the limit under “Joined files”",
-        ),
-        (
-            "say that it means missing with --missing",
-            "say under “Rows” that it means missing:",
-        ),
-        (
-            "give one --test-join for each --join",
-            "open the joined files of the test too",
-        ),
-    ];
-    let mut text = error.to_owned();
-    for (argument, field) in WORDS {
-        text = text.replace(argument, field);
-    }
-    text
+/// An error of the import, with its cure in the fields of the window.
+pub(super) fn in_window(error: &ImportError) -> String {
+    error.with_cure(|cure| match cure {
+        Cure::CallMissing(text) => {
+            format!("correct it, or say under “Rows” that it means missing: \"{text}\"")
+        }
+        Cure::NameTimes => "make the columns of their times “time” in both".to_owned(),
+        Cure::NameJoinedTime => "make the column of its times “time”".to_owned(),
+        Cure::GiveLimit => "give the limit under “Joined files”".to_owned(),
+        Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
+        other => other.to_string(),
+    })
 }
 
 /// The text with a full stop, and with a capital unless it begins with the name of a column or file.
 pub(super) fn sentence(text: &str) -> String {
-    const WORDS: [&str; 10] = [
-        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too",
+    const WORDS: [&str; 11] = [
+        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too", "twice",
     ];
     let first = text.split_whitespace().next().unwrap_or_default();
     let mut sentence = text.to_owned();
@@ -63,7 +53,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::import::{ImportError, Joined, Recipe};
+    use crate::import::{Joined, Recipe};
 
     fn recipe() -> Recipe {
         Recipe {
@@ -80,7 +70,7 @@ mod tests {
         std::fs::write(folder.path().join("two.csv"), other.unwrap_or_default()).unwrap();
         let watch = &mut |_| std::ops::ControlFlow::Continue(());
         let imported: Result<_, ImportError> = recipe.import(Path::new(folder.path()), watch);
-        in_window(&imported.unwrap_err().to_string())
+        in_window(&imported.unwrap_err())
     }
 
     #[test]

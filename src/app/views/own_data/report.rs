@@ -4,7 +4,7 @@ use super::{
     checking::Checked,
     error_table::error_tables_ui,
     model::{Trained, Validated},
-    remarks::{flattery, in_window, sentence},
+    remarks::{flattery, sentence},
     state::OwnDataView,
 };
 use crate::{
@@ -49,7 +49,7 @@ fn samples_ui(ui: &mut Ui, view: &OwnDataView) {
     match &view.checking.checked {
         Some(Ok(checked)) => checked_ui(ui, checked, view.draft.as_ref().map(|draft| &draft.plan)),
         Some(Err(reason)) => {
-            note_ui(ui, &sentence(&in_window(reason)));
+            note_ui(ui, &sentence(reason));
         }
         None if view.checking.is_under_way() => {
             dim_ui(ui, "The import is being tried out…");
@@ -109,7 +109,7 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
         note_ui(ui, flattery(SplitBy::Random));
     }
     for warning in &checked.warnings {
-        note_ui(ui, &sentence(&in_window(warning)));
+        note_ui(ui, &sentence(warning));
     }
 }
 

@@ -1,4 +1,4 @@
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::{ComboBox, DragValue, Ui};
 
 use super::{
     charts::{Chart, ChartTab},
@@ -23,7 +23,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
         );
         return;
     };
-    let before = (view.chart.tab, view.chart.target);
+    let before = (view.chart.tab, view.chart.target, view.chart.sample);
     ui.horizontal(|ui| {
         if let Some(tab) = tabs_ui(ui, "Charts", &ChartTab::ALL, view.chart.tab) {
             view.chart.tab = tab;
@@ -43,6 +43,19 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
             });
             picked.response.labelled_by(label.id);
         }
+        let samples = shown.tested.as_ref().map_or(0, |tested| tested.set().samples());
+        if before.0 == ChartTab::Sample && samples > 0 {
+            ui.add_space(space(2));
+            let label = ui.label("Test sample");
+            let mut number = view.chart.sample.min(samples - 1) + 1;
+            let field = ui.add(
+                DragValue::new(&mut number)
+                    .range(1..=samples)
+                    .suffix(format!(" of {samples}")),
+            );
+            field.labelled_by(label.id);
+            view.chart.sample = number - 1;
+        }
     });
     match view.chart.chart(shown) {
         Chart::Plots(figure) => {
@@ -61,7 +74,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
         }
         Chart::None(reason) => placeholder_ui(ui, reason),
     }
-    if (view.chart.tab, view.chart.target) != before {
+    if (view.chart.tab, view.chart.target, view.chart.sample) != before {
         ui.request_repaint();
     }
 }

@@ -10,6 +10,7 @@ use super::{
     charts::ChartChoice,
     checking::Checking,
     draft::{Draft, file_name},
+    judging::Measuring,
     keeping::Keeping,
     model::{Trained, Validated},
     opening::{Files, Opening, ToOpen},
@@ -49,6 +50,8 @@ pub struct OwnDataView {
     pub(super) validated: Option<Validated>,
     /// True while a cross-validation is under way.
     pub(super) is_validating: bool,
+    /// What the readings tell, and other decoders.
+    pub(super) measuring: Measuring,
     /// Networks trained and opened.
     pub(super) runs: Runs,
     pub(super) keeping: Keeping,
@@ -71,6 +74,10 @@ pub(super) enum Tab {
     Columns,
     /// Charts of the network on show.
     Results,
+    /// What the readings tell.
+    Findings,
+    /// Other decoders beside the network on show.
+    Decoders,
     /// The networks of this session.
     Runs,
 }
@@ -97,6 +104,7 @@ impl OwnDataView {
             asked: None,
             validated: None,
             is_validating: false,
+            measuring: Measuring::new(Arc::clone(&wake)),
             runs: Runs::default(),
             keeping: Keeping::new(wake),
             tab: Tab::default(),
@@ -155,6 +163,9 @@ impl OwnDataView {
         match &self.draft {
             None => Some("Open a recording first: drop files on the window.".to_owned()),
             Some(_) if self.opening.under_way.is_some() => Some("Files are being opened.".to_owned()),
+            Some(_) if self.measuring.is_under_way() => {
+                Some("Something is being measured: wait for its end, or stop it in its card.".to_owned())
+            }
             Some(draft) => draft.obstacle(),
         }
     }
@@ -216,11 +227,12 @@ impl OwnDataView {
         let (Some(shown), Some(asked)) = (&self.shown, self.asked) else {
             return false;
         };
-        let is_there = match self.phase {
-            Phase::Paused => self.settings.training != asked.training,
-            Phase::Ended(reason) => reason != crate::training::StopReason::Diverged,
-            _ => false,
-        };
+        let is_there = !self.measuring.is_under_way()
+            && match self.phase {
+                Phase::Paused => self.settings.training != asked.training,
+                Phase::Ended(reason) => reason != crate::training::StopReason::Diverged,
+                _ => false,
+            };
         let is_same_plan = || {
             self.draft
                 .as_ref()

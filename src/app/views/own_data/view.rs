@@ -6,6 +6,7 @@ use super::{
     columns_table::columns_ui,
     exports::own_data_exports,
     form::form_ui,
+    judging::{decoders_ui, findings_ui},
     report::report_ui,
     results::results_ui,
     runs_table::runs_ui,
@@ -34,7 +35,7 @@ impl View for OwnDataView {
     }
 
     fn is_working(&self) -> bool {
-        matches!(self.phase, Phase::Preparing | Phase::Training)
+        self.measuring.is_under_way() || matches!(self.phase, Phase::Preparing | Phase::Training)
     }
 
     fn has_unfinished(&self) -> bool {
@@ -101,6 +102,8 @@ fn cards_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
     let tabs = [
         (Tab::Columns, "Columns"),
         (Tab::Results, "Results"),
+        (Tab::Findings, "Findings"),
+        (Tab::Decoders, "Decoders"),
         (Tab::Runs, "Runs"),
     ];
     let shown = view.tab;
@@ -112,6 +115,8 @@ fn cards_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
     match shown {
         Tab::Columns => columns_ui(ui, view, effects),
         Tab::Results => results_ui(ui, view),
+        Tab::Findings => findings_ui(ui, view),
+        Tab::Decoders => decoders_ui(ui, view),
         Tab::Runs => runs_ui(ui, view),
     }
 }

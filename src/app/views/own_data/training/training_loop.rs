@@ -14,7 +14,10 @@ use crate::{
         job::Report,
         shared::Phase,
         training_worker::{continue_run, furthest_epoch},
-        views::own_data::model::{Tested, Trained, Validated},
+        views::own_data::{
+            model::{Tested, Trained, Validated},
+            remarks::in_window,
+        },
     },
     dataset::{Folds, Seed, SplitBy, Stream},
     evaluation::{
@@ -73,7 +76,7 @@ fn watch(progress: Progress, report: &Report<TrainingEvent>) -> ControlFlow<()> 
 
 fn sets(plan: &Plan, seed: Seed, report: &Report<TrainingEvent>) -> Result<PlannedSets, String> {
     let sets = plan.sets(Path::new(""), seed, &mut |progress| watch(progress, report));
-    sets.map_err(|error| error.to_string())
+    sets.map_err(|error| in_window(&error))
 }
 
 /// What a network file says beside the network.
@@ -210,7 +213,7 @@ fn validate(
     report: &Report<TrainingEvent>,
 ) -> Result<Option<Validated>, String> {
     let recording = plan.recording(Path::new(""), &mut |progress| watch(progress, report));
-    let recording = recording.map_err(|error| error.to_string())?;
+    let recording = recording.map_err(|error| in_window(&error))?;
     let (set, by) = (&recording.set, plan.division.by);
     let cross_validated = |by| -> Result<Option<CrossValidated>, String> {
         let dealt =

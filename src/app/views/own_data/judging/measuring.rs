@@ -1,0 +1,101 @@
+use std::sync::Arc;
+
+use super::thread::{Decoders, News, Task, Told, work};
+use crate::{
+    app::job::{Job, Wake},
+    evaluation::{
+        RunSettings,
+        recorded::{FittedModel, Stage},
+    },
+    export::MeasuredNetworkFile,
+    import::{Plan, Progress},
+};
+
+/// The window's end of the thread, and what it has measured.
+#[derive(Debug)]
+pub struct Measuring {
+    job: Job<News>,
+    /// The work under way.
+    pub(super) under_way: Option<UnderWay>,
+    /// How far a file is read.
+    pub(super) reading: Option<Progress>,
+    /// What the recording tells, once it was measured.
+    pub told: Option<Box<Told>>,
+    /// Decoders measured so far.
+    pub decoders: Option<Box<Decoders>>,
+    /// Model to be fitted again and again; the better one if none is chosen.
+    pub(super) model: Option<FittedModel>,
+    /// Target of the learning curve and of the chart of decoders.
+    pub(super) target: usize,
+}
+
+/// Work of the thread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum UnderWay {
+    Findings(Option<Stage>),
+    Decoders,
+}
+
+impl Measuring {
+    /// Nothing measured yet. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::new("own data findings", wake),
+            under_way: None,
+            reading: None,
+            told: None,
+            decoders: None,
+            model: None,
+            target: 0,
+        }
+    }
+
+    pub fn is_under_way(&self) -> bool {
+        self.under_way.is_some()
+    }
+
+    pub(super) fn find(&mut self, plan: Plan, settings: RunSettings, folds: usize) {
+        self.told = None;
+        self.start(
+            UnderWay::Findings(None),
+            Task::Findings(Box::new(plan), Box::new(settings), folds, self.model),
+        );
+    }
+
+    pub(super) fn measure_decoders(&mut self, file: Arc<MeasuredNetworkFile>) {
+        self.decoders = None;
+        self.start(UnderWay::Decoders, Task::Decoders(file));
+    }
+
+    fn start(&mut self, under_way: UnderWay, task: Task) {
+        (self.under_way, self.reading) = (Some(under_way), None);
+        self.job.start(
+            move |report| work(task, report),
+            |ended| News::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+    }
+
+    /// Lets go of the work under way.
+    pub fn cancel(&mut self) {
+        self.job.abandon();
+        self.under_way = None;
+    }
+
+    /// Takes what the thread has to tell; returns why it failed, if it did.
+    pub fn follow(&mut self) -> Option<String> {
+        let mut failure = None;
+        while let Some(news) = self.job.next_event() {
+            match news {
+                News::Reading(progress) => self.reading = Some(progress),
+                News::Begun(stage) => self.under_way = Some(UnderWay::Findings(Some(stage))),
+                News::Told(told) => self.told = Some(told),
+                News::Measured(decoders) => self.decoders = Some(decoders),
+                News::Ended(ended) => {
+                    self.under_way = None;
+                    failure = ended.err();
+                }
+            }
+        }
+        failure
+    }
+}

@@ -1,0 +1,182 @@
+use faer::linalg::solvers::DenseSolveCore;
+
+use super::{
+    super::dense::{DampedLeastSquares, distance, errors, jacobian},
+    *,
+};
+use crate::training::{
+    backpropagation::Backpropagation,
+    examples::tests::{random_examples, random_mlp},
+};
+
+/// Every solver, with its name.
+fn solvers(shape: Shape, examples: &Examples) -> [(&'static str, NormalEquations); 2] {
+    let samples = examples.samples();
+    let factored = NormalEquations::<dyn HiddenSolver>::with_solver(
+        Box::new(SchurComplement::new(shape, examples)),
+        &SchurComplement::cost(shape, samples),
+        examples,
+    );
+    let iterated = NormalEquations::<dyn HiddenSolver>::with_solver(
+        Box::new(ConjugateGradient::new(shape, examples)),
+        &ConjugateGradient::cost(shape, samples),
+        examples,
+    );
+    [("factored", factored), ("conjugate gradients", iterated)]
+}
+
+/// The step at damping `mu`, solved as after a rejected step: another network was evaluated since.
+fn step(equations: &mut NormalEquations, mlp: &Mlp, examples: &Examples, mu: f64) -> Option<Vec<f64>> {
+    equations.gather(mlp, examples);
+    equations.mse(&Mlp::zeros(mlp.shape()), examples);
+    let mut step = vec![0.0; mlp.weights().len()];
+    equations.solve(mlp, examples, mu, &mut step)?;
+    Some(step)
+}
+
+/// Rounding is amplified by the condition number κ of the normal equations, and so is the residual that conjugate
+/// gradients leave. The directions in which the step is then uncertain hardly change the linearised error: at least
+/// its decrease is found to six digits.
+#[test]
+fn the_step_is_that_of_the_dense_jacobian() {
+    for (inputs, hidden, outputs, samples) in [
+        (5, 4, 3, 300),
+        (1, 1, 1, 3),
+        (7, 2, 1, 40),
+        (12, 6, 5, 513),
+        (8, 12, 2, 40),
+        (10, 16, 3, 90),
+    ] {
+        let mlp = random_mlp(inputs, hidden, outputs, 1);
+        let examples = random_examples(samples, inputs, outputs, 2);
+        for mu in [1e-14, 1e-10, 1e-6, 1e-3, 1.0, 1e6] {
+            let dense = DampedLeastSquares::new(&mlp, &examples, mu);
+            let (expected, condition) = (dense.step(), dense.normal_condition());
+            let [(_, mut factored), (_, mut iterated)] = solvers(mlp.shape(), &examples);
+            let what = format!("{inputs}-{hidden}-{outputs}, mu {mu:e}, condition {condition:.1e}");
+            let rounding = 30.0 * f64::EPSILON * condition;
+            match step(&mut factored, &mlp, &examples, mu) {
+                Some(step) => {
+                    let distance = distance(&step, &expected);
+                    assert!(distance < rounding.max(1e-12), "{what}, factored: {distance:e}");
+                }
+                // Lost in rounding.
+                None => assert!(rounding > 1.0, "{what}, factored"),
+            }
+            match step(&mut iterated, &mlp, &examples, mu) {
+                Some(step) => {
+                    let distance = distance(&step, &expected);
+                    let missed = dense.missed(&step, &expected);
+                    assert!(missed < 1e-6, "{what}, iterated: {missed:e}");
+                    let close = rounding + 1e-8 * condition;
+                    assert!(distance < close || condition > 1e6, "{what}, iterated: {distance:e}");
+                }
+                None => assert!(rounding > 1.0, "{what}, iterated"),
+            }
+        }
+    }
+}
+
+/// Decay that differs between the classes of weights, of output biases towards values of their own, beside the matrix
+/// written out.
+#[test]
+fn every_class_of_weights_decays_at_its_own_rate() {
+    let (inputs, hidden, outputs) = (5, 4, 3);
+    let (mlp, examples) = (
+        random_mlp(inputs, hidden, outputs, 1),
+        random_examples(300, inputs, outputs, 2),
+    );
+    let rates = PerClass {
+        hidden_weights: 0.3,
+        hidden_biases: 7.0,
+        output_weights: 0.05,
+        output_biases: 40.0,
+    };
+    let (biases, damping) = ([0.5, -0.3, 0.1], rates.map(|rate| rate + 0.2));
+    let class = |weight: usize| match weight {
+        0..20 => 0,
+        20..24 => 1,
+        24..36 => 2,
+        _ => 3,
+    };
+    let (jacobian, errors) = (jacobian(&mlp, &examples), errors(&mlp, &examples));
+    let mut matrix = jacobian.transpose() * &jacobian;
+    let mut right = jacobian.transpose() * &errors;
+    for (index, weight) in mlp.weights().iter().enumerate() {
+        matrix[(index, index)] += damping.values()[class(index)];
+        let towards = if index < 36 { 0.0 } else { biases[index - 36] };
+        right[(index, 0)] += rates.values()[class(index)] * (weight - towards);
+    }
+    let inverse = matrix.partial_piv_lu().inverse();
+    let step = &inverse * &right;
+
+    let mut equations = NormalEquations::factored(mlp.shape(), &examples);
+    equations.gather(&mlp, &examples);
+    let (decay, mut ours) = (Decay::new(rates, &biases), vec![0.0; mlp.weights().len()]);
+    equations
+        .solve_with_decay(&mlp, &examples, damping, decay, &mut ours)
+        .unwrap();
+    let expected: Vec<f64> = (0..ours.len()).map(|index| -step[(index, 0)]).collect();
+    assert!(distance(&ours, &expected) < 1e-11, "{:e}", distance(&ours, &expected));
+    let length = equations.gradient_length(&mlp, decay);
+    assert!((length / right.norm_l2() - 1.0).abs() < 1e-12, "{length}");
+    let traces = equations.traces_of_inverse(&mlp, damping).unwrap().values();
+    let mut expected = [0.0; 4];
+    (0..ours.len()).for_each(|index| expected[class(index)] += inverse[(index, index)]);
+    for (ours, expected) in traces.iter().zip(expected) {
+        assert!((ours / expected - 1.0).abs() < 1e-11, "{traces:?}, {expected:?}");
+    }
+    let whole = equations.trace_of_inverse(&mlp, 0.7).unwrap();
+    let parts: f64 = equations
+        .traces_of_inverse(&mlp, PerClass::all(0.7))
+        .unwrap()
+        .values()
+        .iter()
+        .sum();
+    assert!((whole / parts - 1.0).abs() < 1e-13);
+}
+
+/// Enough samples that they are divided into parts.
+#[test]
+fn parts_of_the_samples_add_up() {
+    let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
+    let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
+    let blocks = examples.block_count();
+    assert!(SchurComplement::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
+    assert!(ConjugateGradient::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
+    let [factored, iterated] = solvers(mlp.shape(), &examples).map(|(name, mut equations)| {
+        let ours = equations.gather(&mlp, &examples);
+        assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-13, "{name}");
+        step(&mut equations, &mlp, &examples, 1.0).unwrap()
+    });
+    for (a, b) in factored.iter().zip(&iterated) {
+        assert!((a - b).abs() < 1e-6 * a.abs().max(1e-3), "{a} {b}");
+    }
+}
+
+#[test]
+fn it_evaluates_as_back_propagation_does() {
+    let mlp = random_mlp(6, 5, 4, 3);
+    let examples = random_examples(400, 6, 4, 4);
+    let ours = NormalEquations::cheapest(mlp.shape(), &examples).gather(&mlp, &examples);
+    let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
+    assert!((ours.mse - expected.mse).abs() < 1e-14);
+    assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-14);
+}
+
+#[test]
+fn a_singular_system_is_refused_or_solved_but_never_nan() {
+    let mlp = Mlp::zeros(Shape {
+        inputs: 3,
+        hidden: 2,
+        outputs: 2,
+    });
+    let examples = random_examples(2, 3, 2, 5);
+    for (name, mut equations) in solvers(mlp.shape(), &examples) {
+        for mu in [0.0, 1e-300, 1e-3, 1e300] {
+            if let Some(step) = step(&mut equations, &mlp, &examples, mu) {
+                assert!(step.iter().all(|value| value.is_finite()), "{name}, mu {mu}");
+            }
+        }
+    }
+}

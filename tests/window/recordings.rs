@@ -1,0 +1,147 @@
+//! Recordings to be dropped on the window, and what the library makes of them.
+
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use decoupler::{
+    dataset::{Division, Seed},
+    evaluation::{Measured, Run, RunSettings},
+    import::{Plan, Recipe},
+    scene::RowModel,
+};
+use eframe::egui;
+use tempfile::TempDir;
+
+use crate::driver::Driver;
+
+/// A file dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+impl Driver {
+    /// Drops files on the window and waits until their columns are shown.
+    #[track_caller]
+    pub(crate) fn drop_files(&mut self, paths: &[&Path]) {
+        for path in paths {
+            let file = std::sync::Arc::new(Dropped((*path).to_owned()));
+            self.harness().input_mut().dropped_files.push(file);
+        }
+        self.harness().step();
+    }
+
+    /// As [`Self::drop_files`]; waits until the window has tried the import out.
+    #[track_caller]
+    pub(crate) fn open_recordings(&mut self, paths: &[&Path]) {
+        self.drop_files(paths);
+        self.wait("the samples", |driver| driver.says("Test: "));
+    }
+
+    /// Gives a column another meaning by its list.
+    #[track_caller]
+    pub(crate) fn mean(&mut self, column: &str, meaning: &str) {
+        self.click(&format!("Meaning of {column}"));
+        self.click_button(meaning);
+        self.settle();
+    }
+
+    /// Limits the training to so many epochs.
+    #[track_caller]
+    pub(crate) fn limit_epochs(&mut self, epochs: &str) {
+        // What is unfolded in one view is in the others too.
+        if !self.has("Epochs") {
+            self.click("When to stop");
+        }
+        self.enter("Epochs", epochs);
+    }
+
+    /// Presses Train and waits for the end.
+    #[track_caller]
+    pub(crate) fn train_own_data(&mut self) {
+        self.click("▶ Train");
+        self.wait("the end of the training", |driver| driver.says("Finished: "));
+        self.settle();
+    }
+}
+
+/// Readings of two channels and a target that is nearly linear in them, in the order of time.
+pub(crate) fn recording(rows: usize) -> String {
+    let mut text = "time (s),u1 (V),u2 (V),x (mm),y (mm)\n".to_owned();
+    for row in 0..rows {
+        let t = row as f64;
+        let (x, y) = (10.0 + 5.0 * (0.37 * t).sin(), 4.0 * (0.23 * t).cos());
+        let (u1, u2) = (0.2 * x + 0.05 * y + 0.01 * x * y / 40.0, 0.3 * y - 0.02 * x);
+        writeln!(text, "{},{u1:.6},{u2:.6},{x:.6},{y:.6}", 0.1 * t).unwrap();
+    }
+    text
+}
+
+pub(crate) fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// The plan that the window makes of [`recording`].
+pub(crate) fn plan(path: &Path) -> Plan {
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    Plan {
+        import: Recipe {
+            data: path.to_owned(),
+            inputs: names(&["u1", "u2"]),
+            targets: names(&["x", "y"]),
+            time: Some("time".to_owned()),
+            ..Recipe::default()
+        },
+        division: Division::default(),
+        ..Plan::default()
+    }
+}
+
+/// The library's settings for measured samples, with five epochs.
+pub(crate) fn settings() -> RunSettings {
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    settings.training.stopping.epochs = 5;
+    settings
+}
+
+/// What the library makes of the plan with these settings.
+pub(crate) fn trained(plan: &Plan) -> Run {
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
+    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
+    while run.step().is_none() {}
+    run
+}
+
+/// Cells of the error tables on show: `x (mm), network, RMSE: 0.1`.
+pub(crate) fn cells(driver: &Driver) -> Vec<String> {
+    let is_cell = |text: &String| text.contains(", RMSE: ") || text.contains(", MAE: ") || text.contains(", worst: ");
+    driver.texts().into_iter().filter(is_cell).collect()
+}
+
+/// A window with [`recording`] open, its file, and the folder of that.
+pub(crate) fn opened(rows: usize) -> (Driver, PathBuf, TempDir) {
+    opened_text(&recording(rows))
+}
+
+/// As [`opened`], of this text.
+pub(crate) fn opened_text(text: &str) -> (Driver, PathBuf, TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", text);
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&path]);
+    (driver, path, folder)
+}
