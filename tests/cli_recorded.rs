@@ -89,9 +89,10 @@ fn each_target_and_channel_is_judged_with_an_interval() {
 #[test]
 fn networks_are_compared_with_ridge_and_with_a_random_split() {
     let folder = recording();
-    let report = json(&format!("{TELL} --hidden 2 --folds 2 --json"), folder.path());
-    // x is linear, y is noise: a network is worth no more.
-    assert_eq!(report["model"], "ridge");
+    let arguments = "inspect --data r.csv --inputs a,b,d,e --targets x --hidden 2 --folds 2 --json";
+    let report = json(arguments, folder.path());
+    // x is linear: a network is worth no more.
+    assert_eq!(report["model"], "ridge", "{report}");
     let target = &report["targets"][0];
     for figure in ["r2_network", "r2_ridge", "network_to_ridge"] {
         let value = &target[figure];

@@ -161,9 +161,9 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     }
 }
 
-/// The spline rises above the axis around a node; a plateau there would be no height of it.
+/// The spline rises above the axis around a node: in space that is a plateau at the axis, which is told and marked.
 #[test]
-fn between_nodes_too_the_surface_ends_at_the_axis_but_a_map_has_no_holes() {
+fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
     let peak = |mode| Surface {
         mode,
         ..surface(
@@ -174,17 +174,31 @@ fn between_nodes_too_the_surface_ends_at_the_axis_but_a_map_has_no_holes() {
             },
         )
     };
-    let too_high = |mode| {
+    let beyond = |mode| {
         let surface = peak(mode);
         let drawing = lay_out(&surface, OrbitCamera::default());
+        let grid = surface.map.grid();
         let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
-        let corners = cells.flat_map(|cell| drawing.mesh.corners(*cell));
         // Corners beyond the grid are those of cut cells.
-        let heights = corners.filter_map(|corner| surface.values.get(corner));
-        heights.filter(|height| **height > 5.08 + 1e-12).count()
+        let corners = cells
+            .flat_map(|cell| drawing.mesh.corners(*cell))
+            .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
+        let across = grid.y_mm().len();
+        let off_the_edge = corners.map(|corner| {
+            let (x_mm, y_mm) = (grid.x_mm()[corner / across], grid.y_mm()[corner % across]);
+            let at_edge = drawing.sight.point(DVec3::new(x_mm, y_mm, 5.08));
+            drawing.mesh.vertices[corner].at.as_dvec2().distance(at_edge)
+        });
+        let off_the_edge: Vec<f64> = off_the_edge.collect();
+        let furthest = off_the_edge.iter().fold(0.0_f64, |furthest, &off| furthest.max(off));
+        (off_the_edge.len(), furthest, drawing.note)
     };
-    assert_eq!(too_high(ViewMode::ThreeD), 0);
-    assert!(too_high(ViewMode::Top) > 20);
+    let (count, off_the_edge, note) = beyond(ViewMode::ThreeD);
+    assert!(count > 20 && off_the_edge < 0.01, "{count} {off_the_edge}");
+    assert_eq!(note.as_deref(), Some("Beyond the axes: hatched, 1 node"));
+    let (count, _, note) = beyond(ViewMode::Top);
+    assert!(count > 20, "{count}");
+    assert_eq!(note, None, "a map has no axis for heights");
 }
 
 #[test]

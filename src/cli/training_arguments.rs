@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(parsed("train").measured(false).unwrap(), measured);
         // Naming the default method keeps what suits recordings.
         assert_eq!(parsed("train --method br").measured(false).unwrap(), measured);
-        let told = "train --method br --set correlation-epoch=0 --epochs 7 --starts 2 --hidden 3 --seed 4";
+        let told = "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4";
         let told = parsed(told).measured(false).unwrap();
         assert_eq!(
             (told.training.stopping.epochs, told.starts, told.hidden, told.seed),

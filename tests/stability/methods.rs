@@ -129,7 +129,13 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         return wrong("the best weights are not finite");
     }
     let deciding = |record: &decoupler::training::EpochRecord| record.validation_mse.unwrap_or(record.training_mse);
-    let lowest = history.iter().map(deciding).fold(f64::INFINITY, f64::min);
+    // With nothing held out, the latest weights have the best of what Bayesian regularisation minimises: not the training error.
+    let is_latest_best = matches!(settings.method, Method::BayesianRegularization(_))
+        && history.iter().all(|record| record.validation_mse.is_none());
+    let lowest = match history.last().filter(|_| is_latest_best) {
+        Some(latest) => deciding(latest),
+        None => history.iter().map(deciding).fold(f64::INFINITY, f64::min),
+    };
     let (best, start) = (task.deciding_mse(weights), task.deciding_mse(task.start().weights()));
     let flaw = TrainingFlaw::of(&trainer);
     if best.is_finite() && !(agree(best, trainer.best_mse(), 1e-6) || (best - trainer.best_mse()).abs() < 1e-22) {

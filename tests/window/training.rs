@@ -248,7 +248,7 @@ fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
     let is_beyond = |node: &&glam::DVec3| !(7.5..=17.5).contains(&node.x) || !(low..=high).contains(&node.z);
     let count = nodes.iter().filter(is_beyond).count();
     assert!(count > 1, "{nodes:?}");
-    assert!(driver.says(&format!("{count} nodes beyond the axes are drawn at their edge")));
+    assert!(driver.says(&format!("Beyond the axes: hatched, {count} nodes")));
 }
 
 #[test]

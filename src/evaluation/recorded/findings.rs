@@ -2,7 +2,7 @@ use std::fmt;
 
 use super::{
     ChannelImportance, ChannelRemark, Determination, FittedModel, LearningCurve, NonlinearGain, SplitComparison,
-    channel_importance, channel_remarks,
+    Standing, channel_importance, channel_remarks,
 };
 use crate::{
     dataset::{Dataset, Division, Folds, SplitBy, Stream},
@@ -117,7 +117,13 @@ impl Findings {
                 (by, tables) => SplitComparison::of(by, tables),
             });
         }
-        let is_worth_it = gains.iter().flatten().any(NonlinearGain::is_supported);
+        // Where the readings tell nothing, the better answer is only nearer to the mean.
+        let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
+            let is_told = network
+                .as_ref()
+                .is_some_and(|network| network.standing() != Standing::NotTold);
+            is_told && gain.as_ref().is_some_and(NonlinearGain::is_supported)
+        });
         let best = if is_worth_it {
             FittedModel::Network
         } else {
