@@ -83,7 +83,7 @@ impl LiveView {
         }
     }
 
-    /// What would be decoded now.
+    /// The plan of decoding as it is set up now.
     ///
     /// # Errors
     /// If there is no network, or something is to be filled in; with what to do.

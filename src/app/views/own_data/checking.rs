@@ -10,7 +10,7 @@ use crate::{
     import::{Dropped, FileReport, Plan, Recording},
 };
 
-/// What an import gives.
+/// Outcome of an import.
 #[derive(Clone, Debug)]
 pub(super) struct Checked {
     /// Number of samples for training, validation and test.
@@ -21,7 +21,7 @@ pub(super) struct Checked {
     pub(super) dropped: Vec<Dropped>,
     /// The files, and how they are joined.
     pub(super) files: Vec<FileReport>,
-    /// What the user should look at.
+    /// Warnings for the user.
     pub(super) warnings: Vec<String>,
 }
 
@@ -33,7 +33,7 @@ struct CheckingEvent(Result<Box<Checked>, String>);
 pub(super) struct Checking {
     job: Job<CheckingEvent>,
     asked: Option<(Plan, Seed)>,
-    /// What came of it, once it is known.
+    /// Its outcome, once it is known.
     pub(super) checked: Option<Result<Box<Checked>, String>>,
 }
 

@@ -99,7 +99,7 @@ pub(super) fn range_text(min: f64, max: f64) -> String {
     }
 }
 
-/// What is unusual about a column, and whether it hinders its use.
+/// A remark on what is unusual about a column, and whether it hinders its use.
 pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, bool)> {
     if let Some((line, text)) = &summary.first_text {
         let others = match summary.texts {

@@ -1,4 +1,4 @@
-//! What the import and the network on show can be taken away as.
+//! Exports of the import and of the network on show.
 
 use std::sync::Arc;
 

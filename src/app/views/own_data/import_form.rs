@@ -1,4 +1,4 @@
-//! What the user says of the files: which they are, how they are laid out and joined, which rows count, and how the
+//! The user's word on the files: which they are, how they are laid out and joined, which rows count, and how the
 //! samples are divided.
 
 use eframe::egui::{Align, Id, Label, Layout, Response, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
@@ -48,7 +48,7 @@ impl OwnDataView {
     }
 }
 
-/// How to begin.
+/// An invitation to begin.
 pub(super) fn invitation_ui(ui: &mut Ui, view: &OwnDataView, effects: &mut Vec<Effect>) {
     let dim = Theme::of(ui).palette.dim;
     ui.vertical_centered(|ui| {

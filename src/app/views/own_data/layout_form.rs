@@ -1,4 +1,4 @@
-//! How files are joined, and how those of text are laid out.
+//! The join of files, and the layout of those of text.
 
 use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
@@ -14,7 +14,7 @@ use crate::{
 /// Largest number of lines before a table.
 const MOST_LINES: usize = 1_000_000;
 
-/// How the files are joined, in words.
+/// The join of the files in words.
 pub(super) fn joined_summary(draft: &Draft) -> String {
     let is_by_time = draft.files.iter().all(|file| file.meanings.contains(&Meaning::Time));
     if is_by_time {

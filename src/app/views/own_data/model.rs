@@ -27,7 +27,7 @@ pub(super) struct Trained {
     pub(super) wall_time: Option<Duration>,
     /// Defect of the training, once that has ended.
     pub(super) flaw: Option<String>,
-    /// What the user should know beside the errors.
+    /// Remarks beside the errors.
     pub(super) remarks: Vec<String>,
     /// The training as it stands, while it is paused or has ended.
     pub(super) checkpoint: Option<Arc<MeasuredCheckpointFile>>,
@@ -117,7 +117,7 @@ pub(super) struct Validated {
     pub(super) targets: Vec<Channel>,
     /// Errors of the mean, of ridge and of the networks.
     pub(super) table: Vec<TargetRow>,
-    /// What the readings tell, target by target, and where a network is no better than ridge.
+    /// Remarks on the readings, target by target, and where a network is no better than ridge.
     pub(super) remarks: Vec<String>,
 }
 

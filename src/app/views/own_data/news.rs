@@ -1,4 +1,4 @@
-//! What the threads of the view and the dialogs tell, and what becomes of it.
+//! News of the view's threads and of the dialogs, and what becomes of it.
 
 use std::path::PathBuf;
 

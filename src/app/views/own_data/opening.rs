@@ -38,7 +38,7 @@ pub(super) struct Files {
     pub(super) missing: Vec<Missing>,
 }
 
-/// What was opened.
+/// Contents of a file that was opened.
 #[derive(Debug)]
 pub(super) enum Opened {
     /// Recordings with guesses of what they mean.
@@ -54,7 +54,7 @@ pub(super) enum Opened {
 /// News of files being opened.
 #[derive(Debug)]
 pub(super) enum OpeningEvent {
-    /// How far this file is read.
+    /// Progress of reading this file.
     Reading(Progress),
     /// The files are open, or why not.
     Opened(Result<Opened, String>),
@@ -97,7 +97,7 @@ impl Opening {
         self.under_way = None;
     }
 
-    /// What was opened, once it is.
+    /// The contents that were opened, once they are.
     pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
         while let Some(event) = self.job.next_event() {
             match event {

@@ -19,7 +19,7 @@ use crate::{
     sensor::counted,
 };
 
-/// What the import gives, and the errors of the network.
+/// Outcome of the import, and the errors of the network.
 pub(super) fn report_ui(ui: &mut Ui, view: &OwnDataView) {
     scrolled_ui(ui, "own data report", |ui| {
         if let Some(shown) = &view.shown {

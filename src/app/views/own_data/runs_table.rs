@@ -68,7 +68,7 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     }
 }
 
-/// What can be done with the marked network.
+/// Actions on the marked network.
 fn marked_ui(ui: &mut Ui, view: &mut OwnDataView) {
     let Some(place) = view.runs.marked else { return };
     let is_busy = view.phase.is_busy();

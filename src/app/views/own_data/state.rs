@@ -40,7 +40,7 @@ pub struct OwnDataView {
     pub(super) phase: Phase,
     /// True until the first news of a training.
     pub(super) is_beginning: bool,
-    /// How far a file is read before a training.
+    /// Progress of reading a file before a training.
     pub(super) reading: Option<Progress>,
     /// The network on show: in training, ended, or opened.
     pub(super) shown: Option<Trained>,

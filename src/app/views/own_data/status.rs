@@ -53,7 +53,7 @@ pub(super) fn status_ui(ui: &mut Ui, view: &OwnDataView) {
     });
 }
 
-/// How far a file is read.
+/// Progress of reading a file.
 fn reading_ui(ui: &mut Ui, progress: Option<Progress>) {
     let Some(Progress { bytes, of: Some(of) }) = progress else {
         return;

@@ -1,4 +1,4 @@
-//! What the training on show can be taken away as.
+//! Exports of the training on show.
 
 use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
 use crate::{

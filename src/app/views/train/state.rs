@@ -31,7 +31,7 @@ pub struct TrainView {
     pub right: RightCard,
     /// The chart below.
     pub tab: BottomTab,
-    /// What the pointer lights up in every picture.
+    /// The thing that the pointer lights up in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
     pub section: SectionChoice,

@@ -170,7 +170,7 @@ fn right_card_ui(
     }
 }
 
-/// Which of the two surfaces.
+/// Role of one of the two surfaces.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Role {
     Actual,

@@ -58,11 +58,12 @@ pub fn decoders_ui(ui: &mut Ui, view: &mut OwnDataView) {
         }
         return;
     };
-    let mut is_wanted = false;
+    let (mut is_wanted, mut is_stopped) = (false, false);
     ui.horizontal(|ui| {
         target_ui(ui, &decoders.of.targets, target);
         if *under_way == Some(UnderWay::Decoders) {
             dim_ui(ui, "Measuring…");
+            is_stopped = ui.add(ghost_button("Stop measuring")).clicked();
         } else {
             is_wanted = ui.add_enabled(is_possible, ghost_button("Measure again")).clicked();
         }
@@ -91,6 +92,9 @@ pub fn decoders_ui(ui: &mut Ui, view: &mut OwnDataView) {
                 note_ui(ui, note);
             }
         });
+    }
+    if is_stopped {
+        view.measuring.cancel();
     }
     if is_wanted {
         view.measuring.measure_decoders(shown);

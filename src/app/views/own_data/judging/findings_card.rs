@@ -21,7 +21,7 @@ use crate::{
 /// Height of the learning curve.
 const CURVE_HEIGHT: f32 = space(60);
 
-/// What the recording tells, or how to find out.
+/// Findings on the recording, or the way to measure them.
 pub fn findings_ui(ui: &mut Ui, view: &mut OwnDataView) {
     scrolled_ui(ui, "findings", |ui| {
         begin_ui(ui, view);
@@ -108,7 +108,7 @@ fn begin_ui(ui: &mut Ui, view: &mut OwnDataView) {
     }
 }
 
-/// What the measurement will cost.
+/// Cost of the measurement in words.
 fn cost(model: Option<FittedModel>, channels: usize, folds: usize, of_last: Option<Duration>) -> String {
     if model == Some(FittedModel::Ridge) {
         return format!("No network is trained with ridge alone; {folds} folds.");

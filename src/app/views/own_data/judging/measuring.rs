@@ -17,9 +17,9 @@ pub struct Measuring {
     job: Job<News>,
     /// The work under way.
     pub(super) under_way: Option<UnderWay>,
-    /// How far a file is read.
+    /// Progress of reading a file.
     pub(super) reading: Option<Progress>,
-    /// What the recording tells, once it was measured.
+    /// Findings on the recording, once they were measured.
     pub told: Option<Box<Told>>,
     /// Decoders measured so far.
     pub decoders: Option<Box<Decoders>>,

@@ -44,7 +44,7 @@ pub enum Command {
 /// News from the thread.
 #[derive(Debug)]
 pub enum TrainingEvent {
-    /// How far a file is read.
+    /// Progress of reading a file.
     Reading(Progress),
     /// The training as it stands.
     Progressed(Box<Trained>),

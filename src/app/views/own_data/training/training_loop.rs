@@ -79,7 +79,7 @@ fn sets(plan: &Plan, seed: Seed, report: &Report<TrainingEvent>) -> Result<Plann
     sets.map_err(|error| in_window(&error))
 }
 
-/// What a network file says beside the network.
+/// The contents of a network file beside the network.
 struct About {
     plan: Plan,
     inputs: Vec<Channel>,

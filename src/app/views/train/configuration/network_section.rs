@@ -12,7 +12,7 @@ use crate::{
     sensor::counted,
 };
 
-/// What the network reads, and how large it becomes; changes `draft`.
+/// The inputs of the network, and its size; changes `draft`.
 pub fn inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let options = [
         (Quantity::Resistance, "Resistance", "R, as in the paper."),

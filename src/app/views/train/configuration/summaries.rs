@@ -1,4 +1,4 @@
-//! How the folded parts of the configuration stand, in a few words each.
+//! The folded parts of the configuration, in a few words each.
 
 use crate::{
     app::widgets::fields::input_text,

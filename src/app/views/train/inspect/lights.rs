@@ -1,4 +1,4 @@
-/// What the pointer points at, in whatever picture it does: it lights up in all of them.
+/// The thing under the pointer, in whatever picture: it lights up in all of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lighting {
     /// A node, by its number among those drawn.

@@ -28,7 +28,7 @@ pub enum Along {
 /// The wire along which the surfaces are cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SectionChoice {
-    /// Which kind of wire.
+    /// Kind of wire.
     pub along: Along,
     /// Place of the row-wire among those read.
     row: usize,

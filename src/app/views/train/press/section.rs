@@ -55,7 +55,7 @@ const COLUMNS: [Column; 3] = [
     },
 ];
 
-/// What presses, and what every decoder makes of it.
+/// The finger, and the answers of all decoders to it.
 pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     let Some(test) = shared.test() else { return };
     section_heading_ui(ui, "Under your finger");
@@ -266,7 +266,7 @@ impl Shown {
 }
 
 impl PressState {
-    /// What the network's card says while something is pressed and no network has answered.
+    /// Text of the network's card while something is pressed and no network has answered.
     pub fn waiting_text(&self, shared: &Shared) -> &'static str {
         if self.ready.is_awaited(shared) {
             "A small network is being trained to answer…"

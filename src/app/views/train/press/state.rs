@@ -22,14 +22,14 @@ use crate::{
     scene::Touch,
 };
 
-/// What is pressed, and what is known of it.
+/// The touch, and everything known of it.
 #[derive(Debug)]
 pub struct PressState {
     /// Work of the pointer on the actual surface.
     pub hand: Hand,
-    /// What presses.
+    /// The finger that presses.
     pub finger: Finger,
-    /// What is pressed; `None` while the test set is on show.
+    /// The touch; `None` while the test set is on show.
     pub(super) touch: Option<Touch>,
     /// Hold of the pointer, while its button is down.
     pub(super) grip: Option<Grip>,
@@ -69,12 +69,12 @@ impl PressState {
         self.touch.is_some()
     }
 
-    /// What is pressed; `None` while the test set is on show.
+    /// The touch; `None` while the test set is on show.
     pub fn touch(&self) -> Option<&Touch> {
         self.touch.as_ref()
     }
 
-    /// What is shown of the touch; `None` while the test set is on show, or before the first answer.
+    /// The part of the touch that is shown; `None` while the test set is on show, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.shown.as_ref().filter(|_| self.is_pressing())
     }
