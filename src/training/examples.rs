@@ -15,7 +15,7 @@ pub(crate) const BLOCK: usize = 512;
 
 /// Scaled inputs and targets, cut into blocks of samples for the products of training. A clone shares the samples.
 ///
-/// Blocks are held, or [drawn](DrawnBlocks) whenever they are needed.
+/// Blocks are held, or drawn whenever they are needed (`DrawnBlocks`).
 #[derive(Clone, Debug)]
 pub struct Examples {
     data: Arc<Data>,
