@@ -324,8 +324,11 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     }
     fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();
     driver.wait("the damaged file", |driver| driver.says("00000000"));
-    driver.click("Close folder");
-    assert!(driver.has("▶ Run") && !driver.has("Close folder"));
+    driver.click("▶ Run");
+    driver.wait("the end of the experiment", |driver| {
+        driver.views().experiments.running.is_none()
+    });
+    assert!(!driver.has("Close folder"), "results stand in the place of the folder");
 
     driver.click("Open sweep folder…");
     driver.type_into("File", &home.path().display().to_string());

@@ -246,6 +246,10 @@ impl ExperimentsView {
             return;
         };
         effects.push(Effect::Settle(Matter::Experiments));
+        if self.topic == Topic::Sweep {
+            // It would stand in the place of the results.
+            self.folder.close();
+        }
         self.begin(experiment.clone());
         worker::run(&mut self.job, experiment);
     }
