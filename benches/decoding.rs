@@ -8,6 +8,8 @@
 
 #[path = "arithmetic/row.rs"]
 mod row_arithmetic;
+#[path = "arithmetic/untrained.rs"]
+mod untrained;
 
 use std::{hint::black_box, time::Instant};
 
@@ -17,16 +19,14 @@ use decoupler::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
         RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean,
     },
-    network::{
-        DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
-        nguyen_widrow, tanh_in_place, tanh_in_place_single,
-    },
+    network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},
 };
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 use row_arithmetic::RowArithmetic;
+use untrained::untrained_networks;
 
 /// A piece of work with its name.
 type Work<'a> = (String, Box<dyn FnMut() + 'a>);
@@ -59,23 +59,6 @@ fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
         times[TURNS / 2]
     };
     times.iter_mut().map(middle).collect()
-}
-
-/// Untrained networks: speed does not depend on the weights.
-fn networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Networks {
-    let mut rng = Seed(0).rng(Stream::Start);
-    let network = |set: &Dataset| {
-        let inputs = Inputs::fit(choice, set.readings(), NoiseSource::default())?;
-        let outputs = MinMax::fit(set.targets())?;
-        let shape = Shape {
-            inputs: inputs.count(),
-            hidden,
-            outputs: outputs.varying().len(),
-        };
-        let mlp = nguyen_widrow(shape, &mut rng);
-        Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
-    };
-    PerRow::fit(training, RowModel::Each, network).unwrap()
 }
 
 /// What decoding of a frame by networks cannot avoid, in the precision of the array. The type rather than a closure, which
@@ -191,14 +174,14 @@ fn print_scale(scale: ArrayScale) {
                 quantity,
                 scaling: ScalingChoice::Whitening,
             };
-            let networks = networks(&training, choice, hidden);
+            let networks = untrained_networks(&training, choice, hidden);
             let double = CompiledNetworks::<f64>::new(&networks, scale.rows());
             let single = CompiledNetworks::<f32>::new(&networks, scale.rows());
             decoders.push((format!("network, {hidden} hidden, {quantity}, f64"), Box::new(double)));
             decoders.push((format!("network, {hidden} hidden, {quantity}, f32"), Box::new(single)));
         }
     }
-    let first = CompiledNetworks::<f64>::new(&networks(&training, InputChoice::BEST, 12), scale.rows());
+    let first = CompiledNetworks::<f64>::new(&untrained_networks(&training, InputChoice::BEST, 12), scale.rows());
     decoders.push((
         "polish, 1 step".into(),
         Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1, &mut rng).unwrap()),

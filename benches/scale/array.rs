@@ -3,19 +3,17 @@
 use std::hint::black_box;
 
 use decoupler::{
-    dataset::{Dataset, PerRow, Seed, Stream},
+    dataset::{Dataset, Seed, Stream},
     decoupling::{CompiledNetworks, Decoder, Newton, NewtonDecoder, NewtonRules, Solution},
-    network::{
-        DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
-        nguyen_widrow,
-    },
-    scene::{NoiseSource, RowModel, Rows, Scene},
+    network::{InputChoice, Networks, Quantity, ScalingChoice},
+    scene::{Rows, Scene},
     sensor::{ArrayScale, SensorModel},
 };
 
 use crate::{
     row_arithmetic::RowArithmetic,
     timing::{median, time_ms},
+    untrained::untrained_networks,
 };
 
 /// An array with known rows, and some frames of it.
@@ -88,25 +86,12 @@ impl Array {
         ]
     }
 
-    /// Untrained networks: speed does not depend on the weights.
     fn networks(&self, hidden: usize) -> Networks {
-        let mut rng = Seed(0).rng(Stream::Start);
         let choice = InputChoice {
             quantity: Quantity::Conductance,
             scaling: ScalingChoice::MinMax,
         };
-        let network = |set: &Dataset| {
-            let inputs = Inputs::fit(choice, set.readings(), NoiseSource::default())?;
-            let outputs = MinMax::fit(set.targets())?;
-            let shape = Shape {
-                inputs: inputs.count(),
-                hidden,
-                outputs: outputs.varying().len(),
-            };
-            let mlp = nguyen_widrow(shape, &mut rng);
-            Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
-        };
-        PerRow::fit(&self.set, RowModel::Each, network).unwrap()
+        untrained_networks(&self.set, choice, hidden)
     }
 
     /// What the Gauss-Newton method takes for a frame.

@@ -15,6 +15,8 @@ mod row_arithmetic;
 mod samples;
 #[path = "../training/timing.rs"]
 mod timing;
+#[path = "../arithmetic/untrained.rs"]
+mod untrained;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

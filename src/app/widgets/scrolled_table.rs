@@ -38,6 +38,13 @@ pub struct TableColumn<'a> {
     pub width: ColumnWidth<'a>,
 }
 
+impl<'a> ColumnWidth<'a> {
+    /// As wide as the longest of `texts`; it is the widest but for a point or two, which the gap takes.
+    pub fn of_longest(texts: impl Iterator<Item = &'a str>) -> Self {
+        Self::Fits(texts.max_by_key(|text| text.chars().count()).unwrap_or_default())
+    }
+}
+
 /// Column by which the rows are sorted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SortBy {
@@ -45,6 +52,29 @@ pub struct SortBy {
     pub column: Option<usize>,
     /// Largest first.
     pub is_descending: bool,
+}
+
+impl SortBy {
+    /// The rows in this order. `cell` gives the figure of a row in a column, if it has one, and a text: rows without a figure
+    /// come last, by their texts.
+    pub fn order<'a>(self, rows: usize, cell: impl Fn(usize, usize) -> (Option<f64>, &'a str)) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..rows).collect();
+        let Some(column) = self.column else { return order };
+        order.sort_by(|&one, &other| {
+            let ((one, text), (other, other_text)) = (cell(one, column), cell(other, column));
+            let ordering = match (one, other) {
+                (Some(one), Some(other)) => one.total_cmp(&other),
+                (None, None) => text.cmp(other_text),
+                (one, other) => return other.is_some().cmp(&one.is_some()),
+            };
+            if self.is_descending {
+                ordering.reverse()
+            } else {
+                ordering
+            }
+        });
+        order
+    }
 }
 
 /// A row, with one cell for each column.
@@ -68,6 +98,19 @@ pub struct TableCell {
     pub label: Option<String>,
     /// Shown under the pointer; empty for nothing.
     pub meaning: &'static str,
+}
+
+impl TableCell {
+    /// A text that its row's name tells already.
+    pub fn plain(text: String, colour: Color32) -> Self {
+        Self {
+            text,
+            colour,
+            is_strong: false,
+            label: None,
+            meaning: "",
+        }
+    }
 }
 
 /// An action of the user on a table.
@@ -200,13 +243,7 @@ fn widths(ui: &Ui, columns: &[TableColumn<'_>]) -> Vec<f32> {
 fn heading_ui(ui: &mut Ui, column: &TableColumn<'_>, place: usize, sort: Option<SortBy>) -> Option<TableClick> {
     let palette = Theme::of(ui).palette;
     let rect = ui.max_rect();
-    let mut cell = TableCell {
-        text: column.heading.to_owned(),
-        colour: palette.dim,
-        is_strong: false,
-        label: None,
-        meaning: "",
-    };
+    let mut cell = TableCell::plain(column.heading.to_owned(), palette.dim);
     let mut chosen = None;
     if let Some(sort) = sort {
         let response = ui.interact(rect, ui.scope_id().with("sort"), Sense::click());

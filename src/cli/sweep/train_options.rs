@@ -79,7 +79,7 @@ impl TrainOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::{TrialOptions, decoders_in_order as in_order, train_options as canonical};
+    use crate::export::{TrialOptions, decoders_in_order, train_options};
 
     fn read_back(options: &TrialOptions) -> TrainingArguments {
         let mut train = TrainOptions::new();
@@ -124,18 +124,21 @@ mod tests {
         let mut train = TrainOptions::new();
         let defaults = {
             let arguments = train.parse(&[]).unwrap();
-            canonical(&arguments.settings().unwrap(), &arguments.scene.decoders())
+            train_options(&arguments.settings().unwrap(), &arguments.scene.decoders())
         };
         for (option, value, with) in cases {
             let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
             let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
             let arguments = train.parse(&words).unwrap();
-            let (settings, decoders) = (arguments.settings().unwrap(), in_order(&arguments.scene.decoders()));
-            let options = canonical(&settings, &decoders);
+            let (settings, decoders) = (
+                arguments.settings().unwrap(),
+                decoders_in_order(&arguments.scene.decoders()),
+            );
+            let options = train_options(&settings, &decoders);
             assert_ne!(options, defaults, "{option}");
             let back = read_back(&options);
             assert_eq!(back.settings().unwrap(), settings, "{option}");
-            assert_eq!(in_order(&back.scene.decoders()), decoders, "{option}");
+            assert_eq!(decoders_in_order(&back.scene.decoders()), decoders, "{option}");
         }
         let offered: Vec<_> = train
             .0

@@ -106,6 +106,7 @@ mod tests {
         let whole: f64 = cut_cell(corners, -1.0, 9.0, true).map(|polygon| area(&polygon)).sum();
         assert_eq!(whole, 1.0);
     }
+
     #[test]
     fn with_its_plateaus_a_cell_is_whole() {
         let plane = |x: f64, y: f64| DVec3::new(x, y, 4.0 * x + 2.0 * y);

@@ -61,8 +61,7 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
             experiments.edit(form);
         }
         if experiments.topic == Topic::Sweep {
-            let experiment = experiments.form().experiment().ok();
-            folder_form_ui(ui, &mut experiments.folder, experiment.as_ref(), effects);
+            folder_form_ui(ui, &experiments.folder, experiments.specification(), effects);
         }
         ui.add_space(space(4));
     });

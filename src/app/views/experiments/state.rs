@@ -4,6 +4,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde_json::Value;
+
 use super::{
     Form,
     sweep_folder::{OpenFolder, SweepFolder},
@@ -19,7 +21,7 @@ use crate::{
         SimulatedSettings,
         experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
     },
-    export::ExperimentTable,
+    export::{ExperimentTable, sweep_specification},
     figure::{Figure, experiment_figure},
     training::EpochRecord,
 };
@@ -92,6 +94,8 @@ struct CheckedForm {
     checked: Result<usize, String>,
     /// Results to be filled in, with the published figures.
     preview: Option<Outcome>,
+    /// What the terminal needs to sweep it, or the reason for which it cannot.
+    specification: Result<Value, String>,
 }
 
 /// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
@@ -224,14 +228,30 @@ impl ExperimentsView {
         &self.forms[&self.topic].checked
     }
 
+    /// Returns what the terminal needs to sweep the form, or the reason for which it cannot.
+    pub(super) fn specification(&self) -> &Result<Value, String> {
+        &self.forms[&self.topic].specification
+    }
+
     /// Takes a changed form of what is looked at.
     pub fn edit(&mut self, form: Form) {
-        let preview = form.experiment().map(Outcome::new);
-        let (checked, preview) = match preview {
-            Ok(preview) => (Ok(preview.trials().1), Some(preview)),
-            Err(error) => (Err(error.to_string()), None),
+        let (checked, preview, specification) = match form.experiment() {
+            Ok(experiment) => {
+                let specification = sweep_specification(&experiment).map_err(|gap| gap.to_string());
+                let preview = Outcome::new(experiment);
+                (Ok(preview.trials().1), Some(preview), specification)
+            }
+            Err(error) => {
+                let none = Err("The values above cannot be run yet.".to_owned());
+                (Err(error.to_string()), None, none)
+            }
         };
-        let checked = CheckedForm { form, checked, preview };
+        let checked = CheckedForm {
+            form,
+            checked,
+            preview,
+            specification,
+        };
         self.forms.insert(self.topic, checked);
     }
 

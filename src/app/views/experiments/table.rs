@@ -1,14 +1,12 @@
 //! The table of an experiment: every column orders it, every row can be marked.
 
-use std::cmp::Ordering;
-
 use eframe::egui::Ui;
 
 use super::{ExperimentLook, Outcome, open_cell::open_cell};
 use crate::app::{
     shared::{Effect, Shared},
     theme::Theme,
-    widgets::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
+    widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
@@ -22,10 +20,12 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
         .map(|(column, heading)| TableColumn {
             heading,
             is_figure: column >= axes,
-            width: ColumnWidth::Fits(longest(outcome, column)),
+            width: ColumnWidth::of_longest(outcome.table.rows.iter().map(|row| row[column].as_str())),
         })
         .collect();
-    let order = order(outcome, look.sort);
+    let values = &outcome.table.values;
+    let figure = |cell: usize, column: usize| (values[cell].get(column).copied().flatten(), "");
+    let order = look.sort.order(outcome.table.rows.len(), figure);
     let row = |place: usize| {
         let number = order[place];
         let texts = &outcome.table.rows[number];
@@ -68,26 +68,6 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
         }
         Some(TableClick::Point(_)) | None => {}
     }
-}
-
-/// Returns the longest text of a column; it is the widest but for a point or two, which the gap takes.
-fn longest(outcome: &Outcome, column: usize) -> &str {
-    let texts = outcome.table.rows.iter().map(|row| row[column].as_str());
-    texts.max_by_key(|text| text.chars().count()).unwrap_or_default()
-}
-
-/// The cells in the order of the table; those without the figure come last.
-fn order(outcome: &Outcome, sort: SortBy) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..outcome.table.rows.len()).collect();
-    if let Some(column) = sort.column {
-        let value = |cell: usize| outcome.table.values[cell].get(column).copied().flatten();
-        order.sort_by(|&one, &other| match (value(one), value(other)) {
-            (Some(one), Some(other)) if sort.is_descending => other.total_cmp(&one),
-            (Some(one), Some(other)) => one.total_cmp(&other),
-            (one, other) => other.is_some().cmp(&one.is_some()).then(Ordering::Equal),
-        });
-    }
-    order
 }
 
 fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {

@@ -124,13 +124,7 @@ fn list_ui(ui: &mut Ui, runs: &Runs, is_shown: impl Fn(&Trained) -> bool) -> Opt
     columns.extend(headings.iter().map(|heading| figure(heading.as_str(), "0.00012")));
     let row = |place: usize| {
         let run = &runs.runs[place].trained;
-        let cell = |text: String| TableCell {
-            text,
-            colour: palette.text,
-            is_strong: false,
-            label: None,
-            meaning: "",
-        };
+        let cell = |text: String| TableCell::plain(text, palette.text);
         let rmse = |title: &String| {
             let index = run.file.targets.iter().position(|target| target.title() == *title);
             let errors: Option<&TargetErrors> = index.and_then(|index| run.file.errors.get(index));

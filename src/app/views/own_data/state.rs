@@ -50,7 +50,7 @@ pub struct OwnDataView {
     pub(super) validated: Option<Validated>,
     /// True while a cross-validation is under way.
     pub(super) is_validating: bool,
-    /// What the readings tell, and other decoders.
+    /// Findings on the readings, and other decoders.
     pub(super) measuring: Measuring,
     /// Networks trained and opened.
     pub(super) runs: Runs,
@@ -74,7 +74,7 @@ pub(super) enum Tab {
     Columns,
     /// Charts of the network on show.
     Results,
-    /// What the readings tell.
+    /// Findings on the readings.
     Findings,
     /// Other decoders beside the network on show.
     Decoders,

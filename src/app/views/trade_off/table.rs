@@ -89,11 +89,8 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         let text = if is_chosen { palette.text } else { palette.dim };
         let name = point_name(point);
         let name_cell = TableCell {
-            text: name.replace(" preset", ""),
-            colour: text,
             is_strong: is_chosen,
-            label: None,
-            meaning: "",
+            ..TableCell::plain(name.replace(" preset", ""), text)
         };
         let texts: Vec<String> = figures.iter().map(|figure| figure.text(point)).collect();
         let label = format!("{name}: {}", texts.join(", "));
@@ -101,11 +98,8 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
             // A cost is strong where nothing else costs as little for as small an error.
             let is_strong = figure.cost().is_some_and(|cost| on_fronts[cost]);
             TableCell {
-                text: cell,
-                colour: if is_strong { palette.accent } else { text },
                 is_strong,
-                label: None,
-                meaning: "",
+                ..TableCell::plain(cell, if is_strong { palette.accent } else { text })
             }
         });
         TableRow {

@@ -1,5 +1,3 @@
-use std::cmp::Ordering;
-
 use eframe::egui::{Align, Label, Layout, RichText, Ui, vec2};
 
 use super::{SweepFolder, state::OpenFolder, table::SweepTable};
@@ -81,10 +79,14 @@ fn table_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
         .map(|(column, heading)| TableColumn {
             heading,
             is_figure: table.rows.iter().any(|row| row[column].value.is_some()),
-            width: ColumnWidth::Fits(longest(table, column)),
+            width: ColumnWidth::of_longest(table.rows.iter().map(|row| row[column].text.as_str())),
         })
         .collect();
-    let order = order(table, *sort);
+    let cell = |row: usize, column: usize| {
+        let cell = &table.rows[row][column];
+        (cell.value, cell.text.as_str())
+    };
+    let order = sort.order(table.rows.len(), cell);
     let row = |place: usize| {
         let cells = &table.rows[order[place]];
         let options: Vec<String> = (cells[..table.options].iter().zip(&table.headings))
@@ -119,38 +121,4 @@ fn table_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
     {
         *sort = chosen;
     }
-}
-
-/// Returns the longest text of a column.
-fn longest(table: &SweepTable, column: usize) -> &str {
-    let texts = table.rows.iter().map(|row| row[column].text.as_str());
-    texts.max_by_key(|text| text.chars().count()).unwrap_or_default()
-}
-
-/// The trials in the order of the table; those without the figure come last, texts by the alphabet.
-fn order(table: &SweepTable, sort: SortBy) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..table.rows.len()).collect();
-    if let Some(column) = sort.column {
-        let cell = |row: usize| &table.rows[row][column];
-        order.sort_by(|&one, &other| {
-            let (one, other) = (cell(one), cell(other));
-            let ordering = match (one.value, other.value) {
-                (Some(one), Some(other)) => one.total_cmp(&other),
-                (None, None) => one.text.cmp(&other.text),
-                (one, _) => {
-                    return if one.is_some() {
-                        Ordering::Less
-                    } else {
-                        Ordering::Greater
-                    };
-                }
-            };
-            if sort.is_descending {
-                ordering.reverse()
-            } else {
-                ordering
-            }
-        });
-    }
-    order
 }

@@ -1,4 +1,5 @@
 use eframe::egui::Ui;
+use serde_json::Value;
 
 use super::SweepFolder;
 use crate::{
@@ -7,8 +8,7 @@ use crate::{
         theme::space,
         widgets::{dim_ui, ghost_button, section_heading_ui},
     },
-    evaluation::experiments::Experiment,
-    export::{atomic_write, sweep_specification},
+    export::atomic_write,
 };
 
 /// The specification of a sweep.
@@ -19,26 +19,22 @@ const SPECIFICATION: FileWords = FileWords {
     extensions: &["json"],
 };
 
-/// The file with which the terminal trains `experiment`.
-///
-/// # Errors
-/// The terminal cannot train it.
-fn specification_task(experiment: &Experiment) -> Result<FileTask, String> {
-    let specification = sweep_specification(experiment).map_err(|gap| gap.to_string())?;
+/// The file of a specification.
+fn specification_task(specification: Value) -> FileTask {
     let contents = Contents::new(move |path| {
         atomic_write(path, |writer| {
             serde_json::to_writer_pretty(&mut *writer, &specification)?;
             writeln!(writer)
         })
     });
-    Ok(FileTask::save(SPECIFICATION, "sweep", contents))
+    FileTask::save(SPECIFICATION, "sweep", contents)
 }
 
 /// Sweeps on other machines: saves the sweep of the form as a specification, opens a folder that is being filled.
 pub(in crate::app::views::experiments) fn folder_form_ui(
     ui: &mut Ui,
-    folder: &mut SweepFolder,
-    experiment: Option<&Experiment>,
+    folder: &SweepFolder,
+    specification: &Result<Value, String>,
     effects: &mut Vec<Effect>,
 ) {
     section_heading_ui(ui, "On many machines");
@@ -46,20 +42,15 @@ pub(in crate::app::views::experiments) fn folder_form_ui(
         ui,
         "The command decoupler sweep trains a specification on any number of machines and fills a folder, which is shown here.",
     );
-    let task = experiment.map(specification_task);
-    let refusal = match &task {
-        None => "The values above cannot be run yet.",
-        Some(Err(reason)) => reason,
-        Some(Ok(_)) => "",
-    };
+    let refusal = specification.as_ref().err().map_or("", String::as_str);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = space(1);
         let save = ui.add_enabled(refusal.is_empty(), ghost_button("Save specification…"));
         let save = save
             .on_hover_text(SPECIFICATION.description)
             .on_disabled_hover_text(refusal);
-        if let (true, Some(Ok(task))) = (save.clicked(), task.clone()) {
-            effects.push(Effect::ChooseFile(task));
+        if let (true, Ok(specification)) = (save.clicked(), specification) {
+            effects.push(Effect::ChooseFile(specification_task(specification.clone())));
         }
         let open = ui.add(ghost_button("Open sweep folder…"));
         let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");

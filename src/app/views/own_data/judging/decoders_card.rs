@@ -142,13 +142,7 @@ fn table_ui(ui: &mut Ui, decoders: &Decoders, target: usize) {
             frame_time(report.cost.frame_us),
             fit_time(report),
         ];
-        let cell = |text: String| TableCell {
-            text,
-            colour: palette.text,
-            is_strong: false,
-            label: None,
-            meaning: "",
-        };
+        let cell = |text: String| TableCell::plain(text, palette.text);
         TableRow {
             label: format!("{name}: {}", texts.join(", ")),
             is_marked: false,

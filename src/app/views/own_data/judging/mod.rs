@@ -1,4 +1,4 @@
-//! What a recording tells, and decoders beside the network: both measured on a thread of their own, once they are asked for.
+//! Findings on a recording, and decoders beside the network: both measured on a thread of their own, once they are asked for.
 
 mod decoders_card;
 mod findings_card;

@@ -1,4 +1,4 @@
-//! What was measured, as tables to be exported.
+//! Tables of the measurements, to be exported.
 
 use super::thread::{Decoders, Told};
 use crate::export::{Cell, Table, TableColumn};
@@ -9,7 +9,7 @@ fn columns<const N: usize>(columns: [(&'static str, &'static str, &'static str);
         .into()
 }
 
-/// How much the error of each target grows without each channel.
+/// Growth of the error of each target without each channel.
 pub fn channel_table(told: &Told) -> Table {
     let mut rows = Vec::new();
     for channel in &told.findings.importance {

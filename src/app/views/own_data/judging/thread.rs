@@ -27,11 +27,11 @@ pub enum Task {
 /// News from the thread.
 #[derive(Debug)]
 pub enum News {
-    /// How far a file is read.
+    /// Progress of reading a file.
     Reading(Progress),
     /// A part of the work has begun.
     Begun(Stage),
-    /// What the recording tells.
+    /// Findings on the recording.
     Told(Box<Told>),
     /// Decoders measured so far.
     Measured(Box<Decoders>),
@@ -39,7 +39,7 @@ pub enum News {
     Ended(Result<(), String>),
 }
 
-/// What a recording tells.
+/// Findings on a recording, with what they were measured on.
 #[derive(Clone, Debug)]
 pub struct Told {
     /// Import with absolute paths.
@@ -58,7 +58,7 @@ pub struct Told {
 #[derive(Clone, Debug)]
 pub struct Decoders {
     pub of: Arc<MeasuredNetworkFile>,
-    /// What is decoded in the time measured: "a sample", "a frame of 4 row-wires".
+    /// The unit of which the decoding time is measured: "a sample", "a frame of 4 row-wires".
     pub decoded: String,
     pub reports: Vec<TargetReport>,
     /// Decoders that cannot be used, and why.
