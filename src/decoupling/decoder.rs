@@ -1,4 +1,4 @@
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use thiserror::Error;
 
 use super::SolvedRows;
@@ -42,6 +42,27 @@ pub trait Decoder: Send {
         let rows = readings.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
         for (row_index, (readings, targets)) in rows.enumerate() {
             self.decode_row(row_index, readings, targets)
+                .map_err(|error| DecodeError { row_index, ..error })?;
+        }
+        Ok(())
+    }
+
+    /// Decodes rows that need not be those of a frame: `readings` are rows × channels and `targets` rows × outputs, each of
+    /// the row-wire with its index among those read.
+    ///
+    /// # Errors
+    /// If a reading cannot be decoded; `row_index` is then the place among these rows, and the contents of `targets` are
+    /// unspecified.
+    ///
+    /// # Panics
+    /// If the slices have other lengths, or there is no such row-wire.
+    fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        let lengths = (row_indices.len() * channels, row_indices.len() * outputs);
+        assert_eq!((readings.len(), targets.len()), lengths);
+        let rows = readings.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
+        for (row_index, (&known, (readings, targets))) in row_indices.iter().zip(rows).enumerate() {
+            self.decode_row(known, readings, targets)
                 .map_err(|error| DecodeError { row_index, ..error })?;
         }
         Ok(())
@@ -106,13 +127,21 @@ impl DecodeError {
 /// # Panics
 /// If the set has another number of channels, or row-wires unknown to the decoder.
 pub fn decode_set(decoder: &mut dyn Decoder, set: &Dataset) -> Result<Array2<f64>, DecodeError> {
+    /// Samples that are decoded at once.
+    const BLOCK: usize = 1024;
     let mut answers = Array2::zeros((set.samples(), decoder.outputs()));
-    for (sample, mut answer) in answers.rows_mut().into_iter().enumerate() {
-        let answer = answer.as_slice_mut().expect("a row of a standard array is contiguous");
+    let mut readings = Vec::new();
+    for (block, mut answers) in answers.axis_chunks_iter_mut(Axis(0), BLOCK).enumerate() {
+        let first = block * BLOCK;
+        let samples = first..first + answers.nrows();
+        let row_indices: Vec<usize> = samples.clone().map(|sample| set.row_index(sample)).collect();
+        readings.clear();
+        samples.for_each(|sample| readings.extend_from_slice(set.sample_readings(sample)));
+        let answers = answers.as_slice_mut().expect("rows of a standard array are contiguous");
         decoder
-            .decode_row(set.row_index(sample), set.sample_readings(sample), answer)
+            .decode_rows(&row_indices, &readings, answers)
             .map_err(|error| DecodeError {
-                row_index: sample,
+                row_index: first + error.row_index,
                 ..error
             })?;
     }

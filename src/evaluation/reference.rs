@@ -82,16 +82,24 @@ pub fn reference_errors(
 
 /// The answers of the posterior that knows where to linearise (samples × 3·M2); `None` if that of any row did not converge.
 fn limits_mm(posterior: &mut Posterior, test: &Dataset) -> Option<Array2<f64>> {
+    /// Samples whose posteriors are found at once.
+    const BLOCK: usize = 64;
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
     let mut limits_mm = Array2::zeros(test.targets().dim());
-    for (sample, mut answer) in limits_mm.rows_mut().into_iter().enumerate() {
-        let converged = posterior.limit(
-            rows[test.row_index(sample)],
-            test.sample_readings(sample),
-            test.sample_targets(sample),
-            answer.as_slice_mut().expect("a row of a standard array is contiguous"),
-        );
-        if !converged {
+    let (mut readings_ohm, mut truths_mm) = (Vec::new(), Vec::new());
+    for (block, mut limits_mm) in limits_mm.axis_chunks_iter_mut(Axis(0), BLOCK).enumerate() {
+        let samples = block * BLOCK..block * BLOCK + limits_mm.nrows();
+        let rows: Vec<usize> = samples.clone().map(|sample| rows[test.row_index(sample)]).collect();
+        readings_ohm.clear();
+        truths_mm.clear();
+        for sample in samples {
+            readings_ohm.extend_from_slice(test.sample_readings(sample));
+            truths_mm.extend_from_slice(test.sample_targets(sample));
+        }
+        let limits_mm = limits_mm
+            .as_slice_mut()
+            .expect("rows of a standard array are contiguous");
+        if !posterior.limits(&rows, &readings_ohm, &truths_mm, limits_mm) {
             return None;
         }
     }

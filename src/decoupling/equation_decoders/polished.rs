@@ -2,7 +2,10 @@ use rand::Rng;
 
 use super::plain_first::PlainFirst;
 use crate::{
-    decoupling::{DecodeError, Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows, side_by_side::LANES},
+    decoupling::{
+        DecodeError, Decoder, Newton, NewtonRules, Posterior, PosteriorReport, Solution, SolvedRows,
+        side_by_side::LANES,
+    },
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
 };
@@ -86,6 +89,17 @@ impl PolishedDecoder {
     }
 }
 
+/// The standing of an answer to readings with this noise: those that noise explains are all that a posterior can ask for.
+fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
+    let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
+    let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
+    if report.residual <= NOISES * variance.sqrt() {
+        Solution::Unique
+    } else {
+        Solution::None
+    }
+}
+
 impl PlainFirst for PolishedDecoder {
     /// Improves the first answers.
     fn answer_plainly(&mut self, first: usize, readings: &[f64], targets: &mut [f64]) -> [Option<Solution>; LANES] {
@@ -100,7 +114,17 @@ impl PlainFirst for PolishedDecoder {
                 let reports = newton.polish_plainly(&row_wires[..count], readings, targets);
                 reports.map(|report| Some(report?.solution))
             }
-            Improvement::Posterior(..) => [None; LANES],
+            Improvement::Posterior(posterior, noise) => {
+                let reports = posterior.polish_rows(&row_wires[..count], readings, targets, self.steps);
+                let mut standings = [None; LANES];
+                let rows = readings
+                    .chunks_exact(readings.len() / count)
+                    .zip(reports.into_iter().flatten());
+                for (standing, (readings, report)) in standings.iter_mut().zip(rows) {
+                    *standing = Some(standing_beside(noise, readings, report));
+                }
+                standings
+            }
         }
     }
 
@@ -110,14 +134,7 @@ impl PlainFirst for PolishedDecoder {
             Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
             Improvement::Posterior(posterior, noise) => {
                 let report = posterior.polish(row_wire, readings, targets, self.steps)?;
-                let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
-                let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
-                // Readings that noise explains are all that a posterior can ask for.
-                Ok(if report.residual <= NOISES * variance.sqrt() {
-                    Solution::Unique
-                } else {
-                    Solution::None
-                })
+                Ok(standing_beside(noise, readings, report))
             }
         }
     }

@@ -1,6 +1,6 @@
 use super::row_search::{EXPLAINED, RowSearch};
 use crate::{
-    decoupling::{DecodeError, Decoder, Posterior, Solution, SolvedRows},
+    decoupling::{DecodeError, Decoder, Posterior, PosteriorReport, Solution, SolvedRows},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -30,21 +30,25 @@ impl PosteriorDecoder {
         })
     }
 
-    /// Solves one row; returns the standing of the answer.
-    pub(super) fn answer(
+    /// Solves rows side by side, each with the index of its own row-wire; returns the standing of the answers.
+    fn answers(
         &mut self,
-        row_index: usize,
+        row_indices: &[usize],
         readings: &[f64],
         targets: &mut [f64],
-    ) -> Result<Solution, DecodeError> {
+    ) -> Result<Vec<Solution>, DecodeError> {
         let posterior = &mut self.posterior;
         let taken = self
             .search
-            .solve(row_index, readings, targets, |row, readings, coordinates| {
-                let report = posterior.solve(row, readings, coordinates)?;
-                Ok((report.residual, report))
+            .solve_rows(row_indices, readings, targets, |rows, readings, coordinates| {
+                let reports = posterior.solve_rows(rows, readings, coordinates)?;
+                Ok(reports.into_iter().map(|report| (report.residual, report)).collect())
             })?;
-        Ok(match taken {
+        Ok(taken.into_iter().map(|report| self.standing(report)).collect())
+    }
+
+    fn standing(&self, report: Option<PosteriorReport>) -> Solution {
+        match report {
             Some(report) if report.converged => {
                 if self.is_noisy || report.determined && report.residual < EXPLAINED {
                     Solution::Unique
@@ -56,7 +60,17 @@ impl PosteriorDecoder {
                 }
             }
             _ => Solution::None,
-        })
+        }
+    }
+
+    /// Solves one row; returns the standing of the answer.
+    pub(super) fn answer(
+        &mut self,
+        row_index: usize,
+        readings: &[f64],
+        targets: &mut [f64],
+    ) -> Result<Solution, DecodeError> {
+        Ok(self.answers(&[row_index], readings, targets)?[0])
     }
 }
 
@@ -70,9 +84,19 @@ impl Decoder for PosteriorDecoder {
     }
 
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let solution = self.answer(row_index, readings, targets)?;
-        self.solved.count(solution);
+        self.decode_rows(&[row_index], readings, targets)
+    }
+
+    fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        for solution in self.answers(row_indices, readings, targets)? {
+            self.solved.count(solution);
+        }
         Ok(())
+    }
+
+    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let row_indices: Vec<usize> = (0..readings.len() / self.channels()).collect();
+        self.decode_rows(&row_indices, readings, targets)
     }
 
     fn take_solved_rows(&mut self) -> SolvedRows {

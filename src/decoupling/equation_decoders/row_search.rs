@@ -92,15 +92,9 @@ impl RowSearch {
             let (_, report) = solve(self.rows[row_index], readings_ohm, coordinates_mm)?;
             return Ok(Some(report));
         }
-        let unlike = |rest: &Vec<f64>| -> f64 {
-            let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
-            differences.map(|difference| difference * difference).sum()
-        };
-        let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut least = f64::INFINITY;
         let mut of_taken = None;
-        for (_, row_wire) in order {
+        for row_wire in self.order(readings_ohm) {
             let (residual, report) = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
             if residual < least {
                 (least, of_taken) = (residual, Some(report));
@@ -111,5 +105,56 @@ impl RowSearch {
             }
         }
         Ok(of_taken)
+    }
+
+    /// As [`Self::solve`], several rows side by side, those of a frame or others: `solve` solves for a given row-wire each.
+    /// Returns the report on the row-wire taken for each row.
+    pub(super) fn solve_rows<R: Copy>(
+        &self,
+        row_indices: &[usize],
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        mut solve: impl FnMut(&[usize], &[f64], &mut [f64]) -> Result<Vec<(f64, R)>, DecodeError>,
+    ) -> Result<Vec<Option<R>>, DecodeError> {
+        if self.rest.is_empty() {
+            let row_wires: Vec<usize> = row_indices.iter().map(|&index| self.rows[index]).collect();
+            let reports = solve(&row_wires, readings_ohm, coordinates_mm)?;
+            return Ok(reports.into_iter().map(|(_, report)| Some(report)).collect());
+        }
+        let (channels, outputs) = (self.channels(), self.outputs());
+        let readings_of = |place: usize| &readings_ohm[place * channels..][..channels];
+        let orders: Vec<Vec<usize>> = (0..row_indices.len())
+            .map(|place| self.order(readings_of(place)))
+            .collect();
+        let mut taken: Vec<(f64, Option<R>)> = vec![(f64::INFINITY, None); row_indices.len()];
+        for rank in 0..self.rows.len() {
+            let open: Vec<usize> = (0..taken.len()).filter(|&place| taken[place].0 >= EXPLAINED).collect();
+            if open.is_empty() {
+                break;
+            }
+            let row_wires: Vec<usize> = open.iter().map(|&place| orders[place][rank]).collect();
+            let readings_ohm: Vec<f64> = open.iter().flat_map(|&place| readings_of(place)).copied().collect();
+            let mut trials_mm = vec![0.0; open.len() * outputs];
+            let found = solve(&row_wires, &readings_ohm, &mut trials_mm)?;
+            let trials = trials_mm.chunks_exact(outputs).zip(found);
+            for (&place, (trial_mm, (residual, report))) in open.iter().zip(trials) {
+                if residual < taken[place].0 {
+                    taken[place] = (residual, Some(report));
+                    coordinates_mm[place * outputs..][..outputs].copy_from_slice(trial_mm);
+                }
+            }
+        }
+        Ok(taken.into_iter().map(|(_, report)| report).collect())
+    }
+
+    /// The row-wires in the order of similarity of these readings with theirs at rest.
+    fn order(&self, readings_ohm: &[f64]) -> Vec<usize> {
+        let unlike = |rest: &Vec<f64>| -> f64 {
+            let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
+            differences.map(|difference| difference * difference).sum()
+        };
+        let mut order: Vec<(f64, usize)> = self.rest.iter().map(unlike).zip(self.rows.iter().copied()).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order.into_iter().map(|(_, row_wire)| row_wire).collect()
     }
 }

@@ -1,44 +1,12 @@
 use pulp::{Simd, WithSimd};
 
 use super::{
-    gaussian::{Direction, Gaussian},
+    gaussian::{Direction, Gaussians},
+    linear_model::LinearModel,
     marginal::Marginal,
+    pack::{LANES, Pack},
     site::Site,
-    truncated::Factor,
 };
-use crate::decoupling::row_problem::Range;
-
-/// A linear model whose unknowns, and some of whose readings, are known to lie in ranges:
-/// `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)` for x within its ranges, times `P(fₖ·x + εₖ in range k)` for each rounded reading, with
-/// standard normal ε.
-///
-/// Its moments have no closed form in several dimensions. They are found by expectation propagation (Minka 2001;
-/// Cunningham, Hennig and Lacoste-Julien 2011 for ranges): each range is replaced by a Gaussian factor such that its
-/// marginal keeps mean and variance. Tests compare with sampling.
-pub(super) struct LinearModel {
-    /// `[A, b]`, row by row.
-    pub(super) equations: Vec<f64>,
-    /// c, one for each unknown.
-    pub(super) linear: Vec<f64>,
-    /// Ranges of the unknowns, possibly open to one side or both.
-    pub(super) ranges: Vec<Range>,
-    /// The rounded readings.
-    pub(super) rounded: Vec<RoundedReading>,
-    /// Factors with which those of the unknowns begin; empty if they begin with the moments of their ranges.
-    pub(super) first_factors: Vec<Factor>,
-    /// Change of a mean, relative to the range, below which the factors have converged.
-    pub(super) tolerance: f64,
-}
-
-/// A reading of which only the interval is known.
-pub(super) struct RoundedReading {
-    /// f, one coefficient for each unknown.
-    pub(super) form: Vec<f64>,
-    /// Middle of the interval less the reading expected at x = 0, in standard deviations of ε.
-    pub(super) misfit: f64,
-    /// The interval, in standard deviations of ε.
-    pub(super) range: Range,
-}
 
 /// The marginals of all unknowns.
 #[derive(Clone, Debug)]
@@ -59,267 +27,172 @@ const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
 pub(super) const TOLERANCE: f64 = 1e-7;
 
-impl LinearModel {
-    /// The marginals; `None` if numbers overflow.
-    pub(super) fn marginals(&self) -> Option<Marginals> {
-        if !self.first_factors.is_empty() {
-            let found = pulp::Arch::new().dispatch(Propagation {
-                model: self,
-                first_factors: &self.first_factors,
-            });
-            if found.as_ref().is_some_and(|marginals| marginals.converged) {
-                return found;
+/// Expectation propagation for several models side by side, in memory that is used again. A model has the same bits
+/// whatever is in the other lanes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Propagation {
+    gaussians: Gaussians,
+    of_unknowns: Vec<Site>,
+    of_rounded: Vec<Site>,
+    /// Forms of the rounded readings: rounded readings × unknowns.
+    forms: Vec<Pack>,
+}
+
+impl Propagation {
+    /// The marginals of at most [`LANES`] models, all of the same shape; `None` where there is no model or numbers overflow.
+    pub(super) fn marginals(&mut self, models: &[Option<LinearModel>]) -> [Option<Marginals>; LANES] {
+        let mut found = [const { None }; LANES];
+        let has_first =
+            |model: &Option<LinearModel>| model.as_ref().is_some_and(|model| !model.first_factors.is_empty());
+        let mut open = [false; LANES];
+        for (open, model) in open.iter_mut().zip(models) {
+            *open = model.is_some();
+        }
+        self.propagate(models, &mut open, true, &mut found);
+        for (lane, model) in models.iter().enumerate() {
+            let is_found = found[lane].as_ref().is_some_and(|marginals| marginals.converged);
+            open[lane] = has_first(model) && !is_found;
+        }
+        self.propagate(models, &mut open, false, &mut found);
+        found
+    }
+
+    /// Finds the marginals of the models in `open` lanes, which begin with their first factors or without them.
+    fn propagate(
+        &mut self,
+        models: &[Option<LinearModel>],
+        open: &mut [bool; LANES],
+        with_first: bool,
+        found: &mut [Option<Marginals>; LANES],
+    ) {
+        let begun = models.iter().enumerate().filter(|(lane, _)| open[*lane]);
+        let begun = begun.filter_map(|(lane, model)| Some((lane, model.as_ref()?)));
+        let Some((_, shape)) = begun.clone().next() else {
+            return;
+        };
+        self.make_room(shape);
+        for (lane, model) in begun {
+            found[lane] = None;
+            self.load(lane, model, with_first);
+        }
+        pulp::Arch::new().dispatch(Rounds {
+            propagation: self,
+            models,
+            open,
+            found,
+        });
+    }
+
+    fn make_room(&mut self, shape: &LinearModel) {
+        let (n, rounded) = (shape.linear.len(), shape.rounded.len());
+        self.gaussians.make_room(n, shape.equations.len() / (n + 1) + rounded);
+        self.of_unknowns.resize(n, Site::new(0.0));
+        self.of_rounded.resize(rounded, Site::new(1.0));
+        self.forms.resize(rounded * n, Pack::ZERO);
+    }
+
+    fn load(&mut self, lane: usize, model: &LinearModel, with_first: bool) {
+        let n = model.linear.len();
+        for (unknown, (site, &range)) in self.of_unknowns.iter_mut().zip(&model.ranges).enumerate() {
+            let first = model.first_factors.get(unknown).filter(|_| with_first);
+            site.begin(lane, range, first.copied());
+            self.gaussians.set_single(lane, unknown, site.equation(lane));
+            self.gaussians.set_linear(lane, unknown, model.linear[unknown]);
+        }
+        let rows = model.equations.chunks_exact(n + 1);
+        let equations = rows.len();
+        for (equation, row) in rows.enumerate() {
+            for (column, &value) in row.iter().enumerate() {
+                self.gaussians.set_entry(lane, equation, column, value);
             }
         }
-        pulp::Arch::new().dispatch(Propagation {
-            model: self,
-            first_factors: &[],
-        })
+        let forms = self.forms.chunks_exact_mut(n);
+        for (place, ((site, form), reading)) in self.of_rounded.iter_mut().zip(forms).zip(&model.rounded).enumerate() {
+            site.begin(lane, reading.range, None);
+            let (root, right) = site.equation(lane);
+            for (column, (to, &value)) in form.iter_mut().zip(&reading.form).enumerate() {
+                to.set(lane, value);
+                self.gaussians.set_entry(lane, equations + place, column, root * value);
+            }
+            self.gaussians.set_entry(lane, equations + place, n, right);
+        }
     }
 }
 
 /// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
-struct Propagation<'a> {
-    model: &'a LinearModel,
-    first_factors: &'a [Factor],
+struct Rounds<'a> {
+    propagation: &'a mut Propagation,
+    models: &'a [Option<LinearModel>],
+    open: &'a mut [bool; LANES],
+    found: &'a mut [Option<Marginals>; LANES],
 }
 
-impl WithSimd for Propagation<'_> {
-    type Output = Option<Marginals>;
+impl WithSimd for Rounds<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let LinearModel {
-            equations,
-            linear,
-            ranges,
-            rounded,
-            ..
-        } = self.model;
-        let n = linear.len();
-        let unknowns = ranges.iter().enumerate();
-        let unknowns = unknowns.map(|(unknown, &range)| Site::new(Direction::Unknown(unknown), range, 0.0));
-        let rounded = rounded.iter();
-        let rounded = rounded.map(|reading| Site::new(Direction::Form(&reading.form), reading.range, 1.0));
-        let mut sites: Vec<Site<'_>> = unknowns.chain(rounded).collect();
-        for (site, &factor) in sites.iter_mut().zip(self.first_factors) {
-            site.factor = factor;
-        }
-        let mut equations = equations.clone();
-        sites.iter().for_each(|site| site.append_to(&mut equations, n));
-        let mut gaussian = Gaussian::new(&equations, linear)?;
-        let (mut converged, mut rounds) = (false, 0);
+    fn with_simd<S: Simd>(mut self, _: S) {
+        let flaws = self.propagation.gaussians.factor();
         for round in 0..ROUNDS {
-            rounds += 1;
             let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
-            let mut largest = 0.0;
-            for (place, site) in sites.iter_mut().enumerate() {
-                let last = site.mean();
-                if !site.meet_range(&mut gaussian, share) {
-                    return None;
-                }
-                if place < n {
-                    let width = site.range.width();
-                    let unit = if width.is_finite() { width } else { 1.0 };
-                    let moved = (site.mean() - last).abs() / unit;
-                    largest = if moved > largest || moved.is_nan() {
-                        moved
-                    } else {
-                        largest
-                    };
-                }
-            }
-            if largest.is_nan() {
-                return None;
-            }
-            if largest < self.model.tolerance * share {
-                converged = true;
+            let moved = self.propagation.meet_ranges(Pack::splat(share), flaws);
+            self.close_lanes(moved, share, round + 1);
+            if !self.open.contains(&true) {
                 break;
             }
         }
-        Some(Marginals {
-            of_unknowns: sites[..n].iter().map(Site::marginal).collect(),
-            rounds,
-            converged,
-        })
+    }
+}
+
+impl Propagation {
+    /// Lets every site meet its range once. Returns the largest change of a mean, or NaN where numbers overflow.
+    #[inline(always)]
+    fn meet_ranges(&mut self, share: Pack, flaws: Pack) -> Pack {
+        let Self {
+            gaussians,
+            of_unknowns,
+            of_rounded,
+            forms,
+        } = self;
+        let n = of_unknowns.len();
+        let mut largest = flaws;
+        for (unknown, site) in of_unknowns.iter_mut().enumerate() {
+            let marginals = gaussians.marginals(Direction::Unknown(unknown));
+            let (moved, flaws) = site.meet_range(gaussians, marginals, share);
+            largest = largest.max_or_nan(moved + flaws);
+        }
+        for (site, form) in of_rounded.iter_mut().zip(forms.chunks_exact(n)) {
+            let marginals = gaussians.marginals(Direction::Form(form));
+            let (_, flaws) = site.meet_range(gaussians, marginals, share);
+            largest = largest.max_or_nan(flaws);
+        }
+        largest
+    }
+}
+
+impl Rounds<'_> {
+    /// Closes the lanes in which means moved by less than the tolerance, or no numbers are left, or no round.
+    fn close_lanes(&mut self, moved: Pack, share: f64, rounds: usize) {
+        for (lane, (open, model)) in self.open.iter_mut().zip(self.models).enumerate() {
+            let Some(model) = model.as_ref().filter(|_| *open) else {
+                continue;
+            };
+            let moved = moved.get(lane);
+            let converged = moved < model.tolerance * share;
+            if moved.is_nan() {
+                *open = false;
+            } else if converged || rounds == ROUNDS {
+                *open = false;
+                let sites = self.propagation.of_unknowns.iter().zip(&model.ranges);
+                self.found[lane] = Some(Marginals {
+                    of_unknowns: sites.map(|(site, &range)| site.marginal(lane, range)).collect(),
+                    rounds,
+                    converged,
+                });
+            }
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-
-    use super::*;
-    use crate::scene::normal::{normal_cdf, standard_normal};
-
-    const UNIT: Range = Range {
-        lowest: 0.0,
-        highest: 1.0,
-    };
-
-    fn marginals(equations: Vec<f64>, ranges: Vec<Range>) -> Vec<Marginal> {
-        let model = LinearModel {
-            equations,
-            linear: vec![0.0; ranges.len()],
-            ranges,
-            rounded: Vec::new(),
-            first_factors: Vec::new(),
-            tolerance: TOLERANCE,
-        };
-        let marginals = model.marginals().unwrap();
-        assert!(marginals.converged);
-        marginals.of_unknowns
-    }
-
-    #[test]
-    fn one_unknown_is_the_truncated_normal_in_closed_form() {
-        let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
-        for (mean, deviation) in [(0.5, 0.01), (0.2, 0.3), (-0.5, 0.4), (1.3, 0.2), (0.4, 50.0)] {
-            let ours = marginals(vec![1.0 / deviation, mean / deviation], vec![UNIT])[0];
-            let (alpha, beta) = (-mean / deviation, (1.0 - mean) / deviation);
-            let mass = normal_cdf(beta) - normal_cdf(alpha);
-            let ratio = (density(alpha) - density(beta)) / mass;
-            let expected = mean + deviation * ratio;
-            let spread = 1.0 + (alpha * density(alpha) - beta * density(beta)) / mass - ratio * ratio;
-            assert!(
-                (ours.mean - expected).abs() < 2e-4 * deviation.min(1.0),
-                "{mean} {deviation}: {ours:?}"
-            );
-            assert!(
-                (ours.variance / (deviation * deviation * spread) - 1.0).abs() < 2e-3,
-                "{mean} {deviation}"
-            );
-            let below = (normal_cdf((ours.median() - mean) / deviation) - normal_cdf(alpha)) / mass;
-            assert!((below - 0.5).abs() < 2e-3, "{mean} {deviation}: {below}");
-        }
-    }
-
-    /// A reading of noise 1/50, of which only the interval is known: the density of the unknown is a difference of two
-    /// distribution functions, integrated here by the midpoint rule.
-    #[test]
-    fn an_interval_blurred_by_noise_is_the_difference_of_two_distribution_functions() {
-        // Where both the range and the interval cut the unknown, their factors describe it to a fifth of its spread.
-        for (lowest, highest, tolerance) in [
-            (0.2, 0.3, 0.02),
-            (0.45, 0.452, 0.02),
-            (-1.0, 0.1, 0.2),
-            (0.7, f64::INFINITY, 0.2),
-        ] {
-            let model = LinearModel {
-                equations: Vec::new(),
-                linear: vec![0.0],
-                ranges: vec![UNIT],
-                rounded: vec![RoundedReading {
-                    form: vec![50.0],
-                    misfit: 0.0,
-                    range: Range {
-                        lowest: 50.0 * lowest,
-                        highest: 50.0 * highest,
-                    },
-                }],
-                first_factors: Vec::new(),
-                tolerance: TOLERANCE,
-            };
-            let ours = model.marginals().unwrap().of_unknowns[0];
-            let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
-            for k in 0..10_000 {
-                let x = (f64::from(k) + 0.5) / 1e4;
-                let weight = normal_cdf(50.0 * (highest - x)) - normal_cdf(50.0 * (lowest - x));
-                total += weight;
-                first += weight * x;
-                second += weight * x * x;
-            }
-            let mean = first / total;
-            let deviation = (second / total - mean * mean).sqrt();
-            assert!(
-                (ours.mean - mean).abs() < tolerance * deviation,
-                "{lowest}: {ours:?} {mean} {deviation}"
-            );
-            assert!(
-                (ours.variance.sqrt() / deviation - 1.0).abs() < tolerance,
-                "{lowest}: {ours:?} {deviation}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_wide_box_leaves_the_gaussian() {
-        // Equations with AᵀA = [400 250; 250 400].
-        let (a, b) = (20.0, 12.5);
-        let c = (400.0_f64 - b * b).sqrt();
-        let truth = [0.4, 0.7];
-        let wide = Range {
-            lowest: -100.0,
-            highest: 100.0,
-        };
-        let equations = vec![a, b, a * truth[0] + b * truth[1], 0.0, c, c * truth[1]];
-        for (ours, truth) in marginals(equations, vec![wide; 2]).iter().zip(truth) {
-            assert!((ours.mean - truth).abs() < 1e-4);
-            assert!((ours.variance * (400.0 * 400.0 - 250.0 * 250.0) / 400.0 - 1.0).abs() < 1e-3);
-        }
-    }
-
-    /// Two unknowns whose difference is known: what is left is one unknown in the range that both share, which the factors
-    /// describe to a fifth of its spread, and alike down to rounding.
-    #[test]
-    fn a_combination_known_to_rounding_leaves_the_rest_unknown() {
-        for deviation in [1e-4, 1e-8, 1e-12, 1e-15] {
-            let equations = vec![1.0 / deviation, -1.0 / deviation, 0.5 / deviation];
-            let ours = marginals(equations, vec![UNIT; 2]);
-            // x − y = ½, so that x is uniform from ½ to 1.
-            for (ours, middle) in ours.iter().zip([0.75, 0.25]) {
-                assert!((ours.mean - middle).abs() < 1e-3, "{deviation}: {ours:?}");
-                assert!(
-                    (ours.variance.sqrt() * 48.0_f64.sqrt() - 1.0).abs() < 0.2,
-                    "{deviation}: {ours:?}"
-                );
-            }
-        }
-    }
-
-    /// Draws uniformly from the box and weighs: exact, whatever the shape.
-    #[test]
-    fn several_correlated_unknowns_agree_with_sampling() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        for trial in 0..5 {
-            let n = 3;
-            let noise = 0.5;
-            let truth: Vec<f64> = (0..n).map(|_| rng.random()).collect();
-            let mut equations = Vec::new();
-            for _ in 0..4 {
-                let a: Vec<f64> = (0..n).map(|_| standard_normal(&mut rng)).collect();
-                let y = a.iter().zip(&truth).map(|(a, u)| a * u).sum::<f64>() + noise * standard_normal(&mut rng);
-                equations.extend(a.iter().map(|a| a / noise));
-                equations.push(y / noise);
-            }
-            let marginals = marginals(equations.clone(), vec![UNIT; n]);
-            let (mut total, mut first, mut second) = (0.0, [0.0; 3], [0.0; 3]);
-            for _ in 0..400_000 {
-                let u: [f64; 3] = std::array::from_fn(|_| rng.random());
-                let misfit: f64 = equations
-                    .chunks_exact(n + 1)
-                    .map(|row| ((0..n).map(|i| row[i] * u[i]).sum::<f64>() - row[n]).powi(2))
-                    .sum();
-                let weight = (-0.5 * misfit).exp();
-                total += weight;
-                for i in 0..n {
-                    first[i] += weight * u[i];
-                    second[i] += weight * u[i] * u[i];
-                }
-            }
-            for i in 0..n {
-                let mean = first[i] / total;
-                let deviation = (second[i] / total - mean * mean).sqrt();
-                let ours = marginals[i];
-                assert!(
-                    (ours.mean - mean).abs() < 0.03 * deviation,
-                    "{trial}: {ours:?} {mean} {deviation}"
-                );
-                assert!(
-                    (ours.variance.sqrt() / deviation - 1.0).abs() < 0.05,
-                    "{trial}: {ours:?} {deviation}"
-                );
-            }
-        }
-    }
-}
+mod tests;

@@ -1,24 +1,38 @@
-/// A Gaussian in square-root form: mean and a factor L of the covariance `Σ = L Lᵀ`.
+use super::{
+    factor::Factor,
+    pack::{LANES, Pack, dot},
+};
+
+/// Gaussians in square-root form, one in each lane: mean and a factor L of the covariance `Σ = L Lᵀ`.
 ///
 /// Precision matrices square the condition number of the equations; at a noise near rounding nothing would be left of
 /// what the other factors add. L comes from a QR decomposition of the equations themselves, and factors that are added
 /// later update L, not Σ (Potter's square-root filter; Bierman, Factorization Methods for Discrete Sequential
 /// Estimation, 1977, section V.2). Variances are sums of squares.
-pub(super) struct Gaussian {
-    /// Mean, padded to whole vector registers like the columns of L.
-    mean: Vec<f64>,
-    /// L, column by column, each padded with zeros.
-    root: Vec<f64>,
-    /// Length of a padded column.
-    stride: usize,
+#[derive(Clone, Debug, Default)]
+pub(super) struct Gaussians {
+    unknowns: usize,
+    mean: Vec<Pack>,
+    /// L, row by row: unknowns × unknowns.
+    root: Vec<Pack>,
     /// Lᵀa of the direction that was asked for last.
-    along: Vec<f64>,
-    /// Covariances of all unknowns with that direction, padded.
-    covariances: Vec<f64>,
+    along: Vec<Pack>,
+    /// Number of equations, without those of single unknowns.
+    equations: usize,
+    /// `[A, b]`, column by column; below the equations there is room for one of each unknown.
+    columns: Vec<Pack>,
+    /// c of the linear term.
+    linear: Vec<Pack>,
+    /// Equations of single unknowns: coefficient and right side.
+    singles: Vec<(Pack, Pack)>,
+    /// Unknown of each column.
+    order: Vec<[usize; LANES]>,
+    /// Squared norms of what is left of the columns.
+    squares: Vec<Pack>,
+    /// A row of L, and Qᵀb + Lᵀc.
+    row: Vec<Pack>,
+    right: Vec<Pack>,
 }
-
-/// Columns are padded to a multiple of this number.
-const LANES: usize = 4;
 
 /// A direction in the space of the unknowns.
 #[derive(Clone, Copy)]
@@ -26,200 +40,220 @@ pub(super) enum Direction<'a> {
     /// One unknown.
     Unknown(usize),
     /// A linear form: one coefficient for each unknown.
-    Form(&'a [f64]),
+    Form(&'a [Pack]),
 }
 
-impl Gaussian {
-    /// `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)` with `rows` = `[A, b]` row by row; `None` unless the rows determine all of x.
-    ///
-    /// Householder's method with column pivoting, which is stable row by row when the rows differ in size by many
-    /// decades (Cox and Higham 1998).
-    #[inline(always)]
-    pub(super) fn new(rows: &[f64], linear: &[f64]) -> Option<Self> {
-        let n = linear.len();
-        let m = rows.len() / (n + 1);
-        if m < n {
-            return None;
+impl Gaussians {
+    /// Makes room for so many equations of all unknowns, all 0.
+    pub(super) fn make_room(&mut self, unknowns: usize, equations: usize) {
+        fn clear<T: Clone>(values: &mut Vec<T>, length: usize, value: T) {
+            values.clear();
+            values.resize(length, value);
         }
-        // Column by column, the right side last.
-        let mut columns: Vec<f64> = Vec::with_capacity(rows.len());
-        for column in 0..=n {
-            columns.extend(rows.iter().skip(column).step_by(n + 1));
+        (self.unknowns, self.equations) = (unknowns, equations);
+        clear(&mut self.columns, (unknowns + 1) * (equations + unknowns), Pack::ZERO);
+        clear(&mut self.singles, unknowns, (Pack::ZERO, Pack::ZERO));
+        for values in [&mut self.mean, &mut self.along, &mut self.linear, &mut self.squares] {
+            clear(values, unknowns, Pack::ZERO);
         }
-        let mut order: Vec<usize> = (0..n).collect();
-        for k in 0..n {
-            let (mut pivot, mut square) = (k, -1.0);
-            for column in k..n {
-                let rest = &columns[column * m + k..(column + 1) * m];
-                let squares = dot(rest, rest);
-                if squares > square {
-                    (pivot, square) = (column, squares);
-                }
-            }
-            if !(square > 0.0 && square.is_finite()) {
-                return None;
-            }
-            if pivot != k {
-                order.swap(k, pivot);
-                let (left, right) = columns.split_at_mut(pivot * m);
-                left[k * m..(k + 1) * m].swap_with_slice(&mut right[..m]);
-            }
-            let (done, rest) = columns.split_at_mut((k + 1) * m);
-            let reflector = &mut done[k * m + k..];
-            let length = square.sqrt();
-            let diagonal = if reflector[0] > 0.0 { -length } else { length };
-            // v = x − diagonal e₁ has vᵀv = 2 length (length + |x₁|).
-            reflector[0] -= diagonal;
-            let scale = 1.0 / (length * reflector[0].abs());
-            for column in rest.chunks_exact_mut(m) {
-                let column = &mut column[k..];
-                let product = scale * dot(reflector, column);
-                add(column, -product, reflector);
-            }
-            reflector[0] = diagonal;
-        }
-        let r = |i: usize, j: usize| columns[j * m + i];
-        // L = P R⁻¹: row i of R⁻¹ belongs to unknown order[i].
-        let stride = n.next_multiple_of(LANES);
-        let mut root = vec![0.0; n * stride];
-        let mut row = vec![0.0; n];
-        // x = L (Qᵀb + Lᵀc).
-        let mut right = columns[n * m..n * m + n].to_vec();
-        for (i, &unknown) in order.iter().enumerate() {
-            row[i] = 1.0 / r(i, i);
-            for j in i + 1..n {
-                let sum = dot(&row[i..j], &columns[j * m + i..j * m + j]);
-                row[j] = -sum / r(j, j);
-            }
-            for (j, &value) in row.iter().enumerate().skip(i) {
-                root[j * stride + unknown] = value;
-                right[j] += linear[unknown] * value;
-            }
-        }
-        let mut mean = vec![0.0; stride];
-        for (column, &value) in root.chunks_exact(stride).zip(&right) {
-            add(&mut mean, value, column);
-        }
-        Some(Self {
-            mean,
-            root,
-            stride,
-            along: vec![0.0; n],
-            covariances: vec![0.0; stride],
-        })
+        clear(&mut self.row, unknowns, Pack::ZERO);
+        clear(&mut self.right, unknowns, Pack::ZERO);
+        clear(&mut self.root, unknowns * unknowns, Pack::ZERO);
+        clear(&mut self.order, unknowns, [0; LANES]);
     }
 
-    /// Mean and variance along `direction`.
+    /// Sets coefficient `column` of an equation in `lane`, or its right side, which comes after all unknowns.
+    pub(super) fn set_entry(&mut self, lane: usize, equation: usize, column: usize, value: f64) {
+        let height = self.equations + self.unknowns;
+        self.columns[column * height + equation].set(lane, value);
+    }
+
+    /// Sets the equation of a single unknown in `lane`: coefficient and right side.
+    pub(super) fn set_single(&mut self, lane: usize, unknown: usize, (coefficient, right): (f64, f64)) {
+        let single = &mut self.singles[unknown];
+        single.0.set(lane, coefficient);
+        single.1.set(lane, right);
+    }
+
+    /// Sets c of an unknown in `lane`.
+    pub(super) fn set_linear(&mut self, lane: usize, unknown: usize, value: f64) {
+        self.linear[unknown].set(lane, value);
+    }
+
+    /// Finds `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)`. Returns 0 where the equations determine all of x, NaN elsewhere.
+    ///
+    /// Householder's method with column pivoting, which is stable row by row when the rows differ in size by many
+    /// decades (Cox and Higham 1998). The equation of a single unknown has no part in a reflection before its column's.
     #[inline(always)]
-    pub(super) fn marginal(&mut self, direction: Direction<'_>) -> (f64, f64) {
-        let columns = self.root.chunks_exact(self.stride);
+    pub(super) fn factor(&mut self) -> Pack {
+        let (n, m) = (self.unknowns, self.equations);
+        let height = m + n;
+        for (unknown, order) in self.order.iter_mut().enumerate() {
+            *order = [unknown; LANES];
+        }
+        for (squares, column) in self.squares.iter_mut().zip(self.columns.chunks_exact(height)) {
+            *squares = dot(&column[..m], &column[..m]);
+        }
+        let mut flaws = Pack::ZERO;
+        for k in 0..n {
+            self.pivot(k);
+            // The column's own equation comes last; those of others have a 0 in it.
+            let (single, right) = self.singles[k];
+            let rows = k..m + k + 1;
+            let (done, rest) = self.columns.split_at_mut((k + 1) * height);
+            let reflector = &mut done[k * height..][rows.clone()];
+            reflector[m] = single;
+            rest[(n - k - 1) * height + m + k] = right;
+            let square = self.squares[k] + single * single;
+            flaws += square.flaws();
+            let length = square.sqrt();
+            let diagonal = length.against(reflector[0]);
+            // v = x − diagonal e₁ has vᵀv = 2 length (length + |x₁|).
+            reflector[0] -= diagonal;
+            let scale = Pack::ONE / (length * reflector[0].abs());
+            for (column, squares) in rest.chunks_exact_mut(height).zip(&mut self.squares[k + 1..]) {
+                let column = &mut column[rows.clone()];
+                // Its last entry is 0.
+                let product = scale * dot(&reflector[..m], &column[..m]);
+                *squares = reflect(column, product, reflector);
+            }
+            let column = &mut rest[(n - k - 1) * height..][rows];
+            let product = scale * dot(reflector, column);
+            reflect(column, product, reflector);
+            // The reciprocal, which is what R is divided by.
+            reflector[0] = Pack::ONE / diagonal;
+        }
+        self.invert();
+        flaws
+    }
+
+    /// Moves the largest of the columns from `k` on to place `k` in each lane.
+    #[inline(always)]
+    fn pivot(&mut self, k: usize) {
+        let (n, height, rows) = (self.unknowns, self.equations + self.unknowns, self.equations + k);
+        for lane in 0..LANES {
+            let (mut pivot, mut largest) = (k, -1.0);
+            for column in k..n {
+                let single = self.singles[column].0.get(lane);
+                let square = self.squares[column].get(lane) + single * single;
+                if square > largest {
+                    (pivot, largest) = (column, square);
+                }
+            }
+            if pivot == k {
+                continue;
+            }
+            let (left, right) = self.columns.split_at_mut(pivot * height);
+            for (a, b) in left[k * height..][..rows].iter_mut().zip(right) {
+                swap(lane, a, b);
+            }
+            let (left, right) = self.singles.split_at_mut(pivot);
+            swap(lane, &mut left[k].0, &mut right[0].0);
+            swap(lane, &mut left[k].1, &mut right[0].1);
+            for values in [&mut self.squares, &mut self.linear] {
+                let (left, right) = values.split_at_mut(pivot);
+                swap(lane, &mut left[k], &mut right[0]);
+            }
+            let unknown = self.order[k][lane];
+            self.order[k][lane] = self.order[pivot][lane];
+            self.order[pivot][lane] = unknown;
+        }
+    }
+
+    /// Computes L = P R⁻¹, row i of which belongs to the unknown of column i, and the mean x = L (Qᵀb + Lᵀc).
+    #[inline(always)]
+    fn invert(&mut self) {
+        let (n, height) = (self.unknowns, self.equations + self.unknowns);
+        let Self {
+            columns,
+            row,
+            right,
+            root,
+            linear,
+            order,
+            ..
+        } = self;
+        right.copy_from_slice(&columns[n * height..][..n]);
+        root.fill(Pack::ZERO);
+        for i in 0..n {
+            row[i] = columns[i * height + i];
+            for j in i + 1..n {
+                let column = &columns[j * height..][..j + 1];
+                row[j] = -(dot(&row[i..j], &column[i..j]) * column[j]);
+            }
+            for j in i..n {
+                right[j] += linear[i] * row[j];
+                for lane in 0..LANES {
+                    root[order[i][lane] * n + j].set(lane, row[j].get(lane));
+                }
+            }
+        }
+        for (mean, row) in self.mean.iter_mut().zip(root.chunks_exact(n)) {
+            *mean = dot(row, right);
+        }
+    }
+
+    /// Means and variances along `direction`.
+    #[inline(always)]
+    pub(super) fn marginals(&mut self, direction: Direction<'_>) -> (Pack, Pack) {
+        let n = self.unknowns;
         let mean = match direction {
             Direction::Unknown(unknown) => {
-                for (along, column) in self.along.iter_mut().zip(columns) {
-                    *along = column[unknown];
-                }
+                self.along.copy_from_slice(&self.root[unknown * n..][..n]);
                 self.mean[unknown]
             }
             Direction::Form(form) => {
-                for (along, column) in self.along.iter_mut().zip(columns) {
-                    *along = dot(form, &column[..form.len()]);
+                self.along.fill(Pack::ZERO);
+                for (&value, row) in form.iter().zip(self.root.chunks_exact(n)) {
+                    add(&mut self.along, value, row);
                 }
-                dot(form, &self.mean[..form.len()])
+                dot(form, &self.mean)
             }
         };
         (mean, dot(&self.along, &self.along))
     }
 
-    /// Multiplies by `exp(−½ precision t² + linear t)` with t along the direction of the last [`Self::marginal`], which
-    /// gave `mean` and `variance`. False if that leaves no Gaussian.
+    /// Multiplies by the `factors` of t, which is along the direction of the last [`Self::marginals`], which gave `means` and
+    /// `variances`. Returns what is above 0 and finite where that leaves a Gaussian.
     #[inline(always)]
-    pub(super) fn multiply(&mut self, mean: f64, variance: f64, precision: f64, linear: f64) -> bool {
-        let left = 1.0 + precision * variance;
-        if !(left > 0.0 && left.is_finite()) {
-            return false;
-        }
-        let shift = linear - precision / left * (mean + linear * variance);
+    pub(super) fn multiply(&mut self, means: Pack, variances: Pack, factors: Factor<Pack>) -> Pack {
+        let Factor { precision, linear } = factors;
+        let left = Pack::ONE + precision * variances;
+        let shift = linear - precision / left * (means + linear * variances);
         // Σ − precision/left Σ a aᵀ Σ = M Mᵀ with M = L − shrink L (Lᵀa) (Lᵀa)ᵀ.
         let shrink = precision / (left + left.sqrt());
-        self.project();
-        add_blocks(&mut self.mean, shift, &self.covariances);
-        for (column, &along) in self.root.chunks_exact_mut(self.stride).zip(&self.along) {
-            add_blocks(column, -shrink * along, &self.covariances);
+        for (mean, row) in self.mean.iter_mut().zip(self.root.chunks_exact_mut(self.unknowns)) {
+            let covariance = dot(row, &self.along);
+            *mean += shift * covariance;
+            add(row, -(shrink * covariance), &self.along);
         }
-        true
+        left
     }
-}
-
-impl Gaussian {
-    /// Computes L Lᵀa. Each block of unknowns stays in registers.
-    #[inline(always)]
-    fn project(&mut self) {
-        let (blocks, along) = (self.covariances.as_chunks_mut::<LANES>().0, &self.along);
-        for (block, covariances) in blocks.iter_mut().enumerate() {
-            let (mut even, mut odd) = ([0.0; LANES], [0.0; LANES]);
-            let column = |index: usize| -> &[f64; LANES] {
-                let begin = index * self.stride + block * LANES;
-                self.root[begin..begin + LANES].try_into().expect("a block")
-            };
-            let pairs = along.as_chunks::<2>();
-            for (pair, along) in pairs.0.iter().enumerate() {
-                let (of_even, of_odd) = (column(2 * pair), column(2 * pair + 1));
-                for lane in 0..LANES {
-                    even[lane] += along[0] * of_even[lane];
-                    odd[lane] += along[1] * of_odd[lane];
-                }
-            }
-            if let [along] = pairs.1 {
-                let of_even = column(2 * pairs.0.len());
-                for lane in 0..LANES {
-                    even[lane] += along * of_even[lane];
-                }
-            }
-            for lane in 0..LANES {
-                covariances[lane] = even[lane] + odd[lane];
-            }
-        }
-    }
-}
-
-/// Adds `factor` times `from`, both whole registers.
-#[inline(always)]
-fn add_blocks(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (to, from) in to
-        .as_chunks_mut::<LANES>()
-        .0
-        .iter_mut()
-        .zip(from.as_chunks::<LANES>().0)
-    {
-        for lane in 0..LANES {
-            to[lane] += factor * from[lane];
-        }
-    }
-}
-
-/// In four strands of fixed order. Chunks are arrays, for slices of them are not compiled for vector registers.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    let mut sums = [0.0; LANES];
-    for (a, b) in a4.iter().zip(b4) {
-        for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 #[inline(always)]
-fn add(to: &mut [f64], factor: f64, from: &[f64]) {
-    let ((to4, to_rest), (from4, from_rest)) = (to.as_chunks_mut::<LANES>(), from.as_chunks::<LANES>());
-    for (to, from) in to4.iter_mut().zip(from4) {
-        for lane in 0..LANES {
-            to[lane] += factor * from[lane];
-        }
-    }
-    for (to, from) in to_rest.iter_mut().zip(from_rest) {
+fn swap(lane: usize, a: &mut Pack, b: &mut Pack) {
+    let value = a.get(lane);
+    a.set(lane, b.get(lane));
+    b.set(lane, value);
+}
+
+/// Adds `factor` times `from`.
+#[inline(always)]
+fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) {
+    for (to, &from) in to.iter_mut().zip(from) {
         *to += factor * from;
     }
+}
+
+/// Subtracts `product` times the reflector; returns the sum of squares below the first entry.
+#[inline(always)]
+fn reflect(column: &mut [Pack], product: Pack, reflector: &[Pack]) -> Pack {
+    column[0] -= product * reflector[0];
+    let mut sums = [Pack::ZERO; 2];
+    for (place, (entry, &value)) in column[1..].iter_mut().zip(&reflector[1..]).enumerate() {
+        *entry -= product * value;
+        sums[place % 2] += *entry * *entry;
+    }
+    sums[0] + sums[1]
 }

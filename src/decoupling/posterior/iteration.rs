@@ -1,11 +1,38 @@
 use super::{
-    Posterior, PosteriorReport, expectation_propagation,
+    Posterior, PosteriorReport,
+    expectation_propagation::{Marginals, TOLERANCE},
+    linear_model::LinearModel,
     linearised::{Linearised, Point},
+    pack::LANES,
 };
 use crate::decoupling::LARGEST_ERROR;
 
+/// A row on its way to its answer: the equations are linearised anew at each mean.
+///
+/// Where the error of a linearisation is large beside the noise, as far from the answer with little noise, the noise
+/// is blurred to about that error: the answer is approached from a posterior that can hold it.
+struct Approach {
+    /// Index among the rows that are solved.
+    index: usize,
+    /// Row-wire.
+    row: usize,
+    at: Point,
+    most_steps: usize,
+    steps: usize,
+    rounds: usize,
+    /// Factor of the noise in the linearisation at `at`.
+    blur: f64,
+    /// Misfits there, and as the linearisation before expected them.
+    misfits: Vec<f64>,
+    expected: Option<Vec<f64>>,
+    last: Option<Linearised>,
+    variance: f64,
+    determined: bool,
+    converged: bool,
+}
+
 /// Change of a mean, relative to the range, below which the linearisation has converged.
-const TOLERANCE: f64 = 1e-5;
+const LINEARISED_TOLERANCE: f64 = 1e-5;
 /// Change of a mean up to which the first linearisation is followed, which is far from the answer.
 const FIRST_TOLERANCE: f64 = 1e-3;
 /// Error of a linearisation, in standard deviations of the readings, up to which it needs no blur.
@@ -13,96 +40,170 @@ const TOLERATED_MISFIT: f64 = 1e4;
 /// Error of a linearisation in proportion to the change of the readings, before it is known.
 const CURVATURE: f64 = 0.1;
 
+impl Approach {
+    /// From `first` on, by at most so many steps.
+    fn new((index, row): (usize, usize), first: Vec<f64>, most_steps: usize) -> Self {
+        Self {
+            index,
+            row,
+            at: Point {
+                drift: 0.0,
+                displacements_mm: first,
+            },
+            most_steps,
+            steps: 0,
+            rounds: 0,
+            blur: 1.0,
+            misfits: Vec::new(),
+            expected: None,
+            last: None,
+            variance: f64::NAN,
+            determined: false,
+            converged: false,
+        }
+    }
+
+    /// True if the linearisation is far from the answer.
+    fn is_rough(&self) -> bool {
+        self.steps == 0 && self.most_steps > 1
+    }
+
+    /// Linearises where the equations of the row were evaluated.
+    fn linearise(&mut self, posterior: &Posterior) -> LinearModel {
+        let Posterior {
+            likelihood, problem, ..
+        } = posterior;
+        if self.steps == 0 && likelihood.has_drift() {
+            self.at.drift = likelihood.likeliest_drift(problem);
+        }
+        self.misfits = likelihood.misfits(problem, self.at.drift);
+        let error = match &self.expected {
+            None => CURVATURE * rms(self.misfits.iter().copied()),
+            Some(expected) => rms(self
+                .misfits
+                .iter()
+                .zip(expected)
+                .map(|(found, expected)| found - expected)),
+        };
+        self.blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
+        let tolerance = if self.is_rough() { FIRST_TOLERANCE } else { TOLERANCE };
+        posterior.linear_model(self.row, &self.at, self.blur, self.last.as_ref(), tolerance)
+    }
+
+    /// Moves to the mean of the linearised `model`. Returns `true` where the row has arrived, or can go no further.
+    fn follow(&mut self, posterior: &Posterior, model: &LinearModel, marginals: Option<Marginals>) -> bool {
+        let is_rough = self.is_rough();
+        self.steps += 1;
+        let Some(marginals) = marginals else {
+            self.converged = false;
+            return true;
+        };
+        let widths = &posterior.widths;
+        let found = posterior.linearised(model, &self.at, self.blur, marginals);
+        let moved = self
+            .at
+            .displacements_mm
+            .iter()
+            .zip(&found.means.displacements_mm)
+            .zip(widths);
+        let largest = moved
+            .map(|((at, mean), width)| (mean - at).abs() / width)
+            .fold(0.0, f64::max);
+        self.rounds += found.marginals.rounds;
+        let marginals = &found.marginals.of_unknowns;
+        let squares = marginals
+            .iter()
+            .zip(widths)
+            .map(|(marginal, width)| marginal.variance * width * width);
+        self.variance = squares.sum::<f64>() / widths.len() as f64;
+        self.determined = marginals
+            .iter()
+            .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
+        self.converged = found.marginals.converged && self.blur == 1.0;
+        let is_last = largest < LINEARISED_TOLERANCE && self.blur == 1.0 && !is_rough;
+        let found = self.last.insert(found);
+        if is_last {
+            return true;
+        }
+        let share = share_of_step(self.steps);
+        let between = |from: f64, to: f64| if share == 1.0 { to } else { from + share * (to - from) };
+        for (at, mean) in self.at.displacements_mm.iter_mut().zip(&found.means.displacements_mm) {
+            *at = between(*at, *mean);
+        }
+        self.at.drift = between(self.at.drift, found.means.drift);
+        let misfits = self.misfits.iter().zip(&found.misfits);
+        self.expected = Some(misfits.map(|(&from, &to)| between(from, to)).collect());
+        self.steps == self.most_steps
+    }
+}
+
 impl Posterior {
-    /// Linearises anew at each mean, from `first` on; writes the medians.
-    ///
-    /// Where the error of a linearisation is large beside the noise, as far from the answer with little noise, the noise
-    /// is blurred to about that error: the answer is approached from a posterior that can hold it.
+    /// Solves `rows` side by side, each from where it is to `begin` by its coordinates in `coordinates_mm` (rows × 3·M2) and
+    /// in at most so many steps; where one has arrived, the next begins. Replaces the coordinates by the medians and returns
+    /// the report on each row.
     pub(super) fn iterate(
         &mut self,
-        row: usize,
+        (rows, most_steps): (&[usize], usize),
         readings_ohm: &[f64],
-        first: Vec<f64>,
-        most_steps: usize,
         coordinates_mm: &mut [f64],
-    ) -> PosteriorReport {
-        self.problem.read(row, readings_ohm);
-        let (mut variance, mut determined) = (f64::NAN, false);
-        let (mut converged, mut steps, mut rounds) = (false, 0, 0);
-        let mut at = Point {
-            drift: 0.0,
-            displacements_mm: first,
-        };
-        let mut expected: Option<Vec<f64>> = None;
-        let mut last: Option<Linearised> = None;
-        while steps < most_steps {
-            self.problem.evaluate(&at.displacements_mm);
-            if steps == 0 && self.likelihood.has_drift() {
-                at.drift = self.likelihood.likeliest_drift(&self.problem);
+        begin: impl Fn(&mut Self, usize, &[f64]) -> Vec<f64>,
+    ) -> Vec<PosteriorReport> {
+        let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
+        let mut reports = vec![None; rows.len()];
+        let mut waiting = rows.iter().copied().enumerate();
+        let mut lanes: [Option<Approach>; LANES] = [const { None }; LANES];
+        loop {
+            for lane in lanes.iter_mut().filter(|lane| lane.is_none()) {
+                *lane = waiting.next().map(|(index, row)| {
+                    let first = begin(self, row, &coordinates_mm[index * outputs..][..outputs]);
+                    Approach::new((index, row), first, most_steps)
+                });
             }
-            let misfits = self.likelihood.misfits(&self.problem, at.drift);
-            let error = match &expected {
-                None => CURVATURE * rms(misfits.iter().copied()),
-                Some(expected) => rms(misfits.iter().zip(expected).map(|(found, expected)| found - expected)),
-            };
-            let blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
-            let is_rough = steps == 0 && most_steps > 1;
-            let tolerance = if is_rough {
-                FIRST_TOLERANCE
-            } else {
-                expectation_propagation::TOLERANCE
-            };
-            steps += 1;
-            let Some(found) = self.linearised(row, &at, blur, last.as_ref(), tolerance) else {
-                converged = false;
-                break;
-            };
-            let moved = at
-                .displacements_mm
-                .iter()
-                .zip(&found.means.displacements_mm)
-                .zip(&self.widths);
-            let largest = moved
-                .map(|((at, mean), width)| (mean - at).abs() / width)
-                .fold(0.0, f64::max);
-            rounds += found.marginals.rounds;
-            let marginals = &found.marginals.of_unknowns;
-            let squares = marginals
-                .iter()
-                .zip(&self.widths)
-                .map(|(marginal, width)| marginal.variance * width * width);
-            variance = squares.sum::<f64>() / self.widths.len() as f64;
-            determined = marginals
-                .iter()
-                .all(|marginal| marginal.variance.sqrt() <= LARGEST_ERROR);
-            converged = found.marginals.converged && blur == 1.0;
-            let is_last = largest < TOLERANCE && blur == 1.0 && !is_rough;
-            let found = last.insert(found);
-            if is_last {
-                break;
+            if lanes.iter().all(Option::is_none) {
+                return reports.into_iter().flatten().collect();
             }
-            let share = share_of_step(steps);
-            let between = |from: f64, to: f64| if share == 1.0 { to } else { from + share * (to - from) };
-            for (at, mean) in at.displacements_mm.iter_mut().zip(&found.means.displacements_mm) {
-                *at = between(*at, *mean);
+            let mut models = [const { None }; LANES];
+            for (lane, model) in lanes.iter_mut().zip(&mut models) {
+                if let Some(approach) = lane.as_mut().filter(|approach| approach.steps < approach.most_steps) {
+                    self.problem
+                        .read(approach.row, &readings_ohm[approach.index * channels..][..channels]);
+                    self.problem.evaluate(&approach.at.displacements_mm);
+                    *model = Some(approach.linearise(self));
+                }
             }
-            at.drift = between(at.drift, found.means.drift);
-            let misfits = misfits.iter().zip(&found.misfits);
-            expected = Some(misfits.map(|(&from, &to)| between(from, to)).collect());
+            let found = self.propagation.marginals(&models);
+            for ((lane, model), marginals) in lanes.iter_mut().zip(&models).zip(found) {
+                let follow = |approach: &mut Approach| {
+                    let model = model.as_ref();
+                    model.is_none_or(|model| approach.follow(self, model, marginals))
+                };
+                if let Some(approach) = lane.take_if(follow) {
+                    let index = approach.index;
+                    reports[index] = Some(self.answer(approach, readings_ohm, coordinates_mm));
+                }
+            }
         }
-        let answer = match &last {
+    }
+
+    /// Writes the medians of a row that has arrived, and reports on it.
+    fn answer(&mut self, approach: Approach, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> PosteriorReport {
+        let answer = match &approach.last {
             Some(last) => self.medians_mm(last),
-            None => at.displacements_mm,
+            None => approach.at.displacements_mm,
         };
+        let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
+        let readings_ohm = &readings_ohm[approach.index * channels..][..channels];
+        self.problem.read(approach.row, readings_ohm);
         let residual = self.problem.evaluate(&answer);
+        let coordinates_mm = &mut coordinates_mm[approach.index * outputs..][..outputs];
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {
-            steps,
-            rounds,
+            steps: approach.steps,
+            rounds: approach.rounds,
             residual,
-            spread_mm: variance.sqrt(),
-            determined,
-            converged,
+            spread_mm: approach.variance.sqrt(),
+            determined: approach.determined,
+            converged: approach.converged,
         }
     }
 }

@@ -1,5 +1,6 @@
 use super::{
-    expectation_propagation::{LinearModel, RoundedReading, TOLERANCE},
+    expectation_propagation::TOLERANCE,
+    linear_model::{LinearModel, RoundedReading},
     marginal::Marginal,
 };
 use crate::{

@@ -1,4 +1,7 @@
-use super::{Posterior, expectation_propagation::Marginals, likelihood::expected_misfits, truncated::Factor};
+use super::{
+    Posterior, expectation_propagation::Marginals, factor::Factor, likelihood::expected_misfits,
+    linear_model::LinearModel, marginal::medians,
+};
 use crate::decoupling::row_problem::Range;
 
 /// A point of linearisation.
@@ -32,18 +35,17 @@ impl Linearised {
 }
 
 impl Posterior {
-    /// The posterior of the equations linearised at `at`, where they were evaluated, with `blur` times the noise; `None`
-    /// if numbers overflow. Expectation propagation begins with the factors of an earlier linearisation, if there was one, and
-    /// ends when no mean changes by more than `tolerance`.
-    pub(super) fn linearised(
+    /// The equations of row-wire `row` linearised at `at`, where they were evaluated, with `blur` times the noise.
+    /// Expectation propagation begins with the factors of an earlier linearisation, if there was one, and ends when no mean
+    /// changes by more than `tolerance`.
+    pub(super) fn linear_model(
         &self,
         row: usize,
         at: &Point,
         blur: f64,
         earlier: Option<&Linearised>,
         tolerance: f64,
-    ) -> Option<Linearised> {
-        let n = self.widths.len();
+    ) -> LinearModel {
         let mut model = self.likelihood.linearised(&self.problem, at.drift, blur, &self.widths);
         let ranges = self.ranges.iter().zip(&at.displacements_mm).zip(&self.widths);
         model.ranges = ranges
@@ -67,15 +69,26 @@ impl Posterior {
         if let Some(earlier) = earlier {
             model.first_factors = earlier.factors_from(at, &self.widths);
         }
-        let mut marginals = model.marginals()?;
-        let misfits = expected_misfits(&model, self.problem.equations(), &marginals.of_unknowns, blur);
+        model
+    }
+
+    /// The posterior with these `marginals` of the `model` linearised at `at` with `blur` times the noise.
+    pub(super) fn linearised(
+        &self,
+        model: &LinearModel,
+        at: &Point,
+        blur: f64,
+        mut marginals: Marginals,
+    ) -> Linearised {
+        let n = self.widths.len();
+        let misfits = expected_misfits(model, self.problem.equations(), &marginals.of_unknowns, blur);
         let drift = marginals
             .of_unknowns
             .get(n)
             .map_or(0.0, |marginal| at.drift + marginal.mean);
         marginals.of_unknowns.truncate(n);
         let displacements_mm = self.displacements_mm(at, marginals.of_unknowns.iter().map(|marginal| marginal.mean));
-        Some(Linearised {
+        Linearised {
             at: at.clone(),
             means: Point {
                 displacements_mm,
@@ -83,13 +96,12 @@ impl Posterior {
             },
             misfits,
             marginals,
-        })
+        }
     }
 
     /// The medians of the displacements.
     pub(super) fn medians_mm(&self, found: &Linearised) -> Vec<f64> {
-        let medians = found.marginals.of_unknowns.iter().map(|marginal| marginal.median());
-        self.displacements_mm(&found.at, medians)
+        self.displacements_mm(&found.at, medians(&found.marginals.of_unknowns).into_iter())
     }
 
     /// Displacements within their ranges from x = (displacement − present) / width.

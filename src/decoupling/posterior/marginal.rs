@@ -1,4 +1,8 @@
-use super::truncated::Factor;
+use super::{
+    factor::{Factor, Ranges},
+    pack::{LANES, Pack},
+    truncated::Cut,
+};
 use crate::decoupling::row_problem::Range;
 
 /// The distribution of one unknown.
@@ -13,9 +17,18 @@ pub(super) struct Marginal {
     pub(super) factor: Factor,
 }
 
-impl Marginal {
-    /// Half lies below: the answer of the least expected distance.
-    pub(super) fn median(&self) -> f64 {
-        self.seen.median(self.range, self.mean)
+/// The points below which half of each distribution lies: the answers of the least expected distance.
+pub(super) fn medians(marginals: &[Marginal]) -> Vec<f64> {
+    let mut medians = Vec::with_capacity(marginals.len());
+    for some in marginals.chunks(LANES) {
+        let (mut seen, mut ranges, mut means) = (Factor::FLAT, Ranges::NONE, Pack::ZERO);
+        for (lane, marginal) in some.iter().enumerate() {
+            seen.set(lane, marginal.seen);
+            ranges.set(lane, marginal.range);
+            means.set(lane, marginal.mean);
+        }
+        let found = pulp::Arch::new().dispatch(|| Cut::new(seen, &ranges).medians(&ranges, means));
+        medians.extend((0..some.len()).map(|lane| found.get(lane)));
     }
+    medians
 }

@@ -1,11 +1,14 @@
 //! The posterior of a row-wire's deformation given its readings, the noise and the prior of a scene.
 
 mod expectation_propagation;
+mod factor;
 mod gaussian;
 mod iteration;
 mod likelihood;
+mod linear_model;
 mod linearised;
 mod marginal;
+mod pack;
 mod report;
 mod row_prior;
 mod site;
@@ -23,8 +26,10 @@ use crate::{
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
+use expectation_propagation::{Propagation, TOLERANCE};
 use likelihood::Likelihood;
 use linearised::Point;
+use pack::LANES;
 use row_prior::RowPrior;
 
 /// Newton's method with noise and prior: iterates the posterior of the linearised equations, cut to the range of every
@@ -41,6 +46,7 @@ pub struct Posterior {
     rows: Vec<usize>,
     priors: Vec<RowPrior>,
     likelihood: Likelihood,
+    propagation: Propagation,
 }
 
 /// Largest number of linearisations: two or three nearly always do, for conductance is nearly linear.
@@ -61,6 +67,7 @@ impl Posterior {
             rows: rows.to_vec(),
             priors: RowPrior::of_rows(model, scene, rows, rng),
             likelihood: Likelihood::new(scene.noise.in_test().source(model)?),
+            propagation: Propagation::default(),
         })
     }
 
@@ -91,9 +98,27 @@ impl Posterior {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<PosteriorReport, DecodeError> {
-        DecodeError::check(readings_ohm)?;
-        let middle = self.ranges.iter().map(|range| range.middle()).collect();
-        Ok(self.iterate(row, readings_ohm, middle, STEPS, coordinates_mm))
+        Ok(self.solve_rows(&[row], readings_ohm, coordinates_mm)?[0])
+    }
+
+    /// As [`Self::solve`], several rows side by side (rows × M4 readings, rows × 3·M2 coordinates): each has the same bits as
+    /// by itself.
+    ///
+    /// # Errors
+    /// Readings that are no resistances; the error names their place among the rows.
+    ///
+    /// # Panics
+    /// If one of `rows` is none of the rows given.
+    pub(super) fn solve_rows(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<Vec<PosteriorReport>, DecodeError> {
+        self.check(readings_ohm)?;
+        let from_middle =
+            |posterior: &mut Self, _, _: &[f64]| posterior.ranges.iter().map(|range| range.middle()).collect();
+        Ok(self.iterate((rows, STEPS), readings_ohm, coordinates_mm, from_middle))
     }
 
     /// As [`Self::solve`], by at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
@@ -111,14 +136,43 @@ impl Posterior {
         coordinates_mm: &mut [f64],
         steps: usize,
     ) -> Result<PosteriorReport, DecodeError> {
-        DecodeError::check(readings_ohm)?;
-        let mut first = vec![0.0; self.ranges.len()];
-        self.problem.read(row, readings_ohm);
-        self.problem.unknowns_of(coordinates_mm, &mut first);
-        for (value, range) in first.iter_mut().zip(&self.ranges) {
+        Ok(self.polish_rows(&[row], readings_ohm, coordinates_mm, steps)?[0])
+    }
+
+    /// As [`Self::polish`], several rows side by side, as in [`Self::solve_rows`].
+    ///
+    /// # Errors
+    /// Readings that are no resistances; the error names their place among the rows.
+    ///
+    /// # Panics
+    /// If one of `rows` is none of the rows given.
+    pub(super) fn polish_rows(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        steps: usize,
+    ) -> Result<Vec<PosteriorReport>, DecodeError> {
+        self.check(readings_ohm)?;
+        Ok(self.iterate((rows, steps), readings_ohm, coordinates_mm, Self::unknowns_of))
+    }
+
+    /// The unknowns of row-wire `row` nearest to these coordinates.
+    fn unknowns_of(&mut self, row: usize, coordinates_mm: &[f64]) -> Vec<f64> {
+        let mut unknowns_mm = vec![0.0; self.ranges.len()];
+        self.problem.turn_to(row);
+        self.problem.unknowns_of(coordinates_mm, &mut unknowns_mm);
+        for (value, range) in unknowns_mm.iter_mut().zip(&self.ranges) {
             *value = range.clamp(*value);
         }
-        Ok(self.iterate(row, readings_ohm, first, steps, coordinates_mm))
+        unknowns_mm
+    }
+
+    fn check(&self, readings_ohm: &[f64]) -> Result<(), DecodeError> {
+        for (row_index, readings) in readings_ohm.chunks_exact(self.problem.equations()).enumerate() {
+            DecodeError::check(readings).map_err(|error| DecodeError { row_index, ..error })?;
+        }
+        Ok(())
     }
 
     /// Computes the medians of the posterior linearised at the true deformation of the row whose nodes are at `truth_mm`
@@ -128,25 +182,65 @@ impl Posterior {
     /// # Panics
     /// If `row` is none of the rows given.
     pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) -> bool {
-        coordinates_mm.copy_from_slice(truth_mm);
-        self.problem.read(row, readings_ohm);
-        let mut truth = Point {
-            displacements_mm: vec![0.0; self.ranges.len()],
-            drift: 0.0,
-        };
-        self.problem.unknowns_of(truth_mm, &mut truth.displacements_mm);
-        self.problem.evaluate(&truth.displacements_mm);
-        if self.likelihood.has_drift() {
-            truth.drift = self.likelihood.likeliest_drift(&self.problem);
-        }
-        match self.linearised(row, &truth, 1.0, None, expectation_propagation::TOLERANCE) {
-            Some(found) if found.marginals.converged => {
-                let medians_mm = self.medians_mm(&found);
-                self.problem.coordinates_of(&medians_mm, coordinates_mm);
-                true
+        self.limits(&[row], readings_ohm, truth_mm, coordinates_mm)
+    }
+
+    /// As [`Self::limit`], several rows side by side (rows × M4 readings, rows × 3·M2 coordinates). Returns `true` if all
+    /// posteriors converged.
+    ///
+    /// # Panics
+    /// If one of `rows` is none of the rows given.
+    pub(crate) fn limits(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        truths_mm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> bool {
+        let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
+        coordinates_mm.copy_from_slice(truths_mm);
+        let mut all_converged = true;
+        let chunks = rows
+            .chunks(LANES)
+            .zip(readings_ohm.chunks(LANES * channels))
+            .zip(coordinates_mm.chunks_mut(LANES * outputs));
+        for ((rows, readings_ohm), coordinates_mm) in chunks {
+            let mut lanes = [const { None }; LANES];
+            let mut models = [const { None }; LANES];
+            for (lane, &row) in rows.iter().enumerate() {
+                let mut truth = Point {
+                    displacements_mm: vec![0.0; self.ranges.len()],
+                    drift: 0.0,
+                };
+                self.problem.read(row, &readings_ohm[lane * channels..][..channels]);
+                self.problem.unknowns_of(
+                    &coordinates_mm[lane * outputs..][..outputs],
+                    &mut truth.displacements_mm,
+                );
+                self.problem.evaluate(&truth.displacements_mm);
+                if self.likelihood.has_drift() {
+                    truth.drift = self.likelihood.likeliest_drift(&self.problem);
+                }
+                models[lane] = Some(self.linear_model(row, &truth, 1.0, None, TOLERANCE));
+                lanes[lane] = Some((row, truth));
             }
-            _ => false,
+            let found = self.propagation.marginals(&models);
+            let lanes = lanes.into_iter().zip(&models).zip(found);
+            for (((lane, model), marginals), coordinates_mm) in lanes.zip(coordinates_mm.chunks_exact_mut(outputs)) {
+                let (Some((row, truth)), Some(model)) = (lane, model) else {
+                    continue;
+                };
+                match marginals.filter(|marginals| marginals.converged) {
+                    Some(marginals) => {
+                        let found = self.linearised(model, &truth, 1.0, marginals);
+                        self.problem.turn_to(row);
+                        self.problem.coordinates_of(&self.medians_mm(&found), coordinates_mm);
+                    }
+                    None => all_converged = false,
+                }
+            }
         }
+        all_converged
     }
 }
 

@@ -1,113 +1,118 @@
 use super::{
-    gaussian::{Direction, Gaussian},
+    factor::{Factor, Ranges},
+    gaussian::Gaussians,
     marginal::Marginal,
-    truncated::{Factor, Moments},
+    pack::Pack,
+    truncated::{Cut, Moments},
 };
 use crate::decoupling::row_problem::Range;
 
-/// A range and the Gaussian factor that stands for it.
-pub(super) struct Site<'a> {
-    direction: Direction<'a>,
-    pub(super) range: Range,
+/// A range and the Gaussian factor that stands for it, in every lane.
+#[derive(Clone, Debug)]
+pub(super) struct Site {
+    ranges: Ranges,
+    /// Reciprocals of the widths, by which changes of means are measured; 1 for open ranges.
+    per_width: Pack,
     /// Variance of what is added to the unknown before it meets the range.
     noise: f64,
-    pub(super) factor: Factor,
+    pub(super) factor: Factor<Pack>,
     /// The word of the other factors and of the equations on the unknown.
-    seen: Factor,
+    seen: Factor<Pack>,
     /// Moments of that within the range.
     moments: Moments,
 }
 
-impl<'a> Site<'a> {
-    /// Begins with the moments of the range by itself; with none if it is open.
-    pub(super) fn new(direction: Direction<'a>, range: Range, noise: f64) -> Self {
-        let precision = 12.0 / (range.width() * range.width());
-        let factor = if precision > 0.0 {
-            Factor {
-                precision,
-                linear: precision * range.middle(),
-            }
-        } else {
-            Factor {
-                precision: 0.0,
-                linear: 0.0,
-            }
-        };
+impl Site {
+    pub(super) fn new(noise: f64) -> Self {
         Self {
-            direction,
-            range,
+            ranges: Ranges::NONE,
+            per_width: Pack::ZERO,
             noise,
-            factor: factor.blurred(noise),
-            seen: Factor {
-                precision: 0.0,
-                linear: 0.0,
-            },
+            factor: Factor::FLAT,
+            seen: Factor::FLAT,
             moments: Moments {
-                mean: f64::INFINITY,
-                variance: f64::INFINITY,
+                mean: Pack::ZERO,
+                variance: Pack::ZERO,
             },
         }
     }
 
-    /// Changes the factor by `share` of what makes the marginal keep its moments within the range. False if numbers
-    /// overflow.
-    #[inline(always)]
-    pub(super) fn meet_range(&mut self, gaussian: &mut Gaussian, share: f64) -> bool {
-        let (mean, variance) = gaussian.marginal(self.direction);
-        let before = self.factor;
-        let cavity = Factor {
-            precision: 1.0 / variance - before.precision,
-            linear: mean / variance - before.linear,
+    /// Begins in `lane` with `first`, or with the moments of the range by itself; with none if it is open.
+    pub(super) fn begin(&mut self, lane: usize, range: Range, first: Option<Factor>) {
+        let width = range.width();
+        let precision = 12.0 / (width * width);
+        let by_itself = || {
+            let linear = if precision > 0.0 {
+                precision * range.middle()
+            } else {
+                0.0
+            };
+            let share = 1.0 / (1.0 + precision * self.noise);
+            Factor {
+                precision: precision * share,
+                linear: linear * share,
+            }
         };
-        let seen = cavity.blurred(self.noise);
-        let moments = seen.cut_to(self.range);
-        if !(moments.variance > 0.0 && moments.variance.is_finite()) {
-            return false;
-        }
+        self.factor.set(lane, first.unwrap_or_else(by_itself));
+        self.ranges.set(lane, range);
+        self.per_width
+            .set(lane, if width.is_finite() { 1.0 / width } else { 1.0 });
+        self.moments.mean.set(lane, f64::INFINITY);
+    }
+
+    /// Changes the factor by `share` of what makes the marginal keep its moments within the range. `mean` and `variance` are
+    /// those that `gaussians` have along the direction of the last question. Returns by how much the mean within the range
+    /// moved, in proportion to the range, and 0, or NaN where numbers overflow.
+    #[inline(always)]
+    pub(super) fn meet_range(
+        &mut self,
+        gaussians: &mut Gaussians,
+        (mean, variance): (Pack, Pack),
+        share: Pack,
+    ) -> (Pack, Pack) {
+        let before = self.factor;
+        let per_variance = Pack::ONE / variance;
+        let seen = Factor {
+            precision: per_variance - before.precision,
+            linear: mean * per_variance - before.linear,
+        };
+        let seen = seen.blurred(self.noise);
+        let moments = Cut::new(seen, &self.ranges).moments();
+        let per_variance = Pack::ONE / moments.variance;
         let found = Factor {
-            precision: (1.0 / moments.variance - seen.precision).max(0.0),
-            linear: moments.mean / moments.variance - seen.linear,
+            precision: (per_variance - seen.precision).max(Pack::ZERO),
+            linear: moments.mean * per_variance - seen.linear,
         };
         let found = found.blurred(self.noise);
-        let by_precision = share * (found.precision - before.precision);
-        let by_linear = share * (found.linear - before.linear);
-        self.factor = Factor {
-            precision: before.precision + by_precision,
-            linear: before.linear + by_linear,
+        let change = Factor {
+            precision: share * (found.precision - before.precision),
+            linear: share * (found.linear - before.linear),
         };
+        self.factor = Factor {
+            precision: before.precision + change.precision,
+            linear: before.linear + change.linear,
+        };
+        let moved = (moments.mean - self.moments.mean).abs() * self.per_width;
         (self.seen, self.moments) = (seen, moments);
-        gaussian.multiply(mean, variance, by_precision, by_linear)
+        let left = gaussians.multiply(mean, variance, change);
+        (moved, moments.variance.flaws() + left.flaws())
     }
 
-    /// Appends the factor as one more equation.
-    pub(super) fn append_to(&self, equations: &mut Vec<f64>, unknowns: usize) {
-        let root = self.factor.precision.sqrt();
-        if root == 0.0 {
-            return;
-        }
-        match self.direction {
-            Direction::Unknown(place) => {
-                equations.extend((0..unknowns).map(|unknown| if unknown == place { root } else { 0.0 }));
-            }
-            Direction::Form(form) => equations.extend(form.iter().map(|value| root * value)),
-        }
-        equations.push(self.factor.linear / root);
+    /// The square root of the factor's precision in `lane`, and what it equals times the unknown: the factor as an equation.
+    pub(super) fn equation(&self, lane: usize) -> (f64, f64) {
+        let Factor { precision, linear } = self.factor.get(lane);
+        let root = precision.sqrt();
+        (root, if root == 0.0 { 0.0 } else { linear / root })
     }
 
-    /// Mean within the range.
-    #[inline(always)]
-    pub(super) fn mean(&self) -> f64 {
-        self.moments.mean
-    }
-
-    /// Distribution within the range.
-    pub(super) fn marginal(&self) -> Marginal {
+    /// Distribution within the range in `lane`.
+    pub(super) fn marginal(&self, lane: usize, range: Range) -> Marginal {
         Marginal {
-            mean: self.moments.mean,
-            variance: self.moments.variance,
-            range: self.range,
-            seen: self.seen,
-            factor: self.factor,
+            mean: self.moments.mean.get(lane),
+            variance: self.moments.variance.get(lane),
+            range,
+            seen: self.seen.get(lane),
+            factor: self.factor.get(lane),
         }
     }
 }

@@ -1,193 +1,196 @@
-use crate::{decoupling::row_problem::Range, network::exp};
-
-/// A Gaussian factor `exp(−½ precision t² + linear t)`, possibly flat.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Factor {
-    pub(super) precision: f64,
-    pub(super) linear: f64,
-}
-
-/// Mean and variance of a factor cut to a range.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Moments {
-    pub(super) mean: f64,
-    pub(super) variance: f64,
-}
-
-/// Densities side by side in vector registers.
-const LANES: usize = 8;
-/// Points of the quadrature, an even number of intervals.
-const POINTS: usize = 97;
-/// The points in whole registers.
-const BLOCKS: usize = POINTS.div_ceil(LANES);
-/// Simpson's weights, 0 beyond the last point.
-const WEIGHTS: [[f64; LANES]; BLOCKS] = {
-    let mut weights = [[0.0; LANES]; BLOCKS];
-    let mut k = 0;
-    while k < POINTS {
-        weights[k / LANES][k % LANES] = if k == 0 || k == POINTS - 1 {
-            1.0
-        } else if k % 2 == 1 {
-            4.0
-        } else {
-            2.0
-        };
-        k += 1;
-    }
-    weights
+use super::{
+    factor::{Factor, Ranges},
+    pack::{LANES, Pack},
 };
 
-impl Factor {
-    /// The factor of t + `shift`, in terms of t.
-    pub(super) fn shifted(self, shift: f64) -> Self {
-        Self {
-            precision: self.precision,
-            linear: self.linear - self.precision * shift,
-        }
-    }
-
-    /// The factor of t if this is the factor of t + ε, with normal ε of variance `noise`.
-    #[inline(always)]
-    pub(super) fn blurred(self, noise: f64) -> Self {
-        let share = 1.0 / (1.0 + self.precision.max(0.0) * noise);
-        Self {
-            precision: self.precision * share,
-            linear: self.linear * share,
-        }
-    }
-
-    /// Moments of the factor cut to a range, by Simpson's rule over the part that carries weight.
-    #[inline(always)]
-    pub(super) fn cut_to(self, range: Range) -> Moments {
-        Cut::new(self, range).moments()
-    }
-
-    /// Median of the factor cut to a range, within which its mean is `mean`.
-    pub(super) fn median(self, range: Range, mean: f64) -> f64 {
-        Cut::new(self, range).median(mean)
-    }
+/// Mean and variance of factors cut to ranges.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moments {
+    pub(super) mean: Pack,
+    pub(super) variance: Pack,
 }
 
-/// The density exp(slope t − ½ precision t²) at points `lowest` + `step` k, with t measured from the mode within the
-/// range, where what carries weight may be narrower than the rounding of positions.
+/// Intervals of the quadrature on either side of its middle, an even number.
+const HALF: usize = 48;
+
+/// The densities exp(slope t − ½ precision t²) between `middle` − HALF `step` and `middle` + HALF `step`, with t measured
+/// from the mode within the range, where what carries weight may be narrower than the rounding of positions.
 #[derive(Clone, Copy)]
-struct Cut {
-    range: Range,
-    mode: f64,
+pub(super) struct Cut {
+    mode: Pack,
     /// 0, or points out of the range.
-    slope: f64,
-    precision: f64,
-    lowest: f64,
-    step: f64,
+    slope: Pack,
+    precision: Pack,
+    middle: Pack,
+    step: Pack,
+}
+
+/// Densities at equal distances on both sides of the middle of a [`Cut`]. Each follows from the one before by a factor,
+/// and the factor from the one before by another, which is the same for all: the density is the exponential of a parabola.
+struct Pairs {
+    above: Pack,
+    below: Pack,
+    growth_above: Pack,
+    growth_below: Pack,
+    bend: Pack,
 }
 
 impl Cut {
+    /// The part of factors cut to ranges that carries weight.
     #[inline(always)]
-    fn new(factor: Factor, range: Range) -> Self {
+    pub(super) fn new(factor: Factor<Pack>, ranges: &Ranges) -> Self {
         /// exp(−36) ends what carries weight.
         const DECAY: f64 = 36.0;
-        let precision = factor.precision.max(0.0);
-        let mode = range.clamp(factor.linear / precision);
+        let precision = factor.precision.max(Pack::ZERO);
+        let mode = ranges.clamp(factor.linear / precision);
         let slope = factor.linear - precision * mode;
-        let reach = |slope: f64| 2.0 * DECAY / (slope + (slope * slope + 2.0 * DECAY * precision).sqrt());
-        let lowest = (range.lowest - mode).max(-reach(slope.max(0.0)));
-        let highest = (range.highest - mode).min(reach((-slope).max(0.0)));
+        let twice = Pack::splat(2.0 * DECAY);
+        let (falling, rising) = (slope.max(Pack::ZERO), (-slope).max(Pack::ZERO));
+        let below = -(twice / (falling + (falling * falling + twice * precision).sqrt()));
+        let above = twice / (rising + (rising * rising + twice * precision).sqrt());
+        let lowest = below.max(ranges.lowest - mode);
+        let highest = above.min(ranges.highest - mode);
         Self {
-            range,
             mode,
             slope,
             precision,
-            lowest,
-            step: (highest - lowest) / (POINTS - 1) as f64,
+            middle: Pack::splat(0.5) * (lowest + highest),
+            step: Pack::splat(0.5 / HALF as f64) * (highest - lowest),
         }
     }
 
-    /// Each register follows from the one before by a factor, and the factor from the one before by another, which is the
-    /// same for all: the density is the exponential of a parabola.
+    /// The density in the middle, and pairs of densities from there outwards.
     #[inline(always)]
-    fn moments(self) -> Moments {
-        let Self {
-            slope, precision, step, ..
-        } = self;
-        let stride = LANES as f64 * step;
-        // Loops, for what is mapped is not compiled for vector registers.
-        let (mut density, mut growth) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let t = self.lowest + step * lane as f64;
-            density[lane] = slope * t - 0.5 * precision * t * t;
-            growth[lane] = stride * (slope - precision * (t + 0.5 * stride));
+    fn densities(&self) -> (Pack, Pairs) {
+        let half = Pack::splat(0.5);
+        let bend = self.precision * self.step * self.step;
+        let along = self.step * (self.slope - self.precision * self.middle);
+        let in_middle = (self.middle * (self.slope - half * self.precision * self.middle)).exp();
+        let pairs = Pairs {
+            above: in_middle,
+            below: in_middle,
+            growth_above: (along - half * bend).exp(),
+            growth_below: (-along - half * bend).exp(),
+            bend: (-bend).exp(),
+        };
+        (in_middle, pairs)
+    }
+
+    /// Mean and variance by Simpson's rule. Places are counted from the middle in steps, and so are the same for all lanes.
+    #[inline(always)]
+    pub(super) fn moments(self) -> Moments {
+        let (in_middle, mut pairs) = self.densities();
+        let (mut odd, mut even) = (Sums::ZERO, Sums::ZERO);
+        let mut place = 0.0;
+        for _ in 0..HALF / 2 {
+            pairs.step();
+            place += 1.0;
+            odd.add(&pairs, place);
+            pairs.step();
+            place += 1.0;
+            even.add(&pairs, place);
         }
-        for lane in 0..LANES {
-            density[lane] = exp(density[lane]);
-            growth[lane] = exp(growth[lane]);
-        }
-        let bend = exp(-precision * stride * stride);
-        let (mut total, mut first, mut second) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for (block, weights) in WEIGHTS.iter().enumerate() {
-            let begin = self.lowest + stride * block as f64;
-            for lane in 0..LANES {
-                let t = begin + step * lane as f64;
-                let weight = weights[lane] * density[lane];
-                let of_first = weight * t;
-                total[lane] += weight;
-                first[lane] += of_first;
-                second[lane] += of_first * t;
-                density[lane] *= growth[lane];
-                growth[lane] *= bend;
-            }
-        }
-        let (total, first, second) = (sum(total), sum(first), sum(second));
-        let mean = first / total;
+        // Simpson's weights, halved: 2 at odd places, 1 at even ones, ½ at both ends.
+        let mut ends = Sums::ZERO;
+        ends.add(&pairs, place);
+        let (two, half) = (Pack::splat(2.0), Pack::splat(0.5));
+        let sum = |odd: Pack, even: Pack, ends: Pack| (two * odd + even) - half * ends;
+        let total = sum(odd.total, even.total, ends.total) + in_middle;
+        let first = sum(odd.first, even.first, ends.first);
+        let second = sum(odd.second, even.second, ends.second);
+        let per_total = Pack::ONE / total;
+        let mean = first * per_total;
         Moments {
-            mean: self.mode + mean,
-            variance: second / total - mean * mean,
+            mean: self.mode + (self.middle + self.step * mean),
+            variance: self.step * self.step * (second * per_total - mean * mean),
         }
     }
 
-    /// The point below which half of the area under the density lies, by trapezoids; the mean where that is not found.
-    fn median(self, mean: f64) -> f64 {
-        let Self {
-            slope,
-            precision,
-            lowest,
-            step,
-            ..
-        } = self;
-        let mut density = [0.0; POINTS];
-        pulp::Arch::new().dispatch(|| {
-            for (k, density) in density.iter_mut().enumerate() {
-                let t = lowest + step * k as f64;
-                *density = exp(slope * t - 0.5 * precision * t * t);
-            }
-        });
-        let trapezoid = |k: usize| 0.5 * (density[k] + density[k + 1]);
-        let mut left = 0.5 * (0..POINTS - 1).map(trapezoid).sum::<f64>();
-        let mut median = mean - self.mode;
-        for k in 0..POINTS - 1 {
-            if left <= trapezoid(k) {
-                median = lowest + step * (k as f64 + left / trapezoid(k));
-                break;
-            }
-            left -= trapezoid(k);
+    /// The points below which half of the area under the densities lies, by trapezoids; the means where they are not found.
+    #[inline(always)]
+    pub(super) fn medians(self, ranges: &Ranges, means: Pack) -> Pack {
+        let mut densities = [Pack::ZERO; 2 * HALF + 1];
+        let (in_middle, mut pairs) = self.densities();
+        densities[HALF] = in_middle;
+        for place in 1..=HALF {
+            pairs.step();
+            densities[HALF + place] = pairs.above;
+            densities[HALF - place] = pairs.below;
         }
-        self.range.clamp(self.mode + median)
+        let mut medians = means - self.mode;
+        for lane in 0..LANES {
+            let trapezoid = |k: usize| 0.5 * (densities[k].get(lane) + densities[k + 1].get(lane));
+            let mut left = 0.5 * (0..2 * HALF).map(trapezoid).sum::<f64>();
+            for k in 0..2 * HALF {
+                if left <= trapezoid(k) {
+                    let steps = k as f64 - HALF as f64 + left / trapezoid(k);
+                    medians.set(lane, self.middle.get(lane) + self.step.get(lane) * steps);
+                    break;
+                }
+                left -= trapezoid(k);
+            }
+        }
+        ranges.clamp(self.mode + medians)
     }
 }
 
-#[inline(always)]
-fn sum(lanes: [f64; LANES]) -> f64 {
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
+impl Pairs {
+    /// Goes on to the densities one step further out.
+    #[inline(always)]
+    fn step(&mut self) {
+        self.above *= self.growth_above;
+        self.below *= self.growth_below;
+        self.growth_above *= self.bend;
+        self.growth_below *= self.bend;
+    }
+}
+
+/// Sums of densities, and of their products with their places and with the squares of these.
+struct Sums {
+    total: Pack,
+    first: Pack,
+    second: Pack,
+}
+
+impl Sums {
+    const ZERO: Self = Self {
+        total: Pack::ZERO,
+        first: Pack::ZERO,
+        second: Pack::ZERO,
+    };
+
+    #[inline(always)]
+    fn add(&mut self, pairs: &Pairs, place: f64) {
+        let both = pairs.above + pairs.below;
+        self.total += both;
+        self.first += Pack::splat(place) * (pairs.above - pairs.below);
+        self.second += Pack::splat(place * place) * both;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decoupling::row_problem::Range;
 
     const UNIT: Range = Range {
         lowest: 0.0,
         highest: 1.0,
     };
+
+    /// Mean, variance and median of a factor cut to a range, in the last lane beside other factors.
+    fn cut(factor: Factor, range: Range) -> (f64, f64, f64) {
+        let (mut factors, mut ranges) = (Factor::FLAT, Ranges::NONE);
+        (0..LANES).for_each(|lane| ranges.set(lane, range));
+        factors.set(LANES - 1, factor);
+        for lane in 0..LANES - 1 {
+            let precision = [f64::NAN, 1e300, 0.0][lane % 3];
+            factors.set(lane, Factor { precision, ..factor });
+        }
+        let moments = Cut::new(factors, &ranges).moments();
+        let median = Cut::new(factors, &ranges).medians(&ranges, moments.mean).get(LANES - 1);
+        (moments.mean.get(LANES - 1), moments.variance.get(LANES - 1), median)
+    }
 
     /// Moments of the uniform, of a whole normal and of an exponential distribution, all in closed form.
     #[test]
@@ -208,14 +211,14 @@ mod tests {
             (factor(4.0, -8.0), wide, -2.0, 0.25, 1e-9),
             (factor(0.0, -5.0), above, 2.2, 0.04, 2e-3),
         ] {
-            let moments = factor.cut_to(range);
+            let (found_mean, found_variance, _) = cut(factor, range);
             assert!(
-                (moments.mean - mean).abs() <= tolerance * mean.abs(),
-                "{factor:?}: {moments:?}"
+                (found_mean - mean).abs() <= tolerance * mean.abs(),
+                "{factor:?}: {found_mean}"
             );
             assert!(
-                (moments.variance / variance - 1.0).abs() <= tolerance,
-                "{factor:?}: {moments:?}"
+                (found_variance / variance - 1.0).abs() <= tolerance,
+                "{factor:?}: {found_variance}"
             );
         }
     }
@@ -227,21 +230,8 @@ mod tests {
             precision: 0.0,
             linear: -5.0,
         };
-        let median = factor.median(UNIT, factor.cut_to(UNIT).mean);
+        let (_, _, median) = cut(factor, UNIT);
         let expected = -(1.0 - 0.5 * (1.0 - (-5.0_f64).exp())).ln() / 5.0;
         assert!((median - expected).abs() < 1e-4, "{median} {expected}");
-    }
-
-    #[test]
-    fn a_shifted_factor_is_the_same_function_of_its_place() {
-        let factor = Factor {
-            precision: 3.0,
-            linear: 1.5,
-        };
-        let log = |factor: Factor, t: f64| factor.linear * t - 0.5 * factor.precision * t * t;
-        let shifted = factor.shifted(0.7);
-        // Up to a constant.
-        let difference = |t: f64| log(factor, t + 0.7) - log(shifted, t);
-        assert!((difference(-2.0) - difference(5.0)).abs() < 1e-12);
     }
 }
