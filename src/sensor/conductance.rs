@@ -61,12 +61,15 @@ impl RowConductance {
         self.evaluate_by::<Refined>(model, row, displacements_mm);
     }
 
+    /// Evaluates the sums alone, with the same bits as [`Self::evaluate`]; derivatives stay those of the last evaluation.
+    pub(crate) fn evaluate_sums(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
+        self.evaluate_sums_by::<Divided>(model, row, displacements_mm);
+    }
+
     /// Evaluates the sums alone, with the same bits as [`Self::evaluate_refined`]; derivatives stay those of the last
     /// evaluation.
     pub(crate) fn evaluate_sums_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let sensor = (model.scale, &model.geometry);
-        sum_reciprocal_distances::<0, Refined>(sensor, row, displacements_mm, &mut self.sums, &mut []);
+        self.evaluate_sums_by::<Refined>(model, row, displacements_mm);
     }
 
     /// Returns `true` if refined reciprocal roots can be computed of distances up to that of nodes displaced by
@@ -83,6 +86,12 @@ impl RowConductance {
         nearest_mm > 0.0
             && SQUARES.contains(&(nearest_mm * nearest_mm))
             && SQUARES.contains(&(farthest_mm * farthest_mm))
+    }
+
+    fn evaluate_sums_by<R: ReciprocalRoot>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
+        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+        let sensor = (model.scale, &model.geometry);
+        sum_reciprocal_distances::<0, R>(sensor, row, displacements_mm, &mut self.sums, &mut []);
     }
 
     fn evaluate_by<R: ReciprocalRoot>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
@@ -117,6 +126,10 @@ mod tests {
                 alone.evaluate_sums_refined(&model, 2.min(model.scale.rows() - 1), &at);
                 alone.evaluate_sums_refined(&model, 1, &at);
                 assert_eq!(alone, refined);
+                let mut alone = exact.clone();
+                alone.evaluate_sums(&model, 2.min(model.scale.rows() - 1), &at);
+                alone.evaluate_sums(&model, 1, &at);
+                assert_eq!(alone, exact);
                 for (exact, refined) in exact.sums().iter().zip(refined.sums()) {
                     assert!(
                         (refined / exact - 1.0).abs() <= 4.0 * f64::EPSILON,

@@ -1,6 +1,6 @@
 use super::{
     factor::Factor,
-    pack::{LANES, Pack, dot},
+    pack::{LANES, Pack, add, add_to_both, dot, dots},
 };
 
 /// Gaussians in square-root form, one in each lane: mean and a factor L of the covariance `Σ = L Lᵀ`.
@@ -44,22 +44,26 @@ pub(super) enum Direction<'a> {
 }
 
 impl Gaussians {
-    /// Makes room for so many equations of all unknowns, all 0.
+    /// Makes room for so many equations of all unknowns.
     pub(super) fn make_room(&mut self, unknowns: usize, equations: usize) {
-        fn clear<T: Clone>(values: &mut Vec<T>, length: usize, value: T) {
-            values.clear();
-            values.resize(length, value);
+        if (self.unknowns, self.equations) == (unknowns, equations) {
+            return;
         }
         (self.unknowns, self.equations) = (unknowns, equations);
-        clear(&mut self.columns, (unknowns + 1) * (equations + unknowns), Pack::ZERO);
-        clear(&mut self.singles, unknowns, (Pack::ZERO, Pack::ZERO));
-        for values in [&mut self.mean, &mut self.along, &mut self.linear, &mut self.squares] {
-            clear(values, unknowns, Pack::ZERO);
+        self.columns.resize((unknowns + 1) * (equations + unknowns), Pack::ZERO);
+        self.root.resize(unknowns * unknowns, Pack::ZERO);
+        self.singles.resize(unknowns, (Pack::ZERO, Pack::ZERO));
+        self.order.resize(unknowns, [0; LANES]);
+        for values in [
+            &mut self.mean,
+            &mut self.along,
+            &mut self.linear,
+            &mut self.squares,
+            &mut self.row,
+            &mut self.right,
+        ] {
+            values.resize(unknowns, Pack::ZERO);
         }
-        clear(&mut self.row, unknowns, Pack::ZERO);
-        clear(&mut self.right, unknowns, Pack::ZERO);
-        clear(&mut self.root, unknowns * unknowns, Pack::ZERO);
-        clear(&mut self.order, unknowns, [0; LANES]);
     }
 
     /// Sets coefficient `column` of an equation in `lane`, or its right side, which comes after all unknowns.
@@ -91,7 +95,8 @@ impl Gaussians {
         for (unknown, order) in self.order.iter_mut().enumerate() {
             *order = [unknown; LANES];
         }
-        for (squares, column) in self.squares.iter_mut().zip(self.columns.chunks_exact(height)) {
+        for (squares, column) in self.squares.iter_mut().zip(self.columns.chunks_exact_mut(height)) {
+            column[m..].fill(Pack::ZERO);
             *squares = dot(&column[..m], &column[..m]);
         }
         let mut flaws = Pack::ZERO;
@@ -114,12 +119,13 @@ impl Gaussians {
             for (column, squares) in rest.chunks_exact_mut(height).zip(&mut self.squares[k + 1..]) {
                 let column = &mut column[rows.clone()];
                 // Its last entry is 0.
-                let product = scale * dot(&reflector[..m], &column[..m]);
-                *squares = reflect(column, product, reflector);
+                let product = -(scale * dot(&reflector[..m], &column[..m]));
+                column[0] += product * reflector[0];
+                *squares = add(&mut column[1..], product, &reflector[1..]);
             }
             let column = &mut rest[(n - k - 1) * height..][rows];
-            let product = scale * dot(reflector, column);
-            reflect(column, product, reflector);
+            let product = -(scale * dot(reflector, column));
+            add(column, product, reflector);
             // The reciprocal, which is what R is divided by.
             reflector[0] = Pack::ONE / diagonal;
         }
@@ -222,10 +228,21 @@ impl Gaussians {
         let shift = linear - precision / left * (means + linear * variances);
         // Σ − precision/left Σ a aᵀ Σ = M Mᵀ with M = L − shrink L (Lᵀa) (Lᵀa)ᵀ.
         let shrink = precision / (left + left.sqrt());
-        for (mean, row) in self.mean.iter_mut().zip(self.root.chunks_exact_mut(self.unknowns)) {
-            let covariance = dot(row, &self.along);
+        let Self { mean, root, along, .. } = self;
+        let mut pairs = root.chunks_exact_mut(2 * along.len());
+        let (mean_pairs, mean_rest) = mean.as_chunks_mut::<2>();
+        for (means, rows) in mean_pairs.iter_mut().zip(&mut pairs) {
+            let (a, b) = rows.split_at_mut(along.len());
+            let covariances = dots([a, b], along);
+            means[0] += shift * covariances[0];
+            means[1] += shift * covariances[1];
+            add_to_both([a, b], covariances.map(|covariance| -(shrink * covariance)), along);
+        }
+        if let [mean] = mean_rest {
+            let row = pairs.into_remainder();
+            let covariance = dot(row, along);
             *mean += shift * covariance;
-            add(row, -(shrink * covariance), &self.along);
+            add(row, -(shrink * covariance), along);
         }
         left
     }
@@ -236,24 +253,4 @@ fn swap(lane: usize, a: &mut Pack, b: &mut Pack) {
     let value = a.get(lane);
     a.set(lane, b.get(lane));
     b.set(lane, value);
-}
-
-/// Adds `factor` times `from`.
-#[inline(always)]
-fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) {
-    for (to, &from) in to.iter_mut().zip(from) {
-        *to += factor * from;
-    }
-}
-
-/// Subtracts `product` times the reflector; returns the sum of squares below the first entry.
-#[inline(always)]
-fn reflect(column: &mut [Pack], product: Pack, reflector: &[Pack]) -> Pack {
-    column[0] -= product * reflector[0];
-    let mut sums = [Pack::ZERO; 2];
-    for (place, (entry, &value)) in column[1..].iter_mut().zip(&reflector[1..]).enumerate() {
-        *entry -= product * value;
-        sums[place % 2] += *entry * *entry;
-    }
-    sums[0] + sums[1]
 }

@@ -68,15 +68,16 @@ impl Approach {
         self.steps == 0 && self.most_steps > 1
     }
 
-    /// Linearises where the equations of the row were evaluated.
-    fn linearise(&mut self, posterior: &Posterior) -> LinearModel {
+    /// Makes `model` the linearisation at the place where the equations of the row were evaluated.
+    fn linearise(&mut self, posterior: &Posterior, model: &mut LinearModel) {
         let Posterior {
             likelihood, problem, ..
         } = posterior;
         if self.steps == 0 && likelihood.has_drift() {
             self.at.drift = likelihood.likeliest_drift(problem);
         }
-        self.misfits = likelihood.misfits(problem, self.at.drift);
+        self.misfits.clear();
+        self.misfits.extend(likelihood.misfits(problem, self.at.drift));
         let error = match &self.expected {
             None => CURVATURE * rms(self.misfits.iter().copied()),
             Some(expected) => rms(self
@@ -86,8 +87,8 @@ impl Approach {
                 .map(|(found, expected)| found - expected)),
         };
         self.blur = libm::hypot(1.0, (error - TOLERATED_MISFIT).max(0.0));
-        let tolerance = if self.is_rough() { FIRST_TOLERANCE } else { TOLERANCE };
-        posterior.linear_model(self.row, &self.at, self.blur, self.last.as_ref(), tolerance)
+        posterior.linearise(model, self.row, (&self.at, self.blur), self.last.as_ref());
+        model.tolerance = if self.is_rough() { FIRST_TOLERANCE } else { TOLERANCE };
     }
 
     /// Moves to the mean of the linearised `model`. Returns `true` where the row has arrived, or can go no further.
@@ -152,6 +153,7 @@ impl Posterior {
         let mut reports = vec![None; rows.len()];
         let mut waiting = rows.iter().copied().enumerate();
         let mut lanes: [Option<Approach>; LANES] = [const { None }; LANES];
+        let mut models: [Option<LinearModel>; LANES] = [const { None }; LANES];
         loop {
             for lane in lanes.iter_mut().filter(|lane| lane.is_none()) {
                 *lane = waiting.next().map(|(index, row)| {
@@ -162,13 +164,14 @@ impl Posterior {
             if lanes.iter().all(Option::is_none) {
                 return reports.into_iter().flatten().collect();
             }
-            let mut models = [const { None }; LANES];
             for (lane, model) in lanes.iter_mut().zip(&mut models) {
                 if let Some(approach) = lane.as_mut().filter(|approach| approach.steps < approach.most_steps) {
                     self.problem
                         .read(approach.row, &readings_ohm[approach.index * channels..][..channels]);
                     self.problem.evaluate(&approach.at.displacements_mm);
-                    *model = Some(approach.linearise(self));
+                    approach.linearise(self, model.get_or_insert_default());
+                } else {
+                    *model = None;
                 }
             }
             let found = self.propagation.marginals(&models);
@@ -194,7 +197,7 @@ impl Posterior {
         let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
         let readings_ohm = &readings_ohm[approach.index * channels..][..channels];
         self.problem.read(approach.row, readings_ohm);
-        let residual = self.problem.evaluate(&answer);
+        let residual = self.problem.evaluate_residuals(&answer);
         let coordinates_mm = &mut coordinates_mm[approach.index * outputs..][..outputs];
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {

@@ -1,5 +1,4 @@
 use super::{
-    expectation_propagation::TOLERANCE,
     linear_model::{LinearModel, RoundedReading},
     marginal::Marginal,
 };
@@ -25,6 +24,8 @@ use crate::{
 pub(super) struct Likelihood {
     noise: NoiseSource,
     rounding: f64,
+    /// Noise in proportion to the resistance, with the rounding.
+    relative: f64,
 }
 
 /// Rounding of a reading that comes from a few operations in double precision, as a standard deviation.
@@ -32,18 +33,20 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl Likelihood {
     pub(super) fn new(noise: NoiseSource) -> Self {
+        Self::rounded(noise, ROUNDING)
+    }
+
+    fn rounded(noise: NoiseSource, rounding: f64) -> Self {
         Self {
+            relative: libm::hypot(noise.relative(), rounding),
+            rounding,
             noise,
-            rounding: ROUNDING,
         }
     }
 
     /// The same with readings rounded to a part of `parts` of what they are taken to be rounded to.
     pub(super) fn rounded_finer(&self, parts: f64) -> Self {
-        Self {
-            rounding: self.rounding / parts,
-            ..self.clone()
-        }
+        Self::rounded(self.noise.clone(), self.rounding / parts)
     }
 
     /// True if readings share an error, which is then the last unknown.
@@ -74,38 +77,44 @@ impl Likelihood {
     }
 
     fn deviation_ohm(&self, predicted_ohm: f64) -> f64 {
-        let relative = libm::hypot(self.noise.relative(), self.rounding);
-        libm::hypot(relative * predicted_ohm, self.noise.additive_ohm())
+        let (relative_ohm, additive_ohm) = (self.relative * predicted_ohm, self.noise.additive_ohm());
+        if additive_ohm == 0.0 {
+            relative_ohm
+        } else {
+            libm::hypot(relative_ohm, additive_ohm)
+        }
     }
 
     /// w of every reading, with the residuals of the evaluated `problem`.
-    pub(super) fn misfits(&self, problem: &RowProblem, drift: f64) -> Vec<f64> {
+    pub(super) fn misfits(&self, problem: &RowProblem, drift: f64) -> impl Iterator<Item = f64> {
         let gain = self.gain(drift);
-        let misfit = |reading| {
+        let misfit = move |reading| {
             let predicted_ohm = gain * problem.resistance_ohm(reading);
             (problem.reading_ohm(reading) - predicted_ohm) / self.deviation_ohm(predicted_ohm)
         };
-        (0..problem.equations()).map(misfit).collect()
+        (0..problem.equations()).map(misfit)
     }
 
     fn gain(&self, drift: f64) -> f64 {
         (1.0 + self.noise.drift() * drift).max(SMALLEST_GAIN)
     }
 
-    /// The likelihood linearised where `problem` was evaluated, without priors, for unknowns
+    /// Makes `model` the likelihood linearised where `problem` was evaluated, without priors and ranges, for unknowns
     /// x = (displacement − present) / width, and η − `drift` if there is drift. Every σ is `blur` times what it is.
-    pub(super) fn linearised(&self, problem: &RowProblem, drift: f64, blur: f64, widths: &[f64]) -> LinearModel {
+    pub(super) fn linearise(
+        &self,
+        model: &mut LinearModel,
+        problem: &RowProblem,
+        (drift, blur): (f64, f64),
+        widths: &[f64],
+    ) {
         let (n, readings) = (widths.len(), problem.equations());
         let unknowns = n + usize::from(self.has_drift());
         let gain = self.gain(drift);
-        let mut model = LinearModel {
-            equations: Vec::with_capacity((readings + 2 * unknowns) * (unknowns + 1)),
-            linear: vec![0.0; unknowns],
-            ranges: Vec::new(),
-            rounded: Vec::new(),
-            first_factors: Vec::new(),
-            tolerance: TOLERANCE,
-        };
+        model.equations.clear();
+        model.linear.clear();
+        model.linear.resize(unknowns, 0.0);
+        model.rounded.clear();
         let mut form = vec![0.0; unknowns];
         for reading in 0..readings {
             let (read_ohm, predicted_ohm) = (problem.reading_ohm(reading), gain * problem.resistance_ohm(reading));
@@ -127,8 +136,9 @@ impl Likelihood {
             };
             let normalising = -relative - truncation;
             // ∂ ln P/∂x: −∂ ln s/∂x for what moves.
-            for (unknown, (value, &width)) in form.iter_mut().zip(widths).enumerate() {
-                *value = -problem.log_conductance_slope(reading, unknown) * width;
+            let slopes = problem.log_conductance_slopes(reading);
+            for ((value, of_unknown), &width) in form.iter_mut().zip(slopes).zip(widths) {
+                *value = -of_unknown * width;
             }
             if self.has_drift() {
                 form[n] = self.noise.drift() / gain;
@@ -157,7 +167,6 @@ impl Likelihood {
             model.equations.extend((0..n).map(|_| 0.0));
             model.equations.extend([1.0, -drift]);
         }
-        model
     }
 }
 

@@ -8,7 +8,7 @@ use crate::decoupling::row_problem::Range;
 /// Its moments have no closed form in several dimensions. They are found by expectation propagation (Minka 2001;
 /// Cunningham, Hennig and Lacoste-Julien 2011 for ranges): each range is replaced by a Gaussian factor such that its
 /// marginal keeps mean and variance. Tests compare with sampling.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct LinearModel {
     /// `[A, b]`, row by row.
     pub(super) equations: Vec<f64>,

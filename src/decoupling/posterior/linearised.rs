@@ -22,38 +22,33 @@ pub(super) struct Linearised {
 }
 
 impl Linearised {
-    /// The factors of the ranges, for displacements measured from another point.
-    fn factors_from(&self, at: &Point, widths: &[f64]) -> Vec<Factor> {
+    /// Appends the factors of the ranges, for displacements measured from another point.
+    fn append_factors(&self, factors: &mut Vec<Factor>, at: &Point, widths: &[f64]) {
         let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
         let shifts = points.zip(widths).map(|((to, from), width)| (to - from) / width);
-        let marginals = self.marginals.of_unknowns.iter();
-        marginals
-            .zip(shifts)
-            .map(|(marginal, shift)| marginal.factor.shifted(shift))
-            .collect()
+        let marginals = self.marginals.of_unknowns.iter().zip(shifts);
+        factors.extend(marginals.map(|(marginal, shift)| marginal.factor.shifted(shift)));
     }
 }
 
 impl Posterior {
-    /// The equations of row-wire `row` linearised at `at`, where they were evaluated, with `blur` times the noise.
-    /// Expectation propagation begins with the factors of an earlier linearisation, if there was one, and ends when no mean
-    /// changes by more than `tolerance`.
-    pub(super) fn linear_model(
+    /// Makes `model` the equations of row-wire `row` linearised at a point, where they were evaluated, with a factor of the
+    /// noise. Expectation propagation begins with the factors of an earlier linearisation, if there was one.
+    pub(super) fn linearise(
         &self,
+        model: &mut LinearModel,
         row: usize,
-        at: &Point,
-        blur: f64,
+        (at, blur): (&Point, f64),
         earlier: Option<&Linearised>,
-        tolerance: f64,
-    ) -> LinearModel {
-        let mut model = self.likelihood.linearised(&self.problem, at.drift, blur, &self.widths);
+    ) {
+        self.likelihood
+            .linearise(model, &self.problem, (at.drift, blur), &self.widths);
         let ranges = self.ranges.iter().zip(&at.displacements_mm).zip(&self.widths);
-        model.ranges = ranges
-            .map(|((range, at), width)| Range {
-                lowest: (range.lowest - at) / width,
-                highest: (range.highest - at) / width,
-            })
-            .collect();
+        model.ranges.clear();
+        model.ranges.extend(ranges.map(|((range, at), width)| Range {
+            lowest: (range.lowest - at) / width,
+            highest: (range.highest - at) / width,
+        }));
         if self.likelihood.has_drift() {
             let range = self.likelihood.drift_range();
             model.ranges.push(Range {
@@ -65,11 +60,10 @@ impl Posterior {
         let place = place.expect("the row is one of those given");
         let unknowns = model.ranges.len();
         self.priors[place].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
-        model.tolerance = tolerance;
+        model.first_factors.clear();
         if let Some(earlier) = earlier {
-            model.first_factors = earlier.factors_from(at, &self.widths);
+            earlier.append_factors(&mut model.first_factors, at, &self.widths);
         }
-        model
     }
 
     /// The posterior with these `marginals` of the `model` linearised at `at` with `blur` times the noise.

@@ -28,6 +28,7 @@ use crate::{
 };
 use expectation_propagation::{Propagation, TOLERANCE};
 use likelihood::Likelihood;
+use linear_model::LinearModel;
 use linearised::Point;
 use pack::LANES;
 use row_prior::RowPrior;
@@ -49,6 +50,8 @@ pub struct Posterior {
     propagation: Propagation,
 }
 
+/// Relative noise beside which the last units of the model's resistances are nothing.
+const NOISE_ABOVE_ROUNDING: f64 = 1e-4;
 /// Largest number of linearisations: two or three nearly always do, for conductance is nearly linear.
 const STEPS: usize = 60;
 
@@ -60,13 +63,19 @@ impl Posterior {
     /// A sensor without resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Result<Self, SensorError> {
         let ranges = ranges(model, scene);
+        let noise = scene.noise.in_test();
+        let problem = RowProblem::new(model, scene.movement.axes());
         Ok(Self {
-            problem: RowProblem::new(model, scene.movement.axes()),
+            problem: if noise.relative >= NOISE_ABOVE_ROUNDING {
+                problem.refined(&ranges)
+            } else {
+                problem
+            },
             widths: ranges.iter().map(|range| range.width()).collect(),
             ranges,
             rows: rows.to_vec(),
             priors: RowPrior::of_rows(model, scene, rows, rng),
-            likelihood: Likelihood::new(scene.noise.in_test().source(model)?),
+            likelihood: Likelihood::new(noise.source(model)?),
             propagation: Propagation::default(),
         })
     }
@@ -221,7 +230,9 @@ impl Posterior {
                 if self.likelihood.has_drift() {
                     truth.drift = self.likelihood.likeliest_drift(&self.problem);
                 }
-                models[lane] = Some(self.linear_model(row, &truth, 1.0, None, TOLERANCE));
+                let model = models[lane].insert(LinearModel::default());
+                self.linearise(model, row, (&truth, 1.0), None);
+                model.tolerance = TOLERANCE;
                 lanes[lane] = Some((row, truth));
             }
             let found = self.propagation.marginals(&models);

@@ -59,27 +59,27 @@ impl Cut {
         }
     }
 
-    /// The density in the middle, and pairs of densities from there outwards.
+    /// Densities from the middle outwards, in proportion to that in the middle.
     #[inline(always)]
-    fn densities(&self) -> (Pack, Pairs) {
-        let half = Pack::splat(0.5);
+    fn densities(&self) -> Pairs {
         let bend = self.precision * self.step * self.step;
         let along = self.step * (self.slope - self.precision * self.middle);
-        let in_middle = (self.middle * (self.slope - half * self.precision * self.middle)).exp();
-        let pairs = Pairs {
-            above: in_middle,
-            below: in_middle,
-            growth_above: (along - half * bend).exp(),
-            growth_below: (-along - half * bend).exp(),
-            bend: (-bend).exp(),
-        };
-        (in_middle, pairs)
+        // The density falls by at most exp(−36) over 96 steps: |along| ≤ 36/96 and bend ≤ 2·36/48².
+        let growth_above = (along - Pack::splat(0.5) * bend).exp_of_small();
+        let bend = (-bend).exp_of_small();
+        Pairs {
+            above: Pack::ONE,
+            below: Pack::ONE,
+            growth_above,
+            growth_below: bend / growth_above,
+            bend,
+        }
     }
 
     /// Mean and variance by Simpson's rule. Places are counted from the middle in steps, and so are the same for all lanes.
     #[inline(always)]
     pub(super) fn moments(self) -> Moments {
-        let (in_middle, mut pairs) = self.densities();
+        let mut pairs = self.densities();
         let (mut odd, mut even) = (Sums::ZERO, Sums::ZERO);
         let mut place = 0.0;
         for _ in 0..HALF / 2 {
@@ -95,7 +95,7 @@ impl Cut {
         ends.add(&pairs, place);
         let (two, half) = (Pack::splat(2.0), Pack::splat(0.5));
         let sum = |odd: Pack, even: Pack, ends: Pack| (two * odd + even) - half * ends;
-        let total = sum(odd.total, even.total, ends.total) + in_middle;
+        let total = sum(odd.total, even.total, ends.total) + Pack::ONE;
         let first = sum(odd.first, even.first, ends.first);
         let second = sum(odd.second, even.second, ends.second);
         let per_total = Pack::ONE / total;
@@ -109,25 +109,27 @@ impl Cut {
     /// The points below which half of the area under the densities lies, by trapezoids; the means where they are not found.
     #[inline(always)]
     pub(super) fn medians(self, ranges: &Ranges, means: Pack) -> Pack {
-        let mut densities = [Pack::ZERO; 2 * HALF + 1];
-        let (in_middle, mut pairs) = self.densities();
-        densities[HALF] = in_middle;
+        let mut densities = [Pack::ONE; 2 * HALF + 1];
+        let mut pairs = self.densities();
         for place in 1..=HALF {
             pairs.step();
             densities[HALF + place] = pairs.above;
             densities[HALF - place] = pairs.below;
         }
+        // Twice the areas below each point, in steps.
+        let mut below = [Pack::ZERO; 2 * HALF + 1];
+        for k in 0..2 * HALF {
+            below[k + 1] = below[k] + (densities[k] + densities[k + 1]);
+        }
+        let half = Pack::splat(0.5) * below[2 * HALF];
         let mut medians = means - self.mode;
         for lane in 0..LANES {
-            let trapezoid = |k: usize| 0.5 * (densities[k].get(lane) + densities[k + 1].get(lane));
-            let mut left = 0.5 * (0..2 * HALF).map(trapezoid).sum::<f64>();
-            for k in 0..2 * HALF {
-                if left <= trapezoid(k) {
-                    let steps = k as f64 - HALF as f64 + left / trapezoid(k);
-                    medians.set(lane, self.middle.get(lane) + self.step.get(lane) * steps);
-                    break;
-                }
-                left -= trapezoid(k);
+            let half = half.get(lane);
+            let above = below[1..].partition_point(|below| below.get(lane) < half);
+            if half > 0.0 && above < 2 * HALF {
+                let [least, most] = [above, above + 1].map(|k| below[k].get(lane));
+                let steps = above as f64 - HALF as f64 + (half - least) / (most - least);
+                medians.set(lane, self.middle.get(lane) + self.step.get(lane) * steps);
             }
         }
         ranges.clamp(self.mode + medians)
