@@ -15,8 +15,6 @@ pub(crate) struct RowProblem {
     model: SensorModel,
     axes: Axes,
     conductance: RowConductance,
-    /// True if reciprocal roots are refined rather than divided.
-    is_refined: bool,
     displacements_mm: Vec<DVec3>,
     readings_ohm: Vec<f64>,
     row: usize,
@@ -89,7 +87,6 @@ impl RowProblem {
             model: *model,
             axes,
             conductance: RowConductance::new(model, axes),
-            is_refined: false,
             displacements_mm: vec![DVec3::ZERO; model.scale.nodes_per_row()],
             readings_ohm: vec![0.0; model.scale.columns()],
             row: 0,
@@ -121,42 +118,18 @@ impl RowProblem {
         self.readings_ohm.copy_from_slice(readings_ohm);
     }
 
-    /// The same problem, for displacements within `ranges`, evaluated in half the time and to within a few more units in the
-    /// last place where the sensor's lengths allow it.
-    pub(crate) fn refined(self, ranges: &[Range]) -> Self {
-        let axes = self.axes.count();
-        let deepest_mm = ranges.iter().skip(axes - 1).step_by(axes).map(|range| range.highest);
-        let nearest_mm = self.model.geometry.height_mm - deepest_mm.fold(0.0, f64::max);
-        let lengths_mm = ranges.iter().map(|range| range.highest.max(-range.lowest));
-        let largest_mm = lengths_mm.fold(0.0, f64::max);
-        Self {
-            is_refined: RowConductance::is_within_reach(&self.model, nearest_mm, largest_mm),
-            ..self
-        }
-    }
-
     /// Evaluates residuals and derivatives at `unknowns_mm`; returns the rms residual.
     pub(crate) fn evaluate(&mut self, unknowns_mm: &[f64]) -> f64 {
         self.displace(unknowns_mm);
-        let (model, displacements_mm) = (&self.model, &self.displacements_mm);
-        if self.is_refined {
-            self.conductance.evaluate_refined(model, self.row, displacements_mm);
-        } else {
-            self.conductance.evaluate(model, self.row, displacements_mm);
-        }
+        self.conductance.evaluate(&self.model, self.row, &self.displacements_mm);
         self.write_residuals()
     }
 
     /// Evaluates residuals alone at `unknowns_mm`, as [`Self::evaluate`]; derivatives stay those of the last evaluation.
     pub(crate) fn evaluate_residuals(&mut self, unknowns_mm: &[f64]) -> f64 {
         self.displace(unknowns_mm);
-        let (model, displacements_mm) = (&self.model, &self.displacements_mm);
-        if self.is_refined {
-            self.conductance
-                .evaluate_sums_refined(model, self.row, displacements_mm);
-        } else {
-            self.conductance.evaluate_sums(model, self.row, displacements_mm);
-        }
+        self.conductance
+            .evaluate_sums(&self.model, self.row, &self.displacements_mm);
         self.write_residuals()
     }
 

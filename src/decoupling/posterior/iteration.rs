@@ -1,3 +1,5 @@
+use std::cmp::Reverse;
+
 use super::{
     Posterior, PosteriorReport,
     expectation_propagation::{Marginals, TOLERANCE},
@@ -151,7 +153,9 @@ impl Posterior {
     ) -> Vec<PosteriorReport> {
         let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
         let mut reports = vec![None; rows.len()];
-        let mut waiting = rows.iter().copied().enumerate();
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by_key(|&index| Reverse(self.rounds[self.place(rows[index])]));
+        let mut waiting = order.into_iter().map(|index| (index, rows[index]));
         let mut lanes: [Option<Approach>; LANES] = [const { None }; LANES];
         let mut models: [Option<LinearModel>; LANES] = [const { None }; LANES];
         loop {
@@ -195,6 +199,8 @@ impl Posterior {
             None => approach.at.displacements_mm,
         };
         let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
+        let place = self.place(approach.row);
+        self.rounds[place] = approach.rounds;
         let readings_ohm = &readings_ohm[approach.index * channels..][..channels];
         self.problem.read(approach.row, readings_ohm);
         let residual = self.problem.evaluate_residuals(&answer);

@@ -56,10 +56,8 @@ impl Posterior {
                 highest: range.highest,
             });
         }
-        let place = self.rows.iter().position(|&known| known == row);
-        let place = place.expect("the row is one of those given");
         let unknowns = model.ranges.len();
-        self.priors[place].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
+        self.priors[self.place(row)].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
         model.first_factors.clear();
         if let Some(earlier) = earlier {
             earlier.append_factors(&mut model.first_factors, at, &self.widths);

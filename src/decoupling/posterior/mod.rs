@@ -48,10 +48,10 @@ pub struct Posterior {
     priors: Vec<RowPrior>,
     likelihood: Likelihood,
     propagation: Propagation,
+    /// Rounds that each of the rows took when it was last solved: those that take the most begin.
+    rounds: Vec<usize>,
 }
 
-/// Relative noise beside which the last units of the model's resistances are nothing.
-const NOISE_ABOVE_ROUNDING: f64 = 1e-4;
 /// Largest number of linearisations: two or three nearly always do, for conductance is nearly linear.
 const STEPS: usize = 60;
 
@@ -63,20 +63,15 @@ impl Posterior {
     /// A sensor without resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Result<Self, SensorError> {
         let ranges = ranges(model, scene);
-        let noise = scene.noise.in_test();
-        let problem = RowProblem::new(model, scene.movement.axes());
         Ok(Self {
-            problem: if noise.relative >= NOISE_ABOVE_ROUNDING {
-                problem.refined(&ranges)
-            } else {
-                problem
-            },
+            problem: RowProblem::new(model, scene.movement.axes()),
             widths: ranges.iter().map(|range| range.width()).collect(),
             ranges,
             rows: rows.to_vec(),
             priors: RowPrior::of_rows(model, scene, rows, rng),
-            likelihood: Likelihood::new(noise.source(model)?),
+            likelihood: Likelihood::new(scene.noise.in_test().source(model)?),
             propagation: Propagation::default(),
+            rounds: vec![0; rows.len()],
         })
     }
 
@@ -175,6 +170,12 @@ impl Posterior {
             *value = range.clamp(*value);
         }
         unknowns_mm
+    }
+
+    /// Index of row-wire `row` among the rows given.
+    fn place(&self, row: usize) -> usize {
+        let place = self.rows.iter().position(|&known| known == row);
+        place.expect("the row is one of those given")
     }
 
     fn check(&self, readings_ohm: &[f64]) -> Result<(), DecodeError> {
