@@ -280,3 +280,78 @@ pub(super) fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) -> Pack {
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pack(value: impl Fn(usize) -> f64) -> Pack {
+        let mut pack = Pack::ZERO;
+        (0..LANES).for_each(|lane| pack.set(lane, value(lane)));
+        pack
+    }
+
+    fn values(pack: Pack) -> Vec<f64> {
+        (0..LANES).map(|lane| pack.get(lane)).collect()
+    }
+
+    #[test]
+    fn small_exponentials_agree_with_the_standard_library() {
+        for k in -4000..=4000 {
+            let x = f64::from(k) * 1e-4;
+            let ours = pack(|lane| if lane == 1 { x } else { f64::NAN }).exp_of_small();
+            assert!((ours.get(1) / x.exp() - 1.0).abs() <= 2.0 * f64::EPSILON, "{x}");
+            assert!(ours.get(0).is_nan());
+        }
+    }
+
+    /// Integers, whose sums are exact in any order.
+    #[test]
+    fn products_and_sums_are_those_of_every_lane_for_any_length() {
+        for length in 0..=11 {
+            let vector = |seed: usize| -> Vec<Pack> {
+                let entry = |place: usize| pack(|lane| ((7 * place + 5 * lane + seed) % 11) as f64 - 5.0);
+                (0..length).map(entry).collect()
+            };
+            let [a, b, c] = [1, 3, 8].map(vector);
+            let product = |a: &[Pack], b: &[Pack]| -> Vec<f64> {
+                let of_lane = |lane: usize| a.iter().zip(b).map(|(a, b)| a.get(lane) * b.get(lane)).sum();
+                (0..LANES).map(of_lane).collect()
+            };
+            assert_eq!(values(dot(&a, &b)), product(&a, &b));
+            assert_eq!(dots([&a, &b], &c).map(values), [product(&a, &c), product(&b, &c)]);
+            let factors = [pack(|lane| lane as f64), pack(|lane| 2.0 - lane as f64)];
+            let sums = |to: &[Pack], factor: Pack| -> Vec<Vec<f64>> {
+                to.iter().zip(&c).map(|(&to, &c)| values(to + factor * c)).collect()
+            };
+            let (mut added, mut first, mut second) = (a.clone(), a.clone(), b.clone());
+            let squares = add(&mut added, factors[0], &c);
+            add_to_both([&mut first, &mut second], factors, &c);
+            let of = |packs: &[Pack]| -> Vec<Vec<f64>> { packs.iter().map(|&pack| values(pack)).collect() };
+            assert_eq!(
+                (of(&added), values(squares)),
+                (sums(&a, factors[0]), product(&added, &added))
+            );
+            assert_eq!((of(&first), of(&second)), (sums(&a, factors[0]), sums(&b, factors[1])));
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_kept_or_replaced_as_it_is_said() {
+        let (one, nan) = (Pack::ONE, Pack::splat(f64::NAN));
+        assert_eq!(
+            [nan.max(one), nan.min(one), nan.unless_nan(one)].map(|pack| pack.get(0)),
+            [1.0; 3]
+        );
+        assert!(
+            [one.max(nan), one.min(nan), one.max_or_nan(nan), nan.max_or_nan(one)]
+                .iter()
+                .all(|pack| pack.get(0).is_nan())
+        );
+        let flawed = [0.0, -1.0, f64::INFINITY, f64::NAN];
+        assert!(flawed.iter().all(|&value| Pack::splat(value).flaws().get(0).is_nan()));
+        assert_eq!(Pack::splat(1e-300).flaws().get(0), 0.0);
+        let against = [(2.0, 3.0), (2.0, -3.0), (2.0, 0.0)].map(|(a, b)| Pack::splat(a).against(Pack::splat(b)).get(0));
+        assert_eq!(against, [-2.0, 2.0, 2.0]);
+    }
+}

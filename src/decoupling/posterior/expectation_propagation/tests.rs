@@ -184,3 +184,64 @@ fn several_correlated_unknowns_agree_with_sampling() {
         }
     }
 }
+
+/// Models that converge soon and late, one whose numbers overflow, and one that begins with factors: alone, and in every
+/// lane beside the others.
+#[test]
+fn models_side_by_side_have_the_bits_of_each_alone() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let n = 3;
+    let mut model = |noise: f64, offset: f64| {
+        // Columns in another order of size for each.
+        let sizes: Vec<f64> = (0..n).map(|_| 10.0_f64.powf(rng.random_range(-2.0..2.0))).collect();
+        let mut row = || -> Vec<f64> { (0..=n).map(|_| standard_normal(&mut rng)).collect() };
+        let mut equations = Vec::new();
+        for _ in 0..5 {
+            let row = row();
+            equations.extend(row[..n].iter().zip(&sizes).map(|(value, size)| value * size / noise));
+            equations.push((row[n] + offset) / noise);
+        }
+        LinearModel {
+            equations,
+            linear: vec![0.3; n],
+            ranges: vec![UNIT; n],
+            rounded: Vec::new(),
+            first_factors: Vec::new(),
+            tolerance: TOLERANCE,
+        }
+    };
+    let (soon, late) = (model(5.0, 0.0), model(1e-3, 0.0));
+    let overflowing = LinearModel {
+        equations: vec![f64::MAX; 5 * (n + 1)],
+        ..model(1.0, 0.0)
+    };
+    let mut warm = model(0.1, 0.5);
+    let factors = alone(warm.clone()).of_unknowns;
+    warm.first_factors = factors.iter().map(|marginal| marginal.factor).collect();
+    let of = |found: &Option<Marginals>| {
+        found.as_ref().map(|found| {
+            let marginals = found.of_unknowns.iter();
+            let bits = marginals.flat_map(|marginal| [marginal.mean, marginal.variance, marginal.factor.precision]);
+            (found.rounds, bits.map(f64::to_bits).collect::<Vec<u64>>())
+        })
+    };
+    let models = [soon, late, overflowing, warm];
+    let by_itself = |model: &LinearModel| of(&Propagation::default().marginals(&[Some(model.clone())])[0]);
+    let expected: Vec<_> = models.iter().map(by_itself).collect();
+    let rounds: Vec<_> = expected
+        .iter()
+        .map(|found| found.as_ref().map(|found| found.0))
+        .collect();
+    assert!(
+        rounds[0] < rounds[1] && rounds[2].is_none() && rounds[3] < rounds[1],
+        "{rounds:?}"
+    );
+    let mut propagation = Propagation::default();
+    for turn in 0..LANES {
+        let place = |lane: usize| (lane + turn) % models.len();
+        let beside: Vec<_> = (0..LANES).map(|lane| Some(models[place(lane)].clone())).collect();
+        for (lane, found) in propagation.marginals(&beside).iter().enumerate() {
+            assert_eq!(of(found), expected[place(lane)], "{turn} {lane}");
+        }
+    }
+}
