@@ -210,7 +210,19 @@ fn models_side_by_side_have_the_bits_of_each_alone() {
             tolerance: TOLERANCE,
         }
     };
-    let (soon, late) = (model(5.0, 0.0), model(1e-3, 0.0));
+    let soon = model(5.0, 0.0);
+    // Differences that are known leave all unknowns to find their place together.
+    let of_differences = [
+        [1.0, -1.0, 0.0, 0.5],
+        [0.0, 1.0, -1.0, -0.2],
+        [0.0; 4],
+        [0.0; 4],
+        [0.0; 4],
+    ];
+    let late = LinearModel {
+        equations: of_differences.as_flattened().iter().map(|value| value / 1e-4).collect(),
+        ..model(1.0, 0.0)
+    };
     let overflowing = LinearModel {
         equations: vec![f64::MAX; 5 * (n + 1)],
         ..model(1.0, 0.0)
