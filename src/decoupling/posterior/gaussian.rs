@@ -1,6 +1,7 @@
 use super::{
     factor::Factor,
-    pack::{LANES, Pack, add, add_to_both, dot, dots},
+    pack::{LANES, Pack},
+    products::{add, add_to_both, dot, dots},
 };
 
 /// Gaussians in square-root form, one in each lane: mean and a factor L of the covariance `Σ = L Lᵀ`.

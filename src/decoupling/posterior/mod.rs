@@ -10,6 +10,7 @@ mod linear_model;
 mod linearised;
 mod marginal;
 mod pack;
+mod products;
 mod report;
 mod row_prior;
 mod site;
