@@ -123,16 +123,16 @@ impl RowSearch {
         }
         let (channels, outputs) = (self.channels(), self.outputs());
         let readings_of = |place: usize| &readings_ohm[place * channels..][..channels];
-        let orders: Vec<Vec<usize>> = (0..row_indices.len())
-            .map(|place| self.order(readings_of(place)))
-            .collect();
+        let order = |place: usize| self.order(readings_of(place)).into_iter();
+        let mut orders: Vec<_> = (0..row_indices.len()).map(order).collect();
         let mut taken: Vec<(f64, Option<R>)> = vec![(f64::INFINITY, None); row_indices.len()];
-        for rank in 0..self.rows.len() {
-            let open: Vec<usize> = (0..taken.len()).filter(|&place| taken[place].0 >= EXPLAINED).collect();
-            if open.is_empty() {
+        loop {
+            let is_open = |place: &usize| taken[*place].0 >= EXPLAINED;
+            let open: Vec<usize> = (0..taken.len()).filter(is_open).collect();
+            let row_wires: Vec<usize> = open.iter().filter_map(|&place| orders[place].next()).collect();
+            if row_wires.is_empty() {
                 break;
             }
-            let row_wires: Vec<usize> = open.iter().map(|&place| orders[place][rank]).collect();
             let readings_ohm: Vec<f64> = open.iter().flat_map(|&place| readings_of(place)).copied().collect();
             let mut trials_mm = vec![0.0; open.len() * outputs];
             let found = solve(&row_wires, &readings_ohm, &mut trials_mm)?;

@@ -113,7 +113,7 @@ impl Gaussians {
             let square = self.squares[k] + single * single;
             flaws += square.flaws();
             let length = square.sqrt();
-            let diagonal = length.against(reflector[0]);
+            let diagonal = length.negated_where_positive(reflector[0]);
             // v = x − diagonal e₁ has vᵀv = 2 length (length + |x₁|).
             reflector[0] -= diagonal;
             let scale = Pack::ONE / (length * reflector[0].abs());

@@ -46,7 +46,7 @@ impl Likelihood {
 
     /// The same with readings rounded to a part of `parts` of what they are taken to be rounded to.
     pub(super) fn rounded_finer(&self, parts: f64) -> Self {
-        Self::rounded(self.noise.clone(), self.rounding / parts)
+        Self::rounded(self.noise, self.rounding / parts)
     }
 
     /// True if readings share an error, which is then the last unknown.

@@ -1,4 +1,4 @@
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// Rows side by side.
 pub(super) const LANES: usize = 4;
@@ -112,9 +112,9 @@ impl Pack {
         self
     }
 
-    /// The magnitude of this with the sign that `other` has not.
+    /// This, negated where `other` is above 0.
     #[inline(always)]
-    pub(super) fn against(mut self, other: Self) -> Self {
+    pub(super) fn negated_where_positive(mut self, other: Self) -> Self {
         for lane in 0..LANES {
             self.0[lane] = if other.0[lane] > 0.0 {
                 -self.0[lane]
@@ -146,46 +146,34 @@ impl Pack {
     }
 }
 
-macro_rules! operator {
-    ($operator:ident, $name:ident, $symbol:tt) => {
+macro_rules! operators {
+    ($($operator:ident $name:ident, $assigning:ident $assign:ident $symbol:tt;)*) => {$(
+        impl $assigning for Pack {
+            #[inline(always)]
+            fn $assign(&mut self, other: Self) {
+                for lane in 0..LANES {
+                    self.0[lane] $symbol other.0[lane];
+                }
+            }
+        }
+
         impl $operator for Pack {
             type Output = Self;
 
             #[inline(always)]
             fn $name(mut self, other: Self) -> Self {
-                for lane in 0..LANES {
-                    self.0[lane] = self.0[lane] $symbol other.0[lane];
-                }
+                self.$assign(other);
                 self
             }
         }
-    };
+    )*};
 }
 
-operator!(Add, add, +);
-operator!(Sub, sub, -);
-operator!(Mul, mul, *);
-operator!(Div, div, /);
-
-impl AddAssign for Pack {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Pack {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
-
-impl MulAssign for Pack {
-    #[inline(always)]
-    fn mul_assign(&mut self, other: Self) {
-        *self = *self * other;
-    }
+operators! {
+    Add add, AddAssign add_assign +=;
+    Sub sub, SubAssign sub_assign -=;
+    Mul mul, MulAssign mul_assign *=;
+    Div div, DivAssign div_assign /=;
 }
 
 impl Neg for Pack {
@@ -231,7 +219,8 @@ mod tests {
         let flawed = [0.0, -1.0, f64::INFINITY, f64::NAN];
         assert!(flawed.iter().all(|&value| Pack::splat(value).flaws().get(0).is_nan()));
         assert_eq!(Pack::splat(1e-300).flaws().get(0), 0.0);
-        let against = [(2.0, 3.0), (2.0, -3.0), (2.0, 0.0)].map(|(a, b)| Pack::splat(a).against(Pack::splat(b)).get(0));
-        assert_eq!(against, [-2.0, 2.0, 2.0]);
+        let negated = [(2.0, 3.0), (2.0, -3.0), (2.0, 0.0)]
+            .map(|(a, b)| Pack::splat(a).negated_where_positive(Pack::splat(b)).get(0));
+        assert_eq!(negated, [-2.0, 2.0, 2.0]);
     }
 }

@@ -15,9 +15,9 @@ pub(super) fn dot(a: &[Pack], b: &[Pack]) -> Pack {
             sums[strand] += a[strand] * b[strand];
         }
     }
-    for strand in 0..STRANDS - 1 {
+    for (strand, sum) in sums.iter_mut().enumerate().take(STRANDS - 1) {
         if let (Some(&a), Some(&b)) = (rest_a.get(strand), rest_b.get(strand)) {
-            sums[strand] += a * b;
+            *sum += a * b;
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
@@ -74,10 +74,10 @@ pub(super) fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) -> Pack {
             sums[strand] += to[strand] * to[strand];
         }
     }
-    for strand in 0..STRANDS - 1 {
+    for (strand, sum) in sums.iter_mut().enumerate().take(STRANDS - 1) {
         if let (Some(to), Some(&from)) = (rest_to.get_mut(strand), rest_from.get(strand)) {
             *to += factor * from;
-            sums[strand] += *to * *to;
+            *sum += *to * *to;
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
