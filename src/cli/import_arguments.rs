@@ -278,6 +278,11 @@ impl ImportArguments {
         })
     }
 
+    /// The recipe that is repeated.
+    pub(super) fn recipe(&self) -> Option<&Path> {
+        self.recipe.as_deref()
+    }
+
     /// Writes the recipe, if that is asked for.
     pub(super) fn save_recipe(&self, plan: &Plan) -> Result<(), Failure> {
         match &self.save_recipe {

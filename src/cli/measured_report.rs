@@ -1,4 +1,8 @@
-use std::{collections::BTreeMap, io::Write, time::Duration};
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    time::Duration,
+};
 
 use serde::Serialize;
 
@@ -83,6 +87,8 @@ pub(super) struct Folds<'a> {
 }
 
 const NETWORK: &str = "network";
+/// The split by a file of test samples.
+const TEST_FILE: &str = "file";
 
 /// Name of the row of `table` with the lowest error for a target.
 fn best(table: &[TargetRow], target: usize) -> &'static str {
@@ -107,7 +113,7 @@ impl Report {
             files: files(recordings()),
             inputs: sets.recording.inputs.clone(),
             split: match sets.test_recording {
-                Some(_) => "file".to_owned(),
+                Some(_) => TEST_FILE.to_owned(),
                 None => by.to_string(),
             },
             test_fraction: test_samples as f64 / (samples + validation_samples + test_samples) as f64,
@@ -120,6 +126,29 @@ impl Report {
                 .collect(),
             warnings,
         }
+    }
+
+    /// Warnings of the import.
+    pub(super) fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Returns `true` if the test samples have files of their own.
+    pub(super) fn has_test_file(&self) -> bool {
+        self.split == TEST_FILE
+    }
+
+    /// Writes the files, and how their samples are divided.
+    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        write_files(&self.files, self.rows, &self.dropped, out)?;
+        writeln!(
+            out,
+            "{} for training, {} for validation, {} for the test (split by {})",
+            counted(self.samples, "sample"),
+            self.validation_samples,
+            self.test_samples,
+            self.split
+        )
     }
 }
 
@@ -179,15 +208,7 @@ pub(super) fn print(
         });
     }
     print_with(|out| {
-        write_files(&report.files, report.rows, &report.dropped, out)?;
-        writeln!(
-            out,
-            "{} for training, {} for validation, {} for the test (split by {})",
-            counted(report.samples, "sample"),
-            report.validation_samples,
-            report.test_samples,
-            report.split
-        )?;
+        report.write(out)?;
         writeln!(
             out,
             "{}, {}, {}, {}, seed {}",
