@@ -79,6 +79,7 @@ fn import_arguments(recipe: &Recipe, add: &mut impl FnMut(&str, &str)) {
         conditions,
         missing,
         units,
+        positions,
     } = recipe;
     add("data", &data.to_string_lossy());
     join.iter()
@@ -104,6 +105,9 @@ fn import_arguments(recipe: &Recipe, add: &mut impl FnMut(&str, &str)) {
     units
         .iter()
         .for_each(|(column, unit)| add("unit", &format!("{column}={unit}")));
+    positions
+        .iter()
+        .for_each(|file| add("positions", &file.to_string_lossy()));
     let DialectChoice {
         encoding,
         separator,

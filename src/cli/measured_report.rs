@@ -18,8 +18,8 @@ use crate::{
         CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
         recorded::{Determination, NonlinearGain},
     },
-    export::{MeasuredNetworkFile, describe_standings, describe_worse_than_ridge, format_duration},
-    import::{Channel, Dropped, Plan, PlannedSets, Recording},
+    export::{MeasuredNetworkFile, describe_positions, describe_standings, describe_worse_than_ridge, format_duration},
+    import::{Channel, Dropped, Plan, PlannedSets, Recording, TargetPosition},
     sensor::counted,
     training::StopReason,
 };
@@ -39,8 +39,21 @@ pub(super) struct Report {
     validation_samples: usize,
     test_samples: usize,
     dropped: Vec<Dropped>,
+    /// Positions of targets, for those that have one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    positions: Vec<Position>,
+    #[serde(skip)]
+    positions_text: Option<String>,
     #[serde(skip)]
     warnings: Vec<String>,
+}
+
+/// Position of a target on the skin.
+#[derive(Serialize)]
+struct Position {
+    target: String,
+    x_mm: f64,
+    y_mm: f64,
 }
 
 /// The object printed by `train --data --json`.
@@ -106,6 +119,12 @@ impl Report {
         let warnings: Vec<String> = recordings()
             .flat_map(|recording| recording.warnings.iter().cloned())
             .collect();
+        let recording = &sets.recording;
+        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| Position {
+            target: recording.targets[target].name.clone(),
+            x_mm,
+            y_mm,
+        };
         let samples = sets.split.training.samples();
         let validation_samples = sets.split.validation.as_ref().map_or(0, Dataset::samples);
         let test_samples = sets.test.samples();
@@ -124,6 +143,8 @@ impl Report {
             dropped: recordings()
                 .flat_map(|recording| recording.dropped.iter().cloned())
                 .collect(),
+            positions: recording.positions.iter().map(position).collect(),
+            positions_text: describe_positions(&recording.positions),
             warnings,
         }
     }
@@ -148,7 +169,8 @@ impl Report {
             self.validation_samples,
             self.test_samples,
             self.split
-        )
+        )?;
+        self.positions_text.iter().try_for_each(|text| writeln!(out, "{text}"))
     }
 }
 

@@ -131,6 +131,7 @@ impl Plan {
             .join
             .iter_mut()
             .for_each(|joined| joined.file = of(&joined.file));
+        plan.import.positions.iter_mut().for_each(|file| *file = of(file));
         if let Some(test) = &mut plan.test {
             test.data = of(&test.data);
             test.join.iter_mut().for_each(|file| *file = of(file));

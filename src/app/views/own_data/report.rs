@@ -104,6 +104,9 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
             ),
         );
     }
+    if let Some(positions) = &checked.positions {
+        dim_ui(ui, &sentence(positions));
+    }
     let is_random = plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random);
     if is_random {
         note_ui(ui, flattery(SplitBy::Random));

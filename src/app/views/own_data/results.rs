@@ -3,16 +3,17 @@ use eframe::egui::{ComboBox, DragValue, Ui};
 use super::{
     charts::{Chart, ChartTab},
     state::OwnDataView,
+    surfaces::surfaces_ui,
 };
 use crate::app::{
     plotting::{Pointer, cells_ui, legend_ui, plots_ui},
-    shared::Phase,
+    shared::{Effect, Look, Phase},
     theme::{Theme, space},
     widgets::{placeholder_ui, tabs_ui},
 };
 
 /// Charts of the network on show.
-pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
+pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effects: &mut Vec<Effect>) {
     let Some(shown) = &view.shown else {
         placeholder_ui(
             ui,
@@ -25,7 +26,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
     };
     let before = (view.chart.tab, view.chart.target, view.chart.sample);
     ui.horizontal(|ui| {
-        if let Some(tab) = tabs_ui(ui, "Charts", &ChartTab::ALL, view.chart.tab) {
+        if let Some(tab) = tabs_ui(ui, "Charts", &ChartTab::offered(shown), view.chart.tab) {
             view.chart.tab = tab;
         }
         let targets = &shown.file.targets;
@@ -44,7 +45,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
             picked.response.labelled_by(label.id);
         }
         let samples = shown.tested.as_ref().map_or(0, |tested| tested.set().samples());
-        if before.0 == ChartTab::Sample && samples > 0 {
+        if matches!(before.0, ChartTab::Sample | ChartTab::Surfaces) && samples > 0 {
             ui.add_space(space(2));
             let label = ui.label("Test sample");
             let mut number = view.chart.sample.min(samples - 1) + 1;
@@ -72,6 +73,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView) {
                 response.on_hover_text_at_pointer(&map.notes[[row, column]]);
             }
         }
+        Chart::Surfaces => surfaces_ui(ui, view, look, effects),
         Chart::None(reason) => placeholder_ui(ui, reason),
     }
     if (view.chart.tab, view.chart.target, view.chart.sample) != before {
