@@ -53,11 +53,13 @@ impl ChartTab {
         (Self::Map, "Error map"),
     ];
 
-    /// Charts offered for a network: surfaces only where targets have positions.
+    /// Charts offered for a network: surfaces where targets have positions, a map of errors where none has.
     pub(super) fn offered(trained: &Trained) -> Vec<(Self, &'static str)> {
         let has_positions = !matches!(trained.positions(), Positions::None);
         let mut offered = Self::ALL.to_vec();
-        offered.retain(|(tab, _)| has_positions || *tab != Self::Surfaces);
+        // Targets that have positions are no positions themselves.
+        let of_others = if has_positions { Self::Map } else { Self::Surfaces };
+        offered.retain(|(tab, _)| *tab != of_others);
         offered
     }
 

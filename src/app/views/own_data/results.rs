@@ -1,7 +1,7 @@
-use eframe::egui::{ComboBox, DragValue, Ui};
+use eframe::egui::{ComboBox, DragValue, Ui, UiBuilder};
 
 use super::{
-    charts::{Chart, ChartTab},
+    charts::{Chart, ChartChoice, ChartTab},
     state::OwnDataView,
     surfaces::surfaces_ui,
 };
@@ -11,6 +11,11 @@ use crate::app::{
     theme::{Theme, space},
     widgets::{placeholder_ui, tabs_ui},
 };
+
+/// Height of the card from which on a chart has room below the surfaces.
+const TALL: f32 = space(125);
+/// Share of the surfaces then.
+const SURFACES: f32 = 0.62;
 
 /// Charts of the network on show.
 pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effects: &mut Vec<Effect>) {
@@ -73,10 +78,33 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effect
                 response.on_hover_text_at_pointer(&map.notes[[row, column]]);
             }
         }
-        Chart::Surfaces => surfaces_ui(ui, view, look, effects),
+        Chart::Surfaces => surfaces_and_sample_ui(ui, view, look, effects),
         Chart::None(reason) => placeholder_ui(ui, reason),
     }
     if (view.chart.tab, view.chart.target, view.chart.sample) != before {
         ui.request_repaint();
+    }
+}
+
+/// The surfaces, and where there is room the values of all targets below them.
+fn surfaces_and_sample_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effects: &mut Vec<Effect>) {
+    let whole = ui.available_rect_before_wrap();
+    let values = ChartChoice {
+        tab: ChartTab::Sample,
+        ..view.chart
+    };
+    let values = view.shown.as_ref().map(|shown| values.chart(shown));
+    match values {
+        Some(Chart::Plots(figure)) if whole.height() > TALL => {
+            let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + (SURFACES * whole.height()).floor());
+            ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
+                surfaces_ui(ui, view, look, effects)
+            });
+            ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {
+                legend_ui(ui, &figure.keys);
+                plots_ui(ui, ChartTab::Sample.file_word(), &figure, Pointer::Moves);
+            });
+        }
+        _ => surfaces_ui(ui, view, look, effects),
     }
 }

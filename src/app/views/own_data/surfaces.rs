@@ -169,12 +169,14 @@ pub(super) fn surfaces_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
             );
         });
     }
+    // Below the line of the choices.
+    let scales = scales.with_min_y(scales.top() + space(7));
     let (parts, note) = (figure.scales(), figure.note());
     let height = scales.height() / parts.len().max(1) as f32;
     for (index, scale) in parts.iter().enumerate() {
         let top = scales.top() + height * index as f32;
         let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + height);
-        colour_scale_ui(ui, slot.shrink2(Vec2::new(0.0, space(2))), scale, &note, look, effects);
+        colour_scale_ui(ui, slot.shrink2(Vec2::new(0.0, space(1))), scale, &note, look, effects);
     }
     choice.drawn = Some(drawn);
 }
@@ -224,7 +226,7 @@ fn node_ui(ui: &mut Ui, target: &Channel, drawn: &Drawn, node: usize) {
         );
     });
     let unit = target.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
-    let [actual, decoded, error] = [actual, decoded, error].map(|node| format_number(node.z));
-    let text = format!("actual {actual}{unit}, decoded {decoded}{unit}, error {error}{unit}");
+    let [actual, decoded, error] = [actual, decoded, error].map(|node| format_number(node.z).replace('-', "−"));
+    let text = format!("actual {actual}, decoded {decoded}, error {error}{unit}");
     ui.label(RichText::new(text).size(type_size().note));
 }
