@@ -69,7 +69,10 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     } else if press.is_pressing() {
         dim_ui(ui, "Computing the readings…");
     } else {
-        dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
+        // The surface says so too: in a low window the error table comes first.
+        if ui.clip_rect().height() > space(70) {
+            dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
+        }
         return;
     }
     let back = ui.small_button("Back to the test set");
