@@ -57,7 +57,8 @@ pub fn describe_worse_than_ridge(targets: &[Channel], network: &[TargetErrors], 
     let worse = targets
         .iter()
         .zip(errors)
-        .filter(|(_, (network, ridge))| network.rmse > ridge.rmse);
+        // Of a target that is constant in the test samples nothing can be judged.
+        .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
     let warning = |(target, (network, ridge)): (&Channel, (&TargetErrors, &TargetErrors))| {
         format!(
             "for {} the network is worse than ridge regression (RMSE {} against {}): take ridge, record more samples, or use \

@@ -3,12 +3,13 @@
 use std::{fmt::Write as _, fs};
 
 use decoupler::{app::Notice, export::RecipeFile};
+use eframe::egui::vec2;
 use egui_kittest::kittest::NodeT as _;
 use tempfile::TempDir;
 
 use crate::{
     driver::Driver,
-    recordings::{opened, written},
+    recordings::{opened, recording, written},
 };
 
 /// Two readings of a press on 2 × 3 taxels, and the force.
@@ -178,4 +179,21 @@ fn positions_without_a_recording_say_what_to_open_first() {
     driver.train_own_data();
     driver.wait("the map", |driver| driver.has("Error over the position"));
     assert!(!driver.has("Surfaces"));
+}
+
+#[test]
+fn the_notes_of_a_square_plot_have_room_in_any_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(40));
+    for size in [vec2(1440.0, 900.0), vec2(1440.0, 760.0), vec2(1024.0, 700.0)] {
+        let mut driver = Driver::open_sized(size);
+        driver.open_recordings(&[&path]);
+        driver.limit_epochs("2");
+        driver.train_own_data();
+        driver.click("Regression");
+        driver.settle();
+        let places = driver.places();
+        let (text, place) = places.iter().find(|(text, _)| text.starts_with("Fitted line")).unwrap();
+        assert!(place.height() < 40.0, "at {size}, '{text}' is at {place:?}");
+    }
 }

@@ -98,7 +98,7 @@ fn surfaces_and_sample_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
         Some(Chart::Plots(figure)) if whole.height() > TALL => {
             let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + (SURFACES * whole.height()).floor());
             ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
-                surfaces_ui(ui, view, look, effects)
+                surfaces_ui(ui, view, look, effects);
             });
             ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {
                 legend_ui(ui, &figure.keys);
