@@ -16,7 +16,7 @@ use decoupler::{
     app::{DecouplerWindow, DialogKind, Effect, Phase, Shared},
     evaluation::SimulatedSettings,
     figure::{EpochOutline, loss_figure},
-    training::EpochRecord,
+    training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
 use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, pos2, vec2};
 
@@ -112,9 +112,16 @@ impl Bench {
     }
 }
 
+/// 8000 nodes.
+const LARGE: &str = "100x80_40x240";
+
 /// A training that does not end while it is measured.
 fn endless(scale: &str) -> SimulatedSettings {
     let mut settings = SimulatedSettings::default();
+    if scale == LARGE {
+        // Its epochs last long enough with any method.
+        settings.training.method = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
+    }
     settings.source.sensor.scale = scale.parse().expect("a scale");
     settings.training.stopping.epochs = 1_000_000;
     settings.training.stopping.min_gradient = 0.0;
@@ -174,7 +181,7 @@ fn main() {
     );
     bench.wait(|state| state.test().is_some());
     clock::print_head();
-    for scale in ["10x10_5x30", "20x20_5x60"] {
+    for scale in ["10x10_5x30", "20x20_5x60", LARGE] {
         let settings = endless(scale);
         bench.window.apply(Effect::Configure(Box::new(settings)));
         bench.wait(|state| {

@@ -324,12 +324,19 @@ impl Driver {
         }
     }
 
-    /// Asks for the export of this name in the menu: "Error table, CSV".
+    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is there: news may move the menu's
+    /// items away from under the pointer.
     #[track_caller]
     pub(crate) fn export(&mut self, name: &str) {
-        self.open_menu();
-        self.click_button(name);
-        self.harness.run_steps(SCROLLING);
+        for _ in 0..5 {
+            self.open_menu();
+            self.click_button(name);
+            self.harness.run_steps(SCROLLING);
+            if self.has("File") {
+                return;
+            }
+        }
+        panic!("no form came; the window shows {:#?}", self.texts());
     }
 
     /// Types `path` into the form of the export of this name and saves; waits for the answer.
