@@ -237,3 +237,35 @@ fn an_inspection_prints_layout_columns_and_times() {
     );
     assert!(text.contains('█') && text.contains("median interval"), "{text}");
 }
+
+#[test]
+fn positions_of_targets_are_told_kept_in_the_recipe_and_refused_by_line() {
+    let folder = recordings();
+    let positions = |text: &str| fs::write(folder.path().join("taxels.csv"), text).unwrap();
+    positions("target,x,y\nstates.c2,0,0\nstates.c3,4,0\n");
+    let arguments = TRAIN.replace("--unit states.c2=mm", "--positions taxels.csv");
+    let output = decoupler(&format!("{arguments} --save-recipe import.json"), folder.path());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("2 targets have positions: a grid of 2 × 1"), "{text}");
+    let report = json("train --recipe import.json --hidden 2 --epochs 3 --json", folder.path());
+    assert_eq!(report["positions"][1]["target"], "states.c3");
+    assert_eq!(report["positions"][1]["x_mm"], 4.0);
+
+    let units = format!("{TRAIN} --positions taxels.csv");
+    let message = failure(&units, folder.path(), 1);
+    assert!(
+        message.contains("states.c2 (mm) and states.c3 have positions and not the same unit"),
+        "{message}"
+    );
+    positions("target,x,y\nstates.c2,0,0\nstates.c4,4,0\n");
+    let message = failure(&arguments, folder.path(), 1);
+    assert!(
+        message.contains("'taxels.csv': line 3: there is no target 'states.c4'"),
+        "{message}"
+    );
+    let message = failure("inspect --data sensor.csv --positions taxels.csv", folder.path(), 2);
+    assert!(
+        message.contains("--positions needs --inputs and --targets"),
+        "{message}"
+    );
+}

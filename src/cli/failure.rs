@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::{interruption, specification_error::SpecificationError};
 use crate::{
     dataset::{ReadError, SimulationError, system_cause},
-    evaluation::{Preset, RunError, experiments::ExperimentError},
+    evaluation::{RunError, experiments::ExperimentError},
     export::{
         DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
     },
@@ -52,12 +52,8 @@ pub(super) enum Failure {
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
-    #[error("noise {noise}, preset {preset}: {cause}; only what was measured before is printed")]
-    TradeOffLevel {
-        noise: f64,
-        preset: Preset,
-        cause: Box<Failure>,
-    },
+    #[error("{place}: {cause}; only what was measured before is printed")]
+    TradeOff { place: String, cause: Box<Failure> },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
     #[error("interrupted")]

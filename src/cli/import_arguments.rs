@@ -73,6 +73,9 @@ pub(super) struct ImportArguments {
     /// Unit of a column, such as states.c2=mm; may be repeated [default: from a header such as "x (mm)"]
     #[arg(long, value_name = "COLUMN=UNIT", value_parser = assignment, requires = "data")]
     unit: Vec<(String, String)>,
+    /// Positions of the targets on the skin, for surfaces in the window: a table with the columns target,x,y (mm)
+    #[arg(long, value_name = "FILE", requires = "data")]
+    positions: Option<PathBuf>,
     /// Repeat the import that --save-recipe wrote
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
@@ -165,6 +168,7 @@ impl ImportArguments {
             (!self.conditions.is_empty(), "--where"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
+            (self.positions.is_some(), "--positions"),
             (self.save_recipe.is_some(), "--save-recipe"),
             (self.split.is_some(), "--split"),
             (self.test_fraction.is_some(), "--test-fraction"),
@@ -275,7 +279,13 @@ impl ImportArguments {
             conditions: self.conditions.clone(),
             missing: self.missing.clone(),
             units: self.unit.iter().cloned().collect(),
+            positions: self.positions.clone(),
         })
+    }
+
+    /// The recipe that is repeated.
+    pub(super) fn recipe(&self) -> Option<&Path> {
+        self.recipe.as_deref()
     }
 
     /// Writes the recipe, if that is asked for.

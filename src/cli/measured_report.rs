@@ -1,4 +1,8 @@
-use std::{collections::BTreeMap, io::Write, time::Duration};
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    time::Duration,
+};
 
 use serde::Serialize;
 
@@ -14,8 +18,8 @@ use crate::{
         CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
         recorded::{Determination, NonlinearGain},
     },
-    export::{MeasuredNetworkFile, describe_standings, describe_worse_than_ridge, format_duration},
-    import::{Channel, Dropped, Plan, PlannedSets, Recording},
+    export::{MeasuredNetworkFile, describe_positions, describe_standings, describe_worse_than_ridge, format_duration},
+    import::{Channel, Dropped, Plan, PlannedSets, Recording, TargetPosition},
     sensor::counted,
     training::StopReason,
 };
@@ -35,8 +39,21 @@ pub(super) struct Report {
     validation_samples: usize,
     test_samples: usize,
     dropped: Vec<Dropped>,
+    /// Positions of targets, for those that have one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    positions: Vec<Position>,
+    #[serde(skip)]
+    positions_text: Option<String>,
     #[serde(skip)]
     warnings: Vec<String>,
+}
+
+/// Position of a target on the skin.
+#[derive(Serialize)]
+struct Position {
+    target: String,
+    x_mm: f64,
+    y_mm: f64,
 }
 
 /// The object printed by `train --data --json`.
@@ -83,6 +100,8 @@ pub(super) struct Folds<'a> {
 }
 
 const NETWORK: &str = "network";
+/// The split by a file of test samples.
+const TEST_FILE: &str = "file";
 
 /// Name of the row of `table` with the lowest error for a target.
 fn best(table: &[TargetRow], target: usize) -> &'static str {
@@ -100,6 +119,12 @@ impl Report {
         let warnings: Vec<String> = recordings()
             .flat_map(|recording| recording.warnings.iter().cloned())
             .collect();
+        let recording = &sets.recording;
+        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| Position {
+            target: recording.targets[target].name.clone(),
+            x_mm,
+            y_mm,
+        };
         let samples = sets.split.training.samples();
         let validation_samples = sets.split.validation.as_ref().map_or(0, Dataset::samples);
         let test_samples = sets.test.samples();
@@ -107,7 +132,7 @@ impl Report {
             files: files(recordings()),
             inputs: sets.recording.inputs.clone(),
             split: match sets.test_recording {
-                Some(_) => "file".to_owned(),
+                Some(_) => TEST_FILE.to_owned(),
                 None => by.to_string(),
             },
             test_fraction: test_samples as f64 / (samples + validation_samples + test_samples) as f64,
@@ -118,8 +143,34 @@ impl Report {
             dropped: recordings()
                 .flat_map(|recording| recording.dropped.iter().cloned())
                 .collect(),
+            positions: recording.positions.iter().map(position).collect(),
+            positions_text: describe_positions(&recording.positions),
             warnings,
         }
+    }
+
+    /// Warnings of the import.
+    pub(super) fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// Returns `true` if the test samples have files of their own.
+    pub(super) fn has_test_file(&self) -> bool {
+        self.split == TEST_FILE
+    }
+
+    /// Writes the files, and how their samples are divided.
+    pub(super) fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        write_files(&self.files, self.rows, &self.dropped, out)?;
+        writeln!(
+            out,
+            "{} for training, {} for validation, {} for the test (split by {})",
+            counted(self.samples, "sample"),
+            self.validation_samples,
+            self.test_samples,
+            self.split
+        )?;
+        self.positions_text.iter().try_for_each(|text| writeln!(out, "{text}"))
     }
 }
 
@@ -179,15 +230,7 @@ pub(super) fn print(
         });
     }
     print_with(|out| {
-        write_files(&report.files, report.rows, &report.dropped, out)?;
-        writeln!(
-            out,
-            "{} for training, {} for validation, {} for the test (split by {})",
-            counted(report.samples, "sample"),
-            report.validation_samples,
-            report.test_samples,
-            report.split
-        )?;
+        report.write(out)?;
         writeln!(
             out,
             "{}, {}, {}, {}, seed {}",

@@ -57,9 +57,11 @@ pub(super) fn write_table(
         .max()
         .unwrap_or(0)
         .max(6);
+    let names = rows.iter().map(|(name, _)| name.chars().count());
+    let name_width = names.max().unwrap_or(0).max(8);
     writeln!(
         out,
-        "{:<width$}  {:<8}{:>11}{:>11}{:>9}{:>11}{:>11}",
+        "{:<width$}  {:<name_width$}{:>11}{:>11}{:>9}{:>11}{:>11}",
         "target", "", "RMSE", "MAE", "R²", "worst", "% of range"
     )?;
     for (index, channel) in channels.iter().enumerate() {
@@ -70,7 +72,7 @@ pub(super) fn write_table(
                 |value: Option<f64>, digits| value.map_or("–".to_owned(), |value| format!("{value:.digits$}"));
             writeln!(
                 out,
-                "{title:<width$}  {name:<8}{:>11}{:>11}{:>9}{:>11}{:>11}",
+                "{title:<width$}  {name:<name_width$}{:>11}{:>11}{:>9}{:>11}{:>11}",
                 format_number(errors.rmse),
                 format_number(errors.mae),
                 or_none(errors.r2, 4),

@@ -28,7 +28,7 @@ pub(super) struct SceneArguments {
     /// :cylinder, :edge)
     #[arg(long, value_name = "random|smooth:MM|indenter")]
     loading: Option<Loading>,
-    /// Quantity that the network reads; of own data (train --data) the columns, separated by commas
+    /// Quantity that the network reads; of own data (--data) the columns, separated by commas
     #[arg(long, value_name = "resistance|conductance|log", value_delimiter = ',')]
     inputs: Vec<String>,
     /// Scaling of the inputs: each to its range, or whitened principal components
@@ -135,12 +135,6 @@ impl SceneArguments {
         ];
         if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
             return refuse(argument, "own data (--data) have their own noise already; leave it out");
-        }
-        if !self.decoder.is_empty() {
-            return refuse(
-                "--decoder",
-                "own data (--data) are tested with the mean, ridge and the network; leave it out",
-            );
         }
         let rows = match self.rows {
             None | Some(Rows::All) => RowModel::Shared,

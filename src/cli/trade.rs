@@ -3,49 +3,57 @@ use clap::Args;
 use super::{
     announcement::announce_workload,
     failure::Failure,
+    import_arguments::ImportArguments,
     interruption::Graceful,
     output::progress_bar,
     parsers::{count, number, seed},
     scene_arguments::SceneArguments,
     trade_report::{Limits, print_json, print_text},
+    training_arguments::method,
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
     evaluation::{Preset, SimulatedSettings, TradeOffLevel, TradeOffPoint, Workload, measure_trade_off},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
-    training::StoppingRules,
+    training::{Method, StoppingRules},
 };
 
 /// Measure speed against accuracy of every decoder
 ///
 /// Trains networks of both presets with several numbers of hidden nodes, at several levels of noise, and prints for each
 /// decoder its error, its time for a frame (median of many, one thread) and its training time, with the choices that no
-/// other beats, and the command for each choice asked for.
+/// other beats, and the command for each choice asked for. With --data it does so on samples of a real sensor from files, for
+/// the decoders that need no model of the sensor.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Trade {
     #[command(flatten)]
-    scene: SceneArguments,
-    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
-    #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
-    array: ArrayScale,
+    pub(super) scene: SceneArguments,
+    #[command(flatten)]
+    pub(super) import: ImportArguments,
+    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
+    #[arg(long, value_name = "SCALE")]
+    pub(super) array: Option<ArrayScale>,
     /// Hidden nodes of the networks
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
-    hidden: Vec<usize>,
-    /// Maximum number of epochs [default: those of the preset]
+    pub(super) hidden: Vec<usize>,
+    /// Training methods of the networks, of own data [default: br]; a simulated sensor has those of its presets
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method())]
+    pub(super) method: Vec<Method>,
+    /// Maximum number of epochs [default: those of the preset; of own data 300]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
-    epochs: Option<usize>,
+    pub(super) epochs: Option<usize>,
     /// Training samples [default: those of the preset]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
-    samples: Option<usize>,
-    /// Test samples, on which the errors are measured
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
-    test_samples: usize,
+    pub(super) samples: Option<usize>,
+    /// Test samples, on which the errors are measured [default: 100]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    pub(super) test_samples: Option<usize>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
-    seed: u64,
-    /// Also print the fastest decoder whose Z error is at most this many percent
+    pub(super) seed: u64,
+    /// Also print the fastest decoder whose error is at most this many percent: of z, or of own data's ranges
     #[arg(long, value_name = "PERCENT", value_parser = number)]
     under_percent: Option<f64>,
     /// Also print the most accurate decoder that takes at most this many microseconds for a frame
@@ -53,11 +61,19 @@ pub(super) struct Trade {
     under_us: Option<f64>,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl Trade {
     pub(super) fn run(self) -> Result<(), Failure> {
+        if self.import.is_given() {
+            return self.run_measured();
+        }
+        self.import.check_unused()?;
+        if !self.method.is_empty() {
+            let message = "--method: the presets name the methods of a simulated sensor; leave it out, or give --data";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
         let noises = match &self.scene.noise[..] {
             [] => vec![0.0, 1e-4, 1e-3, 1e-2],
             given => given.to_vec(),
@@ -89,16 +105,9 @@ impl Trade {
         });
         bar.finish_and_clear();
         drop(graceful);
-        let limits = Limits {
-            percent: self.under_percent,
-            microseconds: self.under_us,
-        };
         if end.is_ok() || !levels.is_empty() {
-            if self.json {
-                print_json(self.array, &levels, limits)?;
-            } else {
-                print_text(self.array, &levels, limits)?;
-            }
+            let print = if self.json { print_json } else { print_text };
+            print(self.array(), &levels, self.limits())?;
         }
         if end? {
             return Ok(());
@@ -107,11 +116,22 @@ impl Trade {
         Err(Failure::InterruptedTrade { done })
     }
 
+    pub(super) fn limits(&self) -> Limits {
+        Limits {
+            percent: self.under_percent,
+            microseconds: self.under_us,
+        }
+    }
+
+    fn array(&self) -> ArrayScale {
+        self.array.unwrap_or_default()
+    }
+
     fn settings(&self, preset: Preset, noise: f64) -> Result<SimulatedSettings, Failure> {
         let mut settings = self.scene.settings_at(preset, Some(noise))?;
-        settings.source.sensor = SensorModel::new(self.array);
+        settings.source.sensor = SensorModel::new(self.array());
         settings.source.samples = self.samples.unwrap_or(settings.source.samples);
-        settings.source.test_samples = self.test_samples;
+        settings.source.test_samples = self.test_samples.unwrap_or(settings.source.test_samples);
         settings.seed = Seed(self.seed);
         let stopping = &mut settings.training.stopping;
         stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
@@ -142,8 +162,8 @@ fn measure_levels(
             // Nothing is lost that would need words.
             Err((_, cause)) if levels.is_empty() => return (levels, Err(cause)),
             Err((preset, cause)) => {
-                let cause = Box::new(cause);
-                return (levels, Err(Failure::TradeOffLevel { noise, preset, cause }));
+                let (place, cause) = (format!("noise {noise}, preset {preset}"), Box::new(cause));
+                return (levels, Err(Failure::TradeOff { place, cause }));
             }
         }
     }

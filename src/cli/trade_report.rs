@@ -23,6 +23,18 @@ pub(super) struct Limits {
     pub(super) microseconds: Option<f64>,
 }
 
+/// Legend of the marks behind the lines of the table.
+pub(super) const FRONTS: &str = "* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
+                                 Training time is the sum over all rows and starts.";
+
+/// Word for a precision.
+pub(super) fn precision_word(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Double => "f64",
+        Precision::Single => "f32",
+    }
+}
+
 /// For each point, true if it is on the Pareto front of decoding time and on that of training time.
 fn fronts(level: &TradeOffLevel) -> Vec<(bool, bool)> {
     let decoding = level.front(TradeOffCost::Decoding).into_iter();
@@ -105,12 +117,13 @@ struct PointReport {
     command: String,
 }
 
+/// The best point within a limit.
 #[derive(Serialize)]
-struct Choice {
-    limit: f64,
+pub(super) struct Choice {
+    pub(super) limit: f64,
     /// Index of the point; none if no point is within the limit.
-    point: Option<usize>,
-    command: Option<String>,
+    pub(super) point: Option<usize>,
+    pub(super) command: Option<String>,
 }
 
 /// The fastest and the most accurate point within `limits`, for those given.
@@ -136,10 +149,7 @@ pub(super) fn print_json(array: ArrayScale, levels: &[TradeOffLevel], limits: Li
     let point = |(point, (on_decoding_front, on_training_front)): (&TradeOffPoint, (bool, bool))| PointReport {
         preset: point.preset.to_string(),
         decoder: point.report.kind.to_string(),
-        precision: match point.report.precision {
-            Precision::Double => "f64",
-            Precision::Single => "f32",
-        },
+        precision: precision_word(point.report.precision),
         hidden: point.hidden(),
         z_percent: point.report.errors.z_percent,
         z_mm: point.report.errors.z_mm,
@@ -183,11 +193,7 @@ fn write_text(array: ArrayScale, levels: &[TradeOffLevel], limits: Limits, out: 
     for level in levels {
         write_level(level, limits, out)?;
     }
-    writeln!(
-        out,
-        "\n* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
-         Training time is the sum over all rows and starts."
-    )
+    writeln!(out, "\n{FRONTS}")
 }
 
 fn write_level(level: &TradeOffLevel, limits: Limits, out: &mut impl Write) -> io::Result<()> {

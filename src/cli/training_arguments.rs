@@ -86,31 +86,17 @@ impl TrainingArguments {
     /// Settings of a new run on own data.
     pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
         let (rows, scaling) = self.scene.measured(has_row_wires)?;
-        let given = [
-            (
-                self.array.is_some(),
-                "--array",
-                "own data (--data) have no array; leave it out",
-            ),
-            (
-                self.samples.is_some(),
-                "--samples",
-                "all rows of own data (--data) are used; choose some with --where",
-            ),
-            (
-                self.test_samples.is_some(),
-                "--test-samples",
-                "of own data (--data) a share tests; give --test-fraction or --test-data",
-            ),
-            (
-                self.validation_samples.is_some(),
-                "--validation-samples",
-                "of own data (--data) a share is held out; give --validation-fraction",
-            ),
-        ];
-        if let Some((_, argument, reason)) = given.into_iter().find(|(is_given, ..)| *is_given) {
-            return Err(Failure::Arguments(format!("{argument}: {reason}")));
+        if !self.scene.decoder.is_empty() {
+            let message = "--decoder: own data (--data) are tested with the mean, ridge and the network; leave it out, or \
+                           use trade";
+            return Err(Failure::Arguments(message.to_owned()));
         }
+        refuse_beside_own_data([
+            self.array.is_some(),
+            self.samples.is_some(),
+            self.test_samples.is_some(),
+            self.validation_samples.is_some(),
+        ])?;
         let default = RunSettings::from(Measured { rows });
         Ok(RunSettings {
             inputs: InputChoice {
@@ -214,7 +200,30 @@ impl TrainingArguments {
     }
 }
 
-fn method() -> impl TypedValueParser<Value = Method> {
+/// Refuses arguments that belong to a simulated sensor, given in this order: array, training, test and validation samples.
+pub(super) fn refuse_beside_own_data(are_given: [bool; 4]) -> Result<(), Failure> {
+    let arguments = [
+        ("--array", "own data (--data) have no array; leave it out"),
+        (
+            "--samples",
+            "all rows of own data (--data) are used; choose some with --where",
+        ),
+        (
+            "--test-samples",
+            "of own data (--data) a share tests; give --test-fraction or --test-data",
+        ),
+        (
+            "--validation-samples",
+            "of own data (--data) a share is held out; give --validation-fraction",
+        ),
+    ];
+    match arguments.iter().zip(are_given).find(|(_, is_given)| *is_given) {
+        Some(((argument, reason), _)) => Err(Failure::Arguments(format!("{argument}: {reason}"))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn method() -> impl TypedValueParser<Value = Method> {
     let names = Method::all().map(|method| method.short_name());
     PossibleValuesParser::new(names).map(|name| {
         let mut methods = Method::all().into_iter();

@@ -65,10 +65,21 @@ pub struct DecoderCost {
 impl DecoderReport {
     /// Returns the name in files, such as `network_f32`.
     pub fn name(&self) -> String {
-        match self.precision {
-            Precision::Double => self.kind.to_string(),
-            Precision::Single => format!("{}_f32", self.kind),
-        }
+        name_in_files(self.kind, self.precision)
+    }
+}
+
+impl TargetReport {
+    /// Returns the name in files, such as `network_f32`.
+    pub fn name(&self) -> String {
+        name_in_files(self.kind, self.precision)
+    }
+}
+
+fn name_in_files(kind: DecoderKind, precision: Precision) -> String {
+    match precision {
+        Precision::Double => kind.to_string(),
+        Precision::Single => format!("{kind}_f32"),
     }
 }
 

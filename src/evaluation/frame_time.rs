@@ -14,6 +14,15 @@ pub fn network_frame_time(run: &Run) -> Option<Duration> {
     Some(Duration::from_secs_f64(1e-6 * microseconds))
 }
 
+/// Returns what [`DecoderCost::frame_us`](super::DecoderCost::frame_us) is the time of, measured on `test`: "a sample", or
+/// "a frame of 4 row-wires".
+pub fn decoded_unit(test: &Dataset) -> String {
+    match (test.frames(), test.row_count()) {
+        (Ok(_), rows @ 2..) => format!("a frame of {rows} row-wires"),
+        _ => "a sample".to_owned(),
+    }
+}
+
 /// Returns the time in microseconds to decode a frame of `test`, or a sample if `test` does not consist of whole
 /// frames: the median over blocks of frames, each long enough for the clock.
 pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {

@@ -42,6 +42,7 @@ mod start_trainer;
 mod starts;
 mod table;
 mod target_errors;
+mod target_trade_off;
 mod task;
 mod trade;
 mod trade_level;
@@ -52,7 +53,7 @@ pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet, TargetReport};
 pub use errors::{Errors, NodeAddress};
 pub use fine_tuning::fine_tune;
-pub use frame_time::network_frame_time;
+pub use frame_time::{decoded_unit, network_frame_time};
 pub use known_presses::{pressed_rows, rebased};
 pub use missing_figures::MissingFigures;
 pub use node_spread::node_rms_mm;
@@ -75,7 +76,8 @@ pub use start_trainer::StartTrainer;
 pub use starts::{StartRecord, best_start};
 pub use table::{ErrorRow, error_rows};
 pub use target_errors::{TargetErrors, TargetRow};
-#[cfg(feature = "figures")]
+pub use target_trade_off::{TargetTradeOffPoint, measure_target_trade_off};
+#[cfg(any(feature = "cli", feature = "figures"))]
 pub(crate) use trade::pareto_front;
 pub use trade::{TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
 pub use trade_level::{TradeOffCost, TradeOffLevel, TradeOffLimits};

@@ -48,7 +48,9 @@ pub use measured_checkpoint::MeasuredCheckpointFile;
 pub use measured_network::MeasuredNetworkFile;
 pub use network_file::{NetworkFile, TrainingRecord};
 pub use recipe_file::RecipeFile;
-pub use recorded_words::{describe_standings, describe_target, describe_warnings, describe_worse_than_ridge};
+pub use recorded_words::{
+    describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
+};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};

@@ -4,7 +4,7 @@ use crate::{
         TargetErrors,
         recorded::{Determination, Findings, Standing, TargetFindings},
     },
-    import::Channel,
+    import::{Channel, TargetPosition},
 };
 
 /// Warns of targets that the readings do not tell, or hardly, by what was measured of each.
@@ -17,6 +17,19 @@ pub fn describe_standings(targets: &[Channel], told: &[Option<Determination>]) -
         Some(told) => (told.standing() != Standing::Told).then(|| told.sentence(&target.name)),
     };
     targets.iter().zip(told).filter_map(of).collect()
+}
+
+/// Says how many targets have positions, and whether these are a grid; `None` if none has one.
+pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
+    let count = match positions.len() {
+        0 => return None,
+        1 => "1 target has a position".to_owned(),
+        count => format!("{count} targets have positions"),
+    };
+    Some(match TargetPosition::lattice(positions) {
+        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm().len(), lattice.y_mm().len()),
+        None => format!("{count}, which are no grid of every x with every y: no surface is laid through them"),
+    })
 }
 
 /// Says how well the readings tell a target, by the better of network and ridge.
@@ -44,7 +57,8 @@ pub fn describe_worse_than_ridge(targets: &[Channel], network: &[TargetErrors], 
     let worse = targets
         .iter()
         .zip(errors)
-        .filter(|(_, (network, ridge))| network.rmse > ridge.rmse);
+        // Of a target that is constant in the test samples nothing can be judged.
+        .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
     let warning = |(target, (network, ridge)): (&Channel, (&TargetErrors, &TargetErrors))| {
         format!(
             "for {} the network is worse than ridge regression (RMSE {} against {}): take ridge, record more samples, or use \

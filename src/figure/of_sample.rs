@@ -23,6 +23,9 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
             100.0 * (value - low) / (high - low)
         }
     };
+    let has_names = targets.len() <= MOST_NAMES;
+    // Targets that are not named are counted from 1.
+    let first = if has_names { 0.0 } else { 1.0 };
     let series = |name: &str, look: Look, values: &[f64]| {
         let points = values.iter().enumerate().map(|(target, &value)| {
             let unit = targets[target]
@@ -36,7 +39,7 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
                     format_number(value)
                 )),
                 item: Some(target),
-                ..PlotPoint::from([target as f64, place(target, value)])
+                ..PlotPoint::from([first + target as f64, place(target, value)])
             }
         });
         Series {
@@ -54,14 +57,14 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
         None => "value".to_owned(),
     };
     let x = PlotAxis::linear("target");
-    let x = if targets.len() <= MOST_NAMES {
+    let x = if has_names {
         x.ticked(TickRule::Names(
             targets.iter().map(|target| target.name.clone()).collect(),
         ))
     } else {
         x.ticked(TickRule::Whole)
     };
-    let ends = [-0.5, targets.len() as f64 - 0.5];
+    let ends = [first - 0.5, first + targets.len() as f64 - 0.5];
     PlotFigure {
         keys: series
             .iter()
@@ -103,5 +106,25 @@ mod tests {
             apart.plots[0].series[1].points[1].note.as_deref(),
             Some("f\ndecoded: -1.00 mm")
         );
+    }
+
+    #[test]
+    fn many_targets_are_counted_from_one() {
+        let channel = Channel {
+            name: "t".to_owned(),
+            unit: None,
+        };
+        let places = |count: usize| -> Vec<f64> {
+            let values = vec![0.5; count];
+            let figure = sample_figure(
+                &vec![channel.clone(); count],
+                &values,
+                &values,
+                &vec![(0.0, 1.0); count],
+            );
+            figure.plots[0].series[0].points.iter().map(|point| point.x).collect()
+        };
+        assert_eq!(places(3), [0.0, 1.0, 2.0], "these stand at their names");
+        assert_eq!(places(13), Vec::from_iter((1..=13).map(f64::from)));
     }
 }

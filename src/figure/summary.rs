@@ -124,17 +124,14 @@ impl Surface {
         let hundredths = |value: f64| format!("{value:.2}").replace('-', "−");
         let number = |value: f64| format_number(value).replace('-', "−");
         let (low, high) = (lowest.z, highest.z);
-        let range = match self.quantity {
-            Quantity::Height => format!("z {} to {} mm", hundredths(low), hundredths(high)),
-            Quantity::Error => format!("error {} to {} mm", hundredths(low), hundredths(high)),
-            Quantity::Pattern => format!("pattern {} to {}", number(low), number(high)),
-            Quantity::Sensitivity => format!("sensitivity {} to {} per mm", number(low), number(high)),
-        };
+        let range = self.quantity.range_text((low, high), hundredths, number);
         let (what, furthest) = match self.quantity {
             Quantity::Height => ("lowest", lowest),
-            Quantity::Sensitivity => ("largest", highest),
-            Quantity::Error | Quantity::Pattern if -low > high => ("furthest from zero", lowest),
-            Quantity::Error | Quantity::Pattern => ("furthest from zero", highest),
+            Quantity::Sensitivity | Quantity::Target(_) => ("largest", highest),
+            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) if -low > high => {
+                ("furthest from zero", lowest)
+            }
+            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) => ("furthest from zero", highest),
         };
         let nodes = counted(self.nodes.len(), "node");
         if low == high {

@@ -2,7 +2,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
-use super::Cure;
+use super::{Cure, PositionsError};
 use crate::dataset::{DatasetError, DivisionError, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
@@ -118,6 +118,14 @@ pub enum ImportError {
         name: String,
         /// The first value at fault.
         value: f64,
+    },
+    /// A file of positions cannot be used.
+    #[error("'{}': {source}", .path.display())]
+    Positions {
+        /// The file.
+        path: PathBuf,
+        /// Its defect.
+        source: PositionsError,
     },
     /// The samples do not make a set.
     #[error(transparent)]

@@ -7,6 +7,7 @@ use super::{
     join::{Partners, median_interval, nearest},
     meanings::Meanings,
     names::{ColumnId, Names},
+    positions::read_positions,
     read::read,
     selection::{Rows, not_a_number},
     table::stem,
@@ -51,6 +52,10 @@ impl Recipe {
         let row_wires = rows.row_wires(&kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
+        let positions = match &self.positions {
+            Some(file) => read_positions(&folder.join(file), &targets, watch)?,
+            None => Vec::new(),
+        };
         let reports = rows.reports();
         let total = files[0].1.rows + files[0].1.too_long.rows;
         let partners: Vec<Option<Vec<Option<u32>>>> = joins
@@ -69,6 +74,7 @@ impl Recipe {
             set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
             inputs,
             targets,
+            positions,
             times,
             has_groups: self.group.is_some(),
             rows: total,

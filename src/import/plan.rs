@@ -51,13 +51,32 @@ impl Plan {
     /// If the files cannot be imported or the samples not be divided.
     pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
         let recording = self.recording(folder, watch)?;
-        let set = &recording.set;
-        let mut rng = seed.rng(Stream::Split);
         let test_recording = match &self.test {
             None => None,
             Some(files) => Some(self.import.of_test(files)?.import(folder, watch)?),
         };
-        let (split, test) = match &test_recording {
+        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
+        Ok(PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        })
+    }
+
+    /// Divides samples that were imported before; `seed` is that of the run.
+    ///
+    /// # Errors
+    /// If the samples cannot be divided.
+    pub fn divide(
+        &self,
+        recording: &Recording,
+        test_recording: Option<&Recording>,
+        seed: Seed,
+    ) -> Result<(Split, Dataset), ImportError> {
+        let set = &recording.set;
+        let mut rng = seed.rng(Stream::Split);
+        Ok(match test_recording {
             None => {
                 let parts = self.division.divide(set, &mut rng)?;
                 (parts.split(set), parts.test_set(set))
@@ -67,12 +86,6 @@ impl Plan {
                 let read = set.row_wires_read().unwrap_or_default();
                 (parts.split(set), recording.set.clone().among_rows(read)?)
             }
-        };
-        Ok(PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
         })
     }
 
@@ -118,6 +131,7 @@ impl Plan {
             .join
             .iter_mut()
             .for_each(|joined| joined.file = of(&joined.file));
+        plan.import.positions.iter_mut().for_each(|file| *file = of(file));
         if let Some(test) = &mut plan.test {
             test.data = of(&test.data);
             test.join.iter_mut().for_each(|file| *file = of(file));

@@ -41,6 +41,10 @@ pub struct Recipe {
     /// Units of columns, where the header does not give them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
+    /// File with the positions of targets on the skin, relative to the folder of the recipe: a table with the columns
+    /// target, x and y (mm).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub positions: Option<PathBuf>,
 }
 
 /// A file joined to another, row by row or by time.

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Excess, Format};
+use super::{Excess, Format, TargetPosition};
 use crate::dataset::Dataset;
 
 /// Measured samples with the meaning of their columns.
@@ -15,6 +15,8 @@ pub struct Recording {
     pub inputs: Vec<Channel>,
     /// Names and units of the targets.
     pub targets: Vec<Channel>,
+    /// Positions of targets on the skin, for those that have one.
+    pub positions: Vec<TargetPosition>,
     /// Time of each sample, if there is a column of times.
     pub times: Option<Vec<f64>>,
     /// `true` if the samples are grouped by a column.

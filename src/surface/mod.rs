@@ -3,11 +3,12 @@
 //! The positions of the nodes in (x, y) are fixed, so the interpolation is factored once per array and each frame is
 //! one matrix-vector product. A [`SurfaceMap`] evaluates it on a [`Grid`]: as a thin-plate spline, as a curve where the
 //! nodes are on one line, bilinearly where neither is feasible. All of them reproduce constants and planes, and none
-//! depends on the unit of length or the origin.
+//! depends on the unit of length or the origin. [`Lattice`] finds the lines of a lattice among places in any order.
 
 mod bilinear;
 mod error;
 mod grid;
+mod lattice;
 mod map;
 mod natural_cubic;
 mod thin_plate;
@@ -15,4 +16,5 @@ mod weights;
 
 pub use error::{Axis, SurfaceError};
 pub use grid::Grid;
+pub use lattice::Lattice;
 pub use map::{Interpolation, SurfaceMap};

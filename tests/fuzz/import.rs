@@ -1,6 +1,6 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler::import::{Cells, DialectChoice, Inspection, Recipe, read_table};
+use decoupler::import::{Cells, DialectChoice, Inspection, Recipe, TargetPosition, holds_positions, read_table};
 
 use crate::{
     corpus::replay,
@@ -54,18 +54,51 @@ fn check(bytes: &[u8], path: &Path) {
     }
 }
 
+/// Reads the file as positions of the targets of a recording.
+fn check_positions(path: &Path, recording: &Path) {
+    holds_positions(path);
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let recipe = Recipe {
+        data: recording.to_owned(),
+        inputs: names(&["u"]),
+        targets: names(&["d1", "d2"]),
+        positions: Some(path.to_owned()),
+        ..Recipe::default()
+    };
+    if let Ok(read) = recipe.import(Path::new(""), &mut |_| ControlFlow::Continue(())) {
+        let at = |place: &TargetPosition| (place.target, place.x_mm.is_finite() && place.y_mm.is_finite());
+        let places = Vec::from_iter(read.positions.iter().map(at));
+        assert!(
+            [
+                &[(0, true)][..],
+                &[(1, true)],
+                &[(0, true), (1, true)],
+                &[(1, true), (0, true)]
+            ]
+            .contains(&&places[..])
+        );
+        TargetPosition::lattice(&read.positions);
+    }
+}
+
 #[test]
 fn any_input() {
     let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("recording.csv");
+    fs::write(&recording, "u,d1,d2\n1,2,3\n4,5,6\n").unwrap();
     // By its ending, a file that has lost its beginning is still taken for a MAT-file.
     let paths = ["data.csv", "data.mat"].map(|name| folder.path().join(name));
     replay!(|bytes: &[u8]| {
         for path in &paths {
             check(bytes, path);
+            check_positions(path, &recording);
         }
         for_each_seed(40, |rng| {
             let bytes = mutated(bytes, rng);
-            paths.iter().for_each(|path| check(&bytes, path));
+            for path in &paths {
+                check(&bytes, path);
+                check_positions(path, &recording);
+            }
         });
     });
 }

@@ -19,6 +19,7 @@ mod looking;
 mod newcomer;
 mod own_data;
 mod own_findings;
+mod own_surfaces;
 mod pictures;
 mod pressing;
 mod reading_errors;

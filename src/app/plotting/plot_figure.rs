@@ -86,10 +86,16 @@ pub fn legend_behind_ui(ui: &mut Ui, keys: &[Key]) -> bool {
     has_room
 }
 
-/// The plots side by side over the space that is left, and the notes: beside a square plot, else above.
+/// Least width of the notes beside a square plot.
+const NOTES_WIDTH: f32 = space(36);
+
+/// The plots side by side over the space that is left, and the notes: beside a square plot that leaves room for them, else
+/// above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
-    if !is_square {
+    let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
+    let are_notes_beside = is_square && left_by_square >= NOTES_WIDTH;
+    if !are_notes_beside {
         notes_ui(ui, figure);
     }
     let whole = ui.available_rect_before_wrap();
@@ -120,7 +126,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
         drawn
     });
     let plots = plots.collect();
-    if is_square {
+    if are_notes_beside {
         let beside = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
         notes_ui(&mut ui.new_child(UiBuilder::new().max_rect(beside)), figure);
     }

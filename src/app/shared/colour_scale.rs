@@ -45,7 +45,9 @@ pub fn colour_scale_ui(
         });
     });
     let state = match scale.quantity {
-        Quantity::Height if look.heights == HeightScale::Fitted => " It fits the heights on show.",
+        Quantity::Height | Quantity::Target(_) if look.heights == HeightScale::Fitted => {
+            " It fits the heights on show."
+        }
         Quantity::Error if look.error_limit_mm.is_some() => " It is locked.",
         _ => "",
     };
@@ -71,12 +73,19 @@ fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) 
         }
     }
     match scale.quantity {
-        Quantity::Height => {
+        Quantity::Height | Quantity::Target(_) => {
             let is_locked = look.heights == HeightScale::Stroke;
             let meanings = [
                 "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
                 "Spans the heights on show: small differences are seen, and colours change their meaning.",
             ];
+            let meanings = match scale.quantity {
+                Quantity::Height => meanings,
+                _ => [
+                    "Spans the values of all test samples: colours mean the same for every sample.",
+                    "Spans the values on show: small differences are seen, and colours change their meaning.",
+                ],
+            };
             if let Some(locked) = lock_ui(ui, is_locked, meanings) {
                 changed.heights = if locked {
                     HeightScale::Stroke
@@ -93,7 +102,8 @@ fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) 
                 changed.error_limit_mm = locked.then_some(limit_mm);
             }
         }
-        Quantity::Pattern | Quantity::Sensitivity => {}
+        // The limit of errors is in millimetres, which these are not.
+        Quantity::Pattern | Quantity::Sensitivity | Quantity::TargetError(_) => {}
     }
 }
 

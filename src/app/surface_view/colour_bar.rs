@@ -51,7 +51,7 @@ impl ColourBar<'_> {
             return response;
         };
         let bar = Rect::from_min_max(to_egui(drawing.bar.min), to_egui(drawing.bar.max));
-        let map = self.theme.colours(self.scale.quantity, self.scale.colours);
+        let map = self.theme.colours(&self.scale.quantity, self.scale.colours);
         let mut mesh = Mesh::default();
         for strip in 0..=STRIPS {
             let part = strip as f32 / STRIPS as f32;

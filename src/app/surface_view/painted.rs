@@ -54,7 +54,7 @@ impl Painted {
             &Card {
                 bounds: bounds(rect),
                 measure: &|text| measure(ui.painter(), text),
-                colours: theme.colours(surface.quantity, surface.colours),
+                colours: theme.colours(&surface.quantity, surface.colours),
             },
         );
         Self {

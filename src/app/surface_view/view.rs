@@ -10,7 +10,7 @@ use crate::{
     app::theme::{Theme, type_size},
     export::format_number,
     figure::{
-        surface::{OrbitCamera, Quantity, Section, Sight, Surface, ViewMode},
+        surface::{OrbitCamera, Section, Sight, Surface, ViewMode},
         ticks::tick_text,
     },
 };
@@ -133,14 +133,8 @@ impl SurfaceView<'_> {
             let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
             let millimetres = |value: f64| tick_text(value, 0.01);
             node.set_value(if low <= high {
-                match self.surface.quantity {
-                    Quantity::Height => format!("z {} to {} mm", millimetres(low), millimetres(high)),
-                    Quantity::Error => format!("error {} to {} mm", millimetres(low), millimetres(high)),
-                    Quantity::Pattern => format!("pattern {} to {}", format_number(low), format_number(high)),
-                    Quantity::Sensitivity => {
-                        format!("sensitivity {} to {} per mm", format_number(low), format_number(high))
-                    }
-                }
+                let quantity = &self.surface.quantity;
+                quantity.range_text((low, high), millimetres, format_number)
             } else {
                 "no values".to_owned()
             });

@@ -61,7 +61,7 @@ impl Theme {
     }
 
     /// Colours of the values of a surface; `sequential` are those of values that do not diverge.
-    pub fn colours(&self, quantity: Quantity, sequential: SequentialMap) -> &ColourMap {
+    pub fn colours(&self, quantity: &Quantity, sequential: SequentialMap) -> &ColourMap {
         if quantity.is_diverging() {
             &self.errors
         } else {

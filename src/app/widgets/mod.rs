@@ -27,6 +27,6 @@ pub use refusal::refusal_ui;
 pub use scrolled_table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui};
 pub use slider::slider_ui;
 pub use snapshot::snapshot_ui;
-pub use table::{Column, Row, captioned_table_ui, table_ui};
+pub use table::{Column, Row, TableWidths, captioned_table_ui, table_ui};
 pub use text_field::text_ui;
 pub use value_under::{take_claim, take_value_under, value_under};

@@ -28,19 +28,24 @@ pub struct Row {
 
 /// Lays out the table over the available width, in smaller type where that is narrow.
 pub fn table_ui(ui: &mut Ui, columns: &[Column], rows: &[Row]) {
-    captioned_table_ui(ui, "", columns, rows);
+    let widths = TableWidths::fitting(ui, columns, &Vec::from_iter(rows));
+    captioned_table_ui(ui, "", columns, rows, &widths);
+}
+
+/// Type size and widths of a table, or of several below each other.
+pub struct TableWidths {
+    size: f32,
+    names: f32,
+    columns: Vec<f32>,
 }
 
 /// As [`table_ui`], for one of several tables that differ by `caption`: assistive technology reads it with every figure.
-pub fn captioned_table_ui(ui: &mut Ui, caption: &str, columns: &[Column], rows: &[Row]) {
+/// With the same `widths` their columns are aligned.
+pub fn captioned_table_ui(ui: &mut Ui, caption: &str, columns: &[Column], rows: &[Row], widths: &TableWidths) {
     let palette = Theme::of(ui).palette;
     let whole = ui.available_width();
     let row_height = space(6);
-    let (size, names, widths) = [type_size().note, type_size().small]
-        .map(|size| measured(ui, columns, rows, size))
-        .into_iter()
-        .reduce(|normal, small| if total_width(&normal) > whole { small } else { normal })
-        .expect("two sizes were measured");
+    let (size, names, widths) = (widths.size, widths.names, &widths.columns);
     // What is left over is shared among the gaps before the columns.
     let gap = ((whole - names - widths.iter().sum::<f32>()) / columns.len() as f32).max(space(1));
     let line = |ui: &mut Ui, cells_ui: &mut dyn FnMut(&mut Ui, usize, Rect), is_last: bool| {
@@ -115,41 +120,54 @@ fn mark_ui(ui: &mut Ui, name: Rect, meaning: &'static str) {
     response.on_hover_text(meaning);
 }
 
-/// The type size, the width of the names, and that of each column.
-type Measured = (f32, f32, Vec<f32>);
+impl TableWidths {
+    /// Widths that the cells of all `rows` fit into, in smaller type where there is less room.
+    pub fn fitting(ui: &Ui, columns: &[Column], rows: &[&Row]) -> Self {
+        let normal = Self::of(ui, columns, rows, type_size().note);
+        if normal.total() > ui.available_width() {
+            Self::of(ui, columns, rows, type_size().small)
+        } else {
+            normal
+        }
+    }
 
-fn measured(ui: &Ui, columns: &[Column], rows: &[Row], size: f32) -> Measured {
-    let width = |text: &str, font: FontId| {
-        ui.painter()
-            .layout_no_wrap(text.to_owned(), font, Color32::WHITE)
-            .size()
-            .x
-    };
-    let in_row = |row: &Row, text: &str| {
-        width(
-            text,
-            if row.is_strong {
-                semibold(size)
-            } else {
-                FontId::proportional(size)
-            },
-        )
-    };
-    let heading = |column: &Column| width(column.heading, FontId::proportional(type_size().small));
-    let names = rows
-        .iter()
-        .map(|row| in_row(row, &capitalised(row.name)) + if row.mark.is_empty() { 0.0 } else { MARK_WIDTH })
-        .fold(0.0, f32::max);
-    let widths = columns.iter().enumerate().map(|(at, column)| {
-        let cells = rows.iter().map(|row| in_row(row, &row.cells[at]));
-        cells.fold(heading(column), f32::max)
-    });
-    (size, names, widths.collect())
-}
+    fn of(ui: &Ui, columns: &[Column], rows: &[&Row], size: f32) -> Self {
+        let width = |text: &str, font: FontId| {
+            ui.painter()
+                .layout_no_wrap(text.to_owned(), font, Color32::WHITE)
+                .size()
+                .x
+        };
+        let in_row = |row: &Row, text: &str| {
+            width(
+                text,
+                if row.is_strong {
+                    semibold(size)
+                } else {
+                    FontId::proportional(size)
+                },
+            )
+        };
+        let heading = |column: &Column| width(column.heading, FontId::proportional(type_size().small));
+        let names = rows
+            .iter()
+            .map(|row| in_row(row, &capitalised(row.name)) + if row.mark.is_empty() { 0.0 } else { MARK_WIDTH })
+            .fold(0.0, f32::max);
+        let widths = columns.iter().enumerate().map(|(at, column)| {
+            let cells = rows.iter().map(|row| in_row(row, &row.cells[at]));
+            cells.fold(heading(column), f32::max)
+        });
+        Self {
+            size,
+            names,
+            columns: widths.collect(),
+        }
+    }
 
-/// With readable gaps between the columns.
-fn total_width((_, names, widths): &Measured) -> f32 {
-    names + widths.iter().sum::<f32>() + space(2) * widths.len() as f32
+    /// With readable gaps between the columns.
+    fn total(&self) -> f32 {
+        self.names + self.columns.iter().sum::<f32>() + space(2) * self.columns.len() as f32
+    }
 }
 
 fn rich(text: &str, size: f32, colour: Color32, is_strong: bool) -> RichText {

@@ -49,7 +49,7 @@ pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
             &Card {
                 bounds: layout(width, height),
                 measure: &measure,
-                colours: colours(surface.quantity, surface.colours),
+                colours: colours(&surface.quantity, surface.colours),
             },
         );
         notes.extend(drawing.note.clone().map(|note| (left, note)));
@@ -113,7 +113,7 @@ fn measure(text: &str) -> Vec2 {
     Vec2::new(text.chars().map(width).sum(), 1.2) * TYPE_SIZE
 }
 
-fn colours(quantity: Quantity, sequential: SequentialMap) -> &'static ColourMap {
+fn colours(quantity: &Quantity, sequential: SequentialMap) -> &'static ColourMap {
     static DIVERGING: OnceLock<ColourMap> = OnceLock::new();
     const STOPS: [Rgb; 5] = [
         [0x0b, 0x3d, 0x91],
@@ -246,7 +246,7 @@ impl Pen<'_> {
                 height: step,
                 ..bar
             };
-            let colour = colours(scale.quantity, scale.colours).at((at as f32 + 0.5) / BAR_STEPS as f32);
+            let colour = colours(&scale.quantity, scale.colours).at((at as f32 + 0.5) / BAR_STEPS as f32);
             self.canvas.block(block, colour);
         }
         self.canvas.outline(bar, Stroke::new(EDGE, 0.75 * SCALE));

@@ -47,7 +47,7 @@ impl ColourScale {
     pub fn lay_out(&self, area: Bounds, measure: &dyn Fn(&str) -> Vec2) -> Option<ScaleDrawing> {
         let (low, high) = (*self.range.start(), *self.range.end());
         let name = self.quantity.axis_name();
-        let line = measure(name).y;
+        let line = measure(&name).y;
         let left = area.min.x + 8.0;
         let bar = Bounds {
             min: Vec2::new(left, area.min.y + line + 12.0),
@@ -72,8 +72,8 @@ impl ColourScale {
             });
             labels.beside(at, Vec2::X, TICK + 3.0, 0.0, &tick_text(value, step));
         }
-        let name_at = Vec2::new(area.min.x + 4.0 + 0.5 * measure(name).x, bar.min.y - 6.0);
-        labels.beside(name_at, Vec2::NEG_Y, 2.0, 8.0, name);
+        let name_at = Vec2::new(area.min.x + 4.0 + 0.5 * measure(&name).x, bar.min.y - 6.0);
+        labels.beside(name_at, Vec2::NEG_Y, 2.0, 8.0, &name);
         Some(ScaleDrawing {
             bar,
             lines,

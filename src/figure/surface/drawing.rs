@@ -53,7 +53,8 @@ impl Surface {
     /// Lays the surface out as `camera` sees it.
     pub fn lay_out(&self, camera: OrbitCamera, card: &Card<'_>) -> Drawing {
         let field = Field::new(self);
-        let names = ["x (mm)", "y (mm)", self.quantity.axis_name()];
+        let value_name = self.quantity.axis_name();
+        let names = ["x (mm)", "y (mm)", &*value_name];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);
         let (lines, labels, (mesh, dots), sight) = match self.mode {

@@ -43,7 +43,7 @@ impl Surface {
     /// Colours of the values.
     pub fn scale(&self) -> ColourScale {
         ColourScale {
-            quantity: self.quantity,
+            quantity: self.quantity.clone(),
             range: self.range.clone(),
             colours: self.colours,
         }
@@ -56,8 +56,8 @@ impl Surface {
         Arc::ptr_eq(&self.map, &other.map)
             && Arc::ptr_eq(&self.values, &other.values)
             && Arc::ptr_eq(&self.nodes, &other.nodes)
-            && (self.quantity, self.mode, self.colours, bits(self))
-                == (other.quantity, other.mode, other.colours, bits(other))
+            && self.quantity == other.quantity
+            && (self.mode, self.colours, bits(self)) == (other.mode, other.colours, bits(other))
     }
 }
 

@@ -1,12 +1,9 @@
 use ndarray::Axis;
 
-use super::model::{Trained, position_pair};
-use crate::{
-    figure::{
-        Figure, HeatMap, PlotFigure, loss_figure, position_error_map, sample_figure, target_regression_figure,
-        training_state_figure,
-    },
-    import::Channel,
+use super::model::{Positions, Tested, Trained, position_pair};
+use crate::figure::{
+    Figure, HeatMap, PlotFigure, loss_figure, position_error_map, sample_figure, target_regression_figure,
+    training_state_figure,
 };
 
 /// Charts of a network.
@@ -19,6 +16,8 @@ pub(super) enum ChartTab {
     TrainingState,
     /// Decoded against actual values of a target.
     Regression,
+    /// Surfaces of one sample through the targets that have positions.
+    Surfaces,
     /// All targets of one sample.
     Sample,
     /// Error over the position.
@@ -31,7 +30,7 @@ pub(super) struct ChartChoice {
     pub(super) tab: ChartTab,
     /// Target of the regression.
     pub(super) target: usize,
-    /// Test sample of which all targets are shown, from 0.
+    /// Test sample of which surfaces or all targets are shown, from 0.
     pub(super) sample: usize,
 }
 
@@ -39,17 +38,30 @@ pub(super) struct ChartChoice {
 pub(super) enum Chart {
     Plots(PlotFigure),
     Map(Box<HeatMap>),
+    /// Surfaces, which the look of all views belongs to.
+    Surfaces,
     None(&'static str),
 }
 
 impl ChartTab {
-    pub(super) const ALL: [(Self, &'static str); 5] = [
+    const ALL: [(Self, &'static str); 6] = [
         (Self::Loss, "Loss"),
         (Self::TrainingState, "Training state"),
         (Self::Regression, "Regression"),
+        (Self::Surfaces, "Surfaces"),
         (Self::Sample, "Sample"),
         (Self::Map, "Error map"),
     ];
+
+    /// Charts offered for a network: surfaces where targets have positions, a map of errors where none has.
+    pub(super) fn offered(trained: &Trained) -> Vec<(Self, &'static str)> {
+        let has_positions = !matches!(trained.positions(), Positions::None);
+        let mut offered = Self::ALL.to_vec();
+        // Targets that have positions are no positions themselves.
+        let of_others = if has_positions { Self::Map } else { Self::Surfaces };
+        offered.retain(|(tab, _)| *tab != of_others);
+        offered
+    }
 
     /// Word in names of files.
     pub(super) fn file_word(self) -> &'static str {
@@ -57,6 +69,7 @@ impl ChartTab {
             Self::Loss => "loss",
             Self::TrainingState => "training-state",
             Self::Regression => "regression",
+            Self::Surfaces => "surfaces",
             Self::Sample => "sample",
             Self::Map => "error-map",
         }
@@ -64,14 +77,20 @@ impl ChartTab {
 }
 
 impl ChartChoice {
-    /// Chooses the chart that says most about networks for these targets.
-    pub(super) fn fit(&mut self, targets: &[Channel]) {
+    /// Chooses the chart that says most about a network.
+    pub(super) fn fit(&mut self, trained: &Trained) {
         self.target = 0;
-        self.tab = if position_pair(targets).is_some() {
-            ChartTab::Map
-        } else {
-            ChartTab::Regression
+        self.tab = match trained.positions() {
+            Positions::Grid(_) => ChartTab::Surfaces,
+            Positions::NoGrid => ChartTab::Sample,
+            Positions::None if position_pair(&trained.file.targets).is_some() => ChartTab::Map,
+            Positions::None => ChartTab::Regression,
         };
+    }
+
+    /// The sample on show, which is one of these.
+    pub(super) fn sample_of(&self, tested: &Tested) -> usize {
+        self.sample.min(tested.set().samples().saturating_sub(1))
     }
 
     /// The chart of a network.
@@ -89,8 +108,9 @@ impl ChartChoice {
                 let pairs = tested.pairs(target);
                 Chart::Plots(target_regression_figure(&pairs, &channel.name, channel.unit.as_deref()))
             }
+            (ChartTab::Surfaces, Some(_)) => Chart::Surfaces,
             (ChartTab::Sample, Some(tested)) => {
-                let sample = self.sample.min(tested.set().samples().saturating_sub(1));
+                let sample = self.sample_of(tested);
                 let actual = tested.set().targets().row(sample).to_vec();
                 let decoded = tested.answers.row(sample).to_vec();
                 Chart::Plots(sample_figure(targets, &actual, &decoded, &tested.ranges))
@@ -120,7 +140,7 @@ impl Chart {
         match self {
             Self::Plots(plots) => Some(plots.into()),
             Self::Map(map) => Some((*map).into()),
-            Self::None(_) => None,
+            Self::Surfaces | Self::None(_) => None,
         }
     }
 }

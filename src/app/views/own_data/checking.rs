@@ -7,6 +7,7 @@ use crate::{
     app::job::{Job, JobError, Report, Wake},
     dataset::{Dataset, Seed},
     evaluation::recorded::channel_remarks,
+    export::describe_positions,
     import::{Dropped, FileReport, Plan, Recording},
 };
 
@@ -21,6 +22,8 @@ pub(super) struct Checked {
     pub(super) dropped: Vec<Dropped>,
     /// The files, and how they are joined.
     pub(super) files: Vec<FileReport>,
+    /// Positions of targets, in words.
+    pub(super) positions: Option<String>,
     /// Warnings for the user.
     pub(super) warnings: Vec<String>,
 }
@@ -99,6 +102,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         files: recordings()
             .flat_map(|recording| recording.files.iter().cloned())
             .collect(),
+        positions: describe_positions(&sets.recording.positions),
         warnings,
     }))
 }

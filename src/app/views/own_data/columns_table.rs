@@ -22,7 +22,7 @@ const ROW_HEIGHT: f32 = space(7);
 const HEADINGS: [(&str, f32); 6] = [
     ("column", 0.0),
     ("meaning", space(26)),
-    ("unit", space(13)),
+    ("unit", space(15)),
     ("values", space(22)),
     ("from – to", space(44)),
     ("missing", space(15)),

@@ -62,6 +62,9 @@ impl Draft {
         if before.by == SplitBy::Random {
             division.by = before.by;
         }
+        if self.plan.import.positions.is_none() {
+            self.plan.import.positions.clone_from(&older.plan.import.positions);
+        }
         if older.plan.test.is_some() {
             self.plan.test.clone_from(&older.plan.test);
         }

@@ -3,7 +3,7 @@ use eframe::egui::{RichText, Ui};
 use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
-        widgets::{Column, Row, captioned_table_ui},
+        widgets::{Column, Row, TableWidths, captioned_table_ui},
     },
     evaluation::TargetErrors,
     export::format_number,
@@ -36,25 +36,26 @@ const COLUMNS: [Column; 5] = [
 /// Errors of each target, a table for each with a row for each of `rows`; the last is the strong one.
 pub(super) fn error_tables_ui(ui: &mut Ui, targets: &[Channel], rows: &[(&'static str, &[TargetErrors])]) {
     let palette = Theme::of(ui).palette;
-    for (index, target) in targets.iter().enumerate() {
+    let lines = |index: usize| -> Vec<Row> {
+        let lines = rows.iter().enumerate().filter_map(|(number, (name, errors))| {
+            let is_network = number + 1 == rows.len();
+            Some(Row {
+                mark: "",
+                name,
+                meaning: meaning(name),
+                cells: cells(errors.get(index)?),
+                colour: if is_network { palette.accent } else { palette.text },
+                is_strong: is_network,
+            })
+        });
+        lines.collect()
+    };
+    let tables = Vec::from_iter((0..targets.len()).map(lines));
+    let widths = TableWidths::fitting(ui, &COLUMNS, &Vec::from_iter(tables.iter().flatten()));
+    for (target, lines) in targets.iter().zip(&tables) {
         ui.add_space(space(1));
         ui.label(RichText::new(target.title()).font(semibold(type_size().body)));
-        let lines: Vec<Row> = rows
-            .iter()
-            .enumerate()
-            .filter_map(|(number, (name, errors))| {
-                let is_network = number + 1 == rows.len();
-                Some(Row {
-                    mark: "",
-                    name,
-                    meaning: meaning(name),
-                    cells: cells(errors.get(index)?),
-                    colour: if is_network { palette.accent } else { palette.text },
-                    is_strong: is_network,
-                })
-            })
-            .collect();
-        ui.scope(|ui| captioned_table_ui(ui, &target.title(), &COLUMNS, &lines));
+        ui.scope(|ui| captioned_table_ui(ui, &target.title(), &COLUMNS, lines, &widths));
         ui.add_space(space(2));
     }
 }

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use super::{
+    charts::ChartTab,
     judging::{channel_table, decoders_table, shown_curve_figure, shown_decoders_figure},
     model::Trained,
     state::{OwnDataView, Tab},
+    surfaces::shown_surfaces,
 };
 use crate::{
     app::shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Phase, copy_exports, csv_export,
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Look, Phase, copy_exports, csv_export,
         error_table_export, loss_export, own_network_exports, picture_exports,
     },
     export::{Cell, RecipeFile, Table, TableColumn},
@@ -43,7 +45,7 @@ const DECODERS: FileWords = FileWords {
 };
 
 /// Everything that can be exported.
-pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
+pub(super) fn own_data_exports(view: &OwnDataView, look: Look) -> Vec<Export<'_>> {
     let nothing = || "Nothing is trained yet: press Train first.".to_owned();
     let shown = view.shown.as_ref().ok_or_else(nothing);
     let stem = |what: &str| format!("{}-{what}", view.stem());
@@ -56,7 +58,7 @@ pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
     };
     let file = shown.clone().map(|shown| Arc::clone(&shown.file));
     let mut exports = own_network_exports(&view.stem(), &file);
-    let (chart, word) = shown_chart(view);
+    let (chart, word) = shown_chart(view, look);
     let chart = chart.map(|figure| move || figure.clone());
     exports.extend(picture_exports("Chart", stem(word), chart));
     let errors = shown.clone().map(|shown| move || error_table(shown));
@@ -125,10 +127,14 @@ pub(super) fn own_data_exports(view: &OwnDataView) -> Vec<Export<'_>> {
 }
 
 /// The chart in the card on show, and the word for it in names of files.
-fn shown_chart(view: &OwnDataView) -> (Result<Figure, String>, &'static str) {
+fn shown_chart(view: &OwnDataView, look: Look) -> (Result<Figure, String>, &'static str) {
     let (figure, word) = match (view.tab, &view.shown) {
         (Tab::Findings, _) => (shown_curve_figure(&view.measuring).map(Figure::from), "learning-curve"),
         (Tab::Decoders, _) => (shown_decoders_figure(&view.measuring).map(Figure::from), "decoders"),
+        (_, Some(_)) if view.chart.tab == ChartTab::Surfaces => (
+            shown_surfaces(view, look).map(Figure::Surfaces),
+            view.chart.tab.file_word(),
+        ),
         (_, Some(shown)) => (view.chart.chart(shown).into_figure(), view.chart.tab.file_word()),
         (_, None) => (None, "chart"),
     };

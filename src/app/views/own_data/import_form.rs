@@ -6,6 +6,7 @@ use eframe::egui::{Align, Id, Label, Layout, Response, RichText, TextEdit, Ui, W
 use super::{
     draft::{Draft, file_name, missing},
     layout_form::{joined_summary, joined_ui, layout_summary, layout_ui},
+    positions_form::{positions_summary, positions_ui},
     remarks::flattery,
     state::OwnDataView,
 };
@@ -69,25 +70,41 @@ pub(super) fn invitation_ui(ui: &mut Ui, view: &OwnDataView, effects: &mut Vec<E
     });
 }
 
+/// An open file by its use.
+#[derive(Clone, Copy)]
+enum OpenFile {
+    /// A recording by its number: the first, or one that is joined to it.
+    Recording(usize),
+    /// Recordings of the test.
+    Test,
+    /// Positions of targets.
+    Positions,
+}
+
 /// The files, and buttons to open others.
 pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "Files");
     let mut closed = None;
     if let Some(draft) = &view.draft {
-        let (paths, test) = (draft.paths(), draft.test_paths());
-        for (number, path) in paths.iter().chain(&test).enumerate() {
-            let name = file_name(path);
-            let what = match number {
-                0 => "",
-                _ if number < paths.len() => ", joined",
-                _ => ", for the test",
+        let recordings = draft.paths().into_iter().enumerate();
+        let recordings = recordings.map(|(number, path)| (OpenFile::Recording(number), path));
+        let test = draft.test_paths().into_iter().map(|path| (OpenFile::Test, path));
+        let positions = draft.plan.import.positions.iter();
+        let positions = positions.map(|path| (OpenFile::Positions, path.clone()));
+        for (file, path) in recordings.chain(test).chain(positions) {
+            let name = file_name(&path);
+            let what = match file {
+                OpenFile::Recording(0) => "",
+                OpenFile::Recording(_) => ", joined",
+                OpenFile::Test => ", for the test",
+                OpenFile::Positions => ", positions",
             };
             ui.horizontal(|ui| {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     let close = ui.small_button("×");
                     close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
                     if close.on_hover_text("Closes this file.").clicked() {
-                        closed = Some(number);
+                        closed = Some(file);
                     }
                     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                         let text = format!("{name}{what}");
@@ -98,8 +115,11 @@ pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Ef
             });
         }
     }
-    if let Some(file) = closed {
-        view.close(file);
+    match (closed, &mut view.draft) {
+        (Some(OpenFile::Recording(number)), _) => view.close(number),
+        (Some(OpenFile::Test), Some(draft)) => draft.plan.test = None,
+        (Some(OpenFile::Positions), Some(draft)) => draft.plan.import.positions = None,
+        _ => {}
     }
     let (under_way, has_draft) = (view.opening.under_way.is_some(), view.draft.is_some());
     ui.horizontal(|ui| {
@@ -133,6 +153,7 @@ pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Ef
 /// The folded parts of the import.
 pub(super) fn import_folds_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
     let (needs_validation, choices) = (view.settings.validation_fraction() > 0.0, view.test_choices.clone());
+    let positions_task = view.positions_task();
     let Some(draft) = &mut view.draft else { return };
     let mut looks_again = false;
     fold_ui(ui, "Split", &split_summary(draft), |ui| {
@@ -144,6 +165,9 @@ pub(super) fn import_folds_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut
         split_ui(ui, draft, needs_validation, task, effects);
     });
     fold_ui(ui, "Rows", &rows_summary(draft), |ui| looks_again |= rows_ui(ui, draft));
+    fold_ui(ui, "Positions", &positions_summary(draft), |ui| {
+        positions_ui(ui, positions_task, effects);
+    });
     if draft.files.len() > 1 {
         fold_ui(ui, "Joined files", &joined_summary(draft), |ui| joined_ui(ui, draft));
     }

@@ -7,7 +7,8 @@ use crate::{
     dataset::Dataset,
     evaluation::{TargetErrors, TargetRow},
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
-    import::Channel,
+    figure::TargetLattice,
+    import::{Channel, Recording},
 };
 
 /// A network trained on recordings, as far as the window knows it.
@@ -41,10 +42,34 @@ pub(super) struct Tested {
     pub(super) answers: Array2<f64>,
     /// Least and largest value of each target.
     pub(super) ranges: Vec<(f64, f64)>,
+    /// Positions of targets.
+    pub(super) positions: Positions,
+}
+
+/// Positions of targets on the skin.
+#[derive(Clone, Debug)]
+pub(super) enum Positions {
+    /// No target has one.
+    None,
+    /// They are no grid, so that no surface is laid through them.
+    NoGrid,
+    /// They are a grid.
+    Grid(Arc<TargetLattice>),
+}
+
+impl Positions {
+    /// The positions in a recording.
+    pub(super) fn of(recording: &Recording) -> Self {
+        if recording.positions.is_empty() {
+            return Self::None;
+        }
+        let lattice = TargetLattice::new(&recording.positions, &recording.targets);
+        lattice.map_or(Self::NoGrid, |lattice| Self::Grid(Arc::new(lattice)))
+    }
 }
 
 impl Tested {
-    pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>) -> Self {
+    pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>, positions: Positions) -> Self {
         let set: Arc<Dataset> = set.into();
         let range = |target| {
             let values = set.targets();
@@ -55,6 +80,7 @@ impl Tested {
             ranges: (0..set.outputs()).map(range).collect(),
             answers,
             set,
+            positions,
         }
     }
 
@@ -94,6 +120,13 @@ impl Trained {
             checkpoint: None,
             file,
         }
+    }
+
+    /// Positions of the targets, as far as the test samples are at hand.
+    pub(super) fn positions(&self) -> &Positions {
+        self.tested
+            .as_ref()
+            .map_or(&Positions::None, |tested| &tested.positions)
     }
 
     /// Errors of the mean, of ridge and of the network, in this order.

@@ -21,6 +21,10 @@ impl OwnDataView {
         if let (Some(draft), false) = (&mut self.draft, self.phase.is_busy()) {
             paths.into_iter().for_each(|path| draft.add_test_file(path));
         }
+        let path = self.chosen_positions.try_iter().last();
+        if let (Some(draft), Some(path), false) = (&mut self.draft, path, self.phase.is_busy()) {
+            draft.plan.import.positions = Some(path);
+        }
     }
 
     /// Keeps networks beside the runs of the other views, if those are kept.
@@ -74,6 +78,11 @@ impl OwnDataView {
                 self.draft = Some(draft);
                 self.set_held_out();
             }
+            Opened::Positions(path) => {
+                if let Some(draft) = &mut self.draft {
+                    draft.plan.import.positions = Some(path);
+                }
+            }
             Opened::Import(draft) => {
                 self.draft = Some(*draft);
             }
@@ -114,7 +123,7 @@ impl OwnDataView {
                 if is_first {
                     effects.push(Effect::Settle(Matter::OwnData));
                     self.tab = Tab::Results;
-                    self.chart.fit(&trained.file.targets);
+                    self.chart.fit(&trained);
                 }
                 if matches!(trained.phase, Phase::Ended(_)) && self.runs.add(&trained) {
                     self.keeping.keep(&trained.file);

@@ -7,13 +7,13 @@ use std::{
 
 use super::{
     draft::{Draft, file_name},
-    model::{Tested, Trained},
+    model::{Positions, Tested, Trained},
     remarks::in_window,
 };
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     export::{DocumentKind, MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
-    import::{DialectChoice, InspectedFile, Joined, Missing, Plan, Progress, Recipe, suggested_plan},
+    import::{DialectChoice, InspectedFile, Joined, Missing, Plan, Progress, Recipe, holds_positions, suggested_plan},
 };
 
 /// Files to be opened.
@@ -43,6 +43,8 @@ pub(super) struct Files {
 pub(super) enum Opened {
     /// Recordings with guesses of what they mean.
     Recordings(Box<Draft>),
+    /// A file with positions of targets, beside recordings that are open.
+    Positions(PathBuf),
     /// A recipe, or the files of a plan.
     Import(Box<Draft>),
     /// A network, and its import if the recording is still there.
@@ -138,8 +140,29 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             }
         }
     }
+    let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.new.into_iter().partition(|path| holds_positions(path));
+    let positions = match (&positions[..], files.open.is_empty() && recordings.is_empty()) {
+        ([], _) => None,
+        ([path], false) => Some(path.clone()),
+        ([path, ..], true) => {
+            let path = path.display();
+            return Err(format!(
+                "'{path}' has positions of targets: open their recording first, or with it"
+            ));
+        }
+        ([one, other, ..], _) => {
+            let (one, other) = (one.display(), other.display());
+            return Err(format!(
+                "'{one}' and '{other}' both have positions of targets: open one of them"
+            ));
+        }
+    };
+    if let (Some(path), []) = (&positions, &recordings[..]) {
+        return Ok(Opened::Positions(path.clone()));
+    }
     let mut paths = files.open;
-    for path in files.new {
+    for path in recordings {
         if !paths.contains(&path) {
             paths.push(path);
         }
@@ -161,6 +184,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     let mut plan = suggested_plan(&inspected_files.map_err(|error| in_window(&error))?);
     plan.import.dialect = recipe.dialect;
     plan.import.missing = recipe.missing;
+    plan.import.positions = positions;
     Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
 }
 
@@ -218,7 +242,7 @@ fn opened_network(file: MeasuredNetworkFile, watch: &mut dyn FnMut(Progress) -> 
             return Err("it has other columns now".to_owned());
         }
         let answers = file.network.decouple(&sets.test);
-        let tested = Tested::new(sets.test, answers);
+        let tested = Tested::new(sets.test, answers, Positions::of(&sets.recording));
         if tested.errors() == file.errors {
             Ok(tested)
         } else {

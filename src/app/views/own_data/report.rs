@@ -104,6 +104,9 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
             ),
         );
     }
+    if let Some(positions) = &checked.positions {
+        dim_ui(ui, &sentence(positions));
+    }
     let is_random = plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random);
     if is_random {
         note_ui(ui, flattery(SplitBy::Random));
@@ -115,6 +118,17 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
 
 fn errors_ui(ui: &mut Ui, shown: &Trained, view: &OwnDataView) {
     section_heading_ui(ui, "Errors on the test set");
+    let plan = &shown.file.plan;
+    let now = view.draft.as_ref().and_then(|draft| draft.plan().ok());
+    let is_changed =
+        now.is_some_and(|now| now.absolute() != *plan) || view.asked.is_some_and(|asked| asked != view.settings);
+    if is_changed && !view.phase.is_busy() {
+        let name = &shown.name;
+        dim_ui(
+            ui,
+            &format!("Of {name}: the import or the settings have changed since this training."),
+        );
+    }
     error_tables_ui(ui, &shown.file.targets, &shown.rows());
     if let Some(flaw) = &shown.flaw {
         note_ui(ui, &sentence(flaw));
@@ -122,15 +136,8 @@ fn errors_ui(ui: &mut Ui, shown: &Trained, view: &OwnDataView) {
     for remark in &shown.remarks {
         note_ui(ui, &sentence(remark));
     }
-    let plan = &shown.file.plan;
     if plan.test.is_none() && plan.division.by == SplitBy::Random {
         note_ui(ui, flattery(SplitBy::Random));
-    }
-    let now = view.draft.as_ref().and_then(|draft| draft.plan().ok());
-    let is_changed =
-        now.is_some_and(|now| now.absolute() != *plan) || view.asked.is_some_and(|asked| asked != view.settings);
-    if is_changed && !view.phase.is_busy() {
-        dim_ui(ui, "The settings have changed since this training.");
     }
 }
 

@@ -15,6 +15,7 @@ use super::{
     model::{Trained, Validated},
     opening::{Files, Opening, ToOpen},
     runs::Runs,
+    surfaces::SurfacesChoice,
     training::{Command, Task, Trainer, ValidationChoice},
 };
 use crate::{
@@ -58,12 +59,16 @@ pub struct OwnDataView {
     /// Card in the middle.
     pub(super) tab: Tab,
     pub(super) chart: ChartChoice,
+    pub(super) surfaces: SurfacesChoice,
     /// Paths that the user chooses, in dialogs or by typing.
     pub(super) choices: Sender<PathBuf>,
     pub(super) chosen: Receiver<PathBuf>,
     /// As [`Self::choices`], for files of test samples.
     pub(super) test_choices: Sender<PathBuf>,
     pub(super) chosen_for_test: Receiver<PathBuf>,
+    /// As [`Self::choices`], for the file with positions of targets.
+    pub(super) positions_choices: Sender<PathBuf>,
+    pub(super) chosen_positions: Receiver<PathBuf>,
 }
 
 /// Cards in the middle.
@@ -87,6 +92,7 @@ impl OwnDataView {
     pub fn new(wake: Wake) -> Self {
         let (choices, chosen) = channel();
         let (test_choices, chosen_for_test) = channel();
+        let (positions_choices, chosen_positions) = channel();
         Self {
             draft: None,
             opening: Opening::new(Arc::clone(&wake)),
@@ -109,10 +115,13 @@ impl OwnDataView {
             keeping: Keeping::new(wake),
             tab: Tab::default(),
             chart: ChartChoice::default(),
+            surfaces: SurfacesChoice::default(),
             choices,
             chosen,
             test_choices,
             chosen_for_test,
+            positions_choices,
+            chosen_positions,
         }
     }
 
@@ -124,14 +133,10 @@ impl OwnDataView {
         }
     }
 
-    /// Closes a file; without the last one there is no import.
+    /// Closes a recording; without the last one there is no import.
     pub(super) fn close(&mut self, file: usize) {
         let Some(draft) = &mut self.draft else { return };
         let mut paths = draft.paths();
-        if file >= paths.len() {
-            draft.plan.test = None;
-            return;
-        }
         paths.remove(file);
         if paths.is_empty() {
             self.draft = None;
@@ -289,7 +294,7 @@ impl OwnDataView {
         self.trainer.cancel();
         self.phase = trained.phase;
         self.asked = asked;
-        self.chart.fit(&trained.file.targets);
+        self.chart.fit(&trained);
         self.shown = Some(trained);
     }
 

@@ -15,7 +15,7 @@ use super::{
     tools,
 };
 use crate::app::{
-    shared::{Columns, Effect, Export, Matter, Notice, Offers, Phase, Shared, View},
+    shared::{Columns, Effect, Export, Look, Matter, Notice, Offers, Phase, Shared, View},
     theme::space,
     widgets::{card_ui, tabs_ui},
 };
@@ -67,8 +67,8 @@ impl View for OwnDataView {
         tools::tools_ui(ui, self);
     }
 
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
-        own_data_exports(self)
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        own_data_exports(self, shared.look)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
@@ -79,7 +79,7 @@ impl View for OwnDataView {
         report_ui(ui, self);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
         let mut upper = whole;
         if ui.ctx().content_rect().width() < WIDE {
@@ -88,7 +88,7 @@ impl View for OwnDataView {
             upper = cards.with_max_y(cards.bottom() - space(2));
             card_ui(ui, report, |ui| report_ui(ui, self));
         }
-        card_ui(ui, upper, |ui| cards_ui(ui, self, effects));
+        card_ui(ui, upper, |ui| cards_ui(ui, self, shared.look, effects));
         ui.allocate_rect(whole, Sense::hover());
     }
 
@@ -98,7 +98,7 @@ impl View for OwnDataView {
 }
 
 /// The card in the middle, with tabs for what it shows.
-fn cards_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
+fn cards_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effects: &mut Vec<Effect>) {
     let tabs = [
         (Tab::Columns, "Columns"),
         (Tab::Results, "Results"),
@@ -114,7 +114,7 @@ fn cards_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
     ui.add_space(space(1));
     match shown {
         Tab::Columns => columns_ui(ui, view, effects),
-        Tab::Results => results_ui(ui, view),
+        Tab::Results => results_ui(ui, view, look, effects),
         Tab::Findings => findings_ui(ui, view),
         Tab::Decoders => decoders_ui(ui, view),
         Tab::Runs => runs_ui(ui, view),

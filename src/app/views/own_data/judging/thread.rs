@@ -8,7 +8,7 @@ use std::{
 use crate::{
     app::{job::Report, views::own_data::remarks::in_window},
     evaluation::{
-        DecoderSet, RunSettings, TargetReport,
+        DecoderSet, RunSettings, TargetReport, decoded_unit,
         recorded::{Findings, FittedModel, Stage},
     },
     export::MeasuredNetworkFile,
@@ -121,10 +121,7 @@ fn measure(file: Arc<MeasuredNetworkFile>, report: &Report<News>) -> Result<(), 
     });
     let sets = sets.map_err(|error| in_window(&error))?;
     let test = &sets.test;
-    let decoded = match (test.frames(), test.row_count()) {
-        (Ok(_), rows @ 2..) => format!("a frame of {rows} row-wires"),
-        _ => "a sample".to_owned(),
-    };
+    let decoded = decoded_unit(test);
     let set = DecoderSet::on_set(file.settings.into(), sets.split.training, Some(file.network.clone()));
     let mut decoders = Decoders {
         of: file,

@@ -15,7 +15,7 @@ use crate::{
         shared::Phase,
         training_worker::{continue_run, furthest_epoch},
         views::own_data::{
-            model::{Tested, Trained, Validated},
+            model::{Positions, Tested, Trained, Validated},
             remarks::in_window,
         },
     },
@@ -84,6 +84,7 @@ struct About {
     plan: Plan,
     inputs: Vec<Channel>,
     targets: Vec<Channel>,
+    positions: Positions,
     samples_crc32: String,
 }
 
@@ -93,6 +94,7 @@ impl About {
             plan: plan.absolute(),
             inputs: sets.recording.inputs.clone(),
             targets: sets.recording.targets.clone(),
+            positions: Positions::of(&sets.recording),
             samples_crc32: MeasuredCheckpointFile::checksum(sets),
         }
     }
@@ -161,7 +163,11 @@ impl<'a> Training<'a> {
     fn tell(&mut self) {
         let begun = Instant::now();
         let About {
-            plan, inputs, targets, ..
+            plan,
+            inputs,
+            targets,
+            positions,
+            ..
         } = &self.about;
         let file = match MeasuredNetworkFile::from_run(&self.run, plan.clone(), (inputs, targets)) {
             Ok(file) => file,
@@ -175,7 +181,7 @@ impl<'a> Training<'a> {
         let is_standing = phase != Phase::Training;
         let saved = is_standing.then(|| MeasuredCheckpointFile::from_run(&self.run, plan, &self.about.samples_crc32));
         let answers = self.run.decouple_test();
-        let tested = Tested::new(Arc::clone(self.run.test()), answers.clone());
+        let tested = Tested::new(Arc::clone(self.run.test()), answers.clone(), positions.clone());
         let trained = Trained {
             name: String::new(),
             tested: Some(Arc::new(tested)),
