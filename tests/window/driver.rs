@@ -36,6 +36,9 @@ const FOLDED: [&str; 7] = [
 /// Label of the button that ends the tour.
 pub(crate) const SKIP: &str = "Skip the tour";
 
+/// Label of the button that closes a notice.
+const DISMISS: &str = "Dismiss";
+
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
 
@@ -342,6 +345,13 @@ impl Driver {
     /// Types `path` into the form of the export of this name and saves; waits for the answer.
     #[track_caller]
     pub(crate) fn save(&mut self, name: &str, path: &Path) {
+        // What is told of an earlier file is no answer.
+        for _ in 0..5 {
+            let buttons = self.harness.query_all_by_label(DISMISS);
+            let Some(newest) = buttons.last() else { break };
+            newest.click();
+            self.harness.run_steps(2);
+        }
         self.export(name);
         self.type_into("File", &path.display().to_string());
         self.click_button("Save");
