@@ -1,4 +1,5 @@
-"""Time from a press of the mouse on the actual surface until the decoupled surface changes on the screen.
+"""Time from a press of the mouse on the actual surface until the decoupled surface changes on the screen, and from a
+movement of the pointer to a node until that lights up.
 
     cargo build --release
     python3 benches/interface/press.py target/release/decoupler            # the small network answers, nothing trains
@@ -22,6 +23,9 @@ from Xlib.ext import xtest
 WIDTH, HEIGHT = 1440, 900
 DISPLAY = ":87"
 PRESSES = 60
+MOVEMENTS = 120
+# Height of the pointer, in pixels.
+POINTER = 24
 # Left, right, top and bottom of what is watched, in pixels.
 ACTUAL = (310, 610, 110, 560)
 DECOUPLED = (660, 960, 110, 560)
@@ -75,6 +79,8 @@ def measure(binary, trains, folder, start):
     if trains:
         shell("xdotool", "key", "ctrl+Return")
         time.sleep(6)
+    hovered = sorted(hover(screen, mouse, PLACES[number % len(PLACES)]) for number in range(MOVEMENTS))
+    print(f"pointer to pixel, ms: {quantiles(hovered)}")
     xtest.fake_input(mouse, X.MotionNotify, x=PLACES[0][0], y=PLACES[0][1])
     click(mouse)
     time.sleep(2)
@@ -90,13 +96,35 @@ def measure(binary, trains, folder, start):
         xtest.fake_input(mouse, X.ButtonRelease, 1)
         mouse.flush()
     times.sort()
-    quantile = lambda share: 1e3 * times[int(share * (len(times) - 1))]
     print(
-        f"press to pixel, ms: p50 {quantile(0.5):.0f}, p95 {quantile(0.95):.0f}, max {quantile(1.0):.0f}; "
+        f"press to pixel, ms: {quantiles(times)}; "
         + ", ".join(f"{frames.count(n)} in frame {n}" for n in sorted(set(frames)))
     )
     if picture := os.environ.get("PICTURE"):
         shell("import", "-window", "root", picture)
+
+
+def quantiles(times):
+    quantile = lambda share: 1e3 * times[int(share * (len(times) - 1))]
+    return f"p50 {quantile(0.5):.0f}, p95 {quantile(0.95):.0f}, max {quantile(1.0):.0f}"
+
+
+def hover(screen, mouse, place):
+    """Moves the pointer to a place of the actual surface; returns the time until the picture there changes, but for the
+    pointer's own."""
+    xtest.fake_input(mouse, X.MotionNotify, x=ACTUAL[0] + 20, y=ACTUAL[2] - 60)
+    mouse.flush()
+    time.sleep(0.3 + 0.1 * random.random())
+    # Below the pointer, where the node's values are told.
+    area = (ACTUAL[0], ACTUAL[1], place[1] + POINTER, ACTUAL[3])
+    actual = screen.pixels(area)
+    begun = time.perf_counter()
+    xtest.fake_input(mouse, X.MotionNotify, x=place[0], y=place[1])
+    mouse.flush()
+    while time.perf_counter() - begun < 2:
+        if screen.pixels(area) != actual:
+            return time.perf_counter() - begun
+    raise SystemExit("No node lights up under the pointer: is the window laid out otherwise?")
 
 
 def press(screen, mouse):

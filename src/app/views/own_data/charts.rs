@@ -79,11 +79,14 @@ impl ChartTab {
 impl ChartChoice {
     /// Chooses the chart that says most about a network.
     pub(super) fn fit(&mut self, trained: &Trained) {
+        let targets = &trained.file.targets;
+        // Where a probe was, in the plane or in space. Of more columns without names the first two are rarely that.
+        let is_probe = targets.len() <= 3;
         self.target = 0;
         self.tab = match trained.positions() {
             Positions::Grid(_) => ChartTab::Surfaces,
             Positions::NoGrid => ChartTab::Sample,
-            Positions::None if position_pair(&trained.file.targets).is_some() => ChartTab::Map,
+            Positions::None if is_probe && position_pair(targets).is_some() => ChartTab::Map,
             Positions::None => ChartTab::Regression,
         };
     }
