@@ -1,5 +1,5 @@
 """Time from a press of the mouse on the actual surface until the decoupled surface changes on the screen, and from a
-movement of the pointer to a node until that lights up.
+movement of the pointer over the surface until the outline of what would press there is drawn.
 
     cargo build --release
     python3 benches/interface/press.py target/release/decoupler            # the small network answers, nothing trains
@@ -24,7 +24,7 @@ WIDTH, HEIGHT = 1440, 900
 DISPLAY = ":87"
 PRESSES = 60
 MOVEMENTS = 120
-# Height of the pointer, in pixels.
+# Size of the pointer, in pixels.
 POINTER = 24
 # Left, right, top and bottom of what is watched, in pixels.
 ACTUAL = (310, 610, 110, 560)
@@ -115,8 +115,8 @@ def hover(screen, mouse, place):
     xtest.fake_input(mouse, X.MotionNotify, x=ACTUAL[0] + 20, y=ACTUAL[2] - 60)
     mouse.flush()
     time.sleep(0.3 + 0.1 * random.random())
-    # Below the pointer, where the node's values are told.
-    area = (ACTUAL[0], ACTUAL[1], place[1] + POINTER, ACTUAL[3])
+    # Beside the pointer, where the body's outline is drawn.
+    area = (ACTUAL[0], place[0] - POINTER, ACTUAL[2], ACTUAL[3])
     actual = screen.pixels(area)
     begun = time.perf_counter()
     xtest.fake_input(mouse, X.MotionNotify, x=place[0], y=place[1])
@@ -124,7 +124,7 @@ def hover(screen, mouse, place):
     while time.perf_counter() - begun < 2:
         if screen.pixels(area) != actual:
             return time.perf_counter() - begun
-    raise SystemExit("No node lights up under the pointer: is the window laid out otherwise?")
+    raise SystemExit("No outline is drawn under the pointer: is the window laid out otherwise?")
 
 
 def press(screen, mouse):

@@ -32,6 +32,21 @@ fn a_killed_sweep_loses_nothing_that_was_finished() {
 }
 
 #[test]
+fn what_a_program_leaves_that_is_killed_after_its_result_is_cleared() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    let runs = folder.join("runs");
+    fill("--out runs", folder);
+    let whole = names(&runs);
+    let (first, _) = results(&runs).pop_first().unwrap();
+    for extension in ["claim", "checkpoint"] {
+        File::create(runs.join(first.replace("json", extension))).unwrap();
+    }
+    assert_eq!(fill("--out runs", folder)["present"], 6);
+    assert_eq!(names(&runs), whole);
+}
+
+#[test]
 fn two_programs_fill_one_folder_together() {
     let folder = folder_with(&six());
     let folder = folder.path();

@@ -26,10 +26,16 @@ impl Claim {
     /// Claims the trial `id` of `folder`.
     pub(super) fn take(folder: &Path, id: TrialId) -> Result<Claimed, WriteError> {
         let result = Trial::path(folder, id);
+        let path = folder.join(format!("{id}.claim"));
         if result.exists() {
+            // A program that was killed just then has left its claim beside the result; one that still runs holds it.
+            if let Ok(file) = File::options().write(true).open(&path)
+                && file.try_lock().is_ok()
+            {
+                Self { path, _file: file }.finish();
+            }
             return Ok(Claimed::Done);
         }
-        let path = folder.join(format!("{id}.claim"));
         let mut options = File::options();
         let file = options.create(true).truncate(false).write(true).open(&path);
         let file = file.map_err(|source| WriteError::io(&path, source))?;
