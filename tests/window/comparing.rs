@@ -114,7 +114,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     wait_for_both(&mut driver);
     assert!(driver.has("Six hidden nodes as A") && driver.has(&format!("{SECOND} as B")));
     check(&driver);
-    assert!(driver.harness().run() <= 2, "an idle view draws nothing");
+    assert!(driver.comes_to_rest(), "an idle view draws nothing");
     driver.click("Use the settings of Six hidden nodes");
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
@@ -202,7 +202,7 @@ fn two_windows_see_each_others_runs_names_pins_and_removals() {
     first.wait("the removal", |driver| !driver.has("Renamed as A"));
     first.settle();
     assert!(!first.has("Surface of A"));
-    assert!(first.harness().run() <= 2, "an idle view draws nothing");
+    assert!(first.comes_to_rest(), "an idle view draws nothing");
 }
 
 #[test]

@@ -4,14 +4,17 @@ use super::{CompareView, Compared, exports::compare_exports, figures_table::figu
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui},
+        shared::{
+            Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, follow_surface,
+            view_mode_ui,
+        },
         surface_view::{ColourBar, SurfaceView},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
     },
     figure::{
         PlotFigure, compared_losses_figure,
-        surface::{Surface, SurfaceFigure, ViewMode},
+        surface::{Surface, SurfaceFigure},
     },
 };
 
@@ -125,11 +128,7 @@ impl CompareView {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 // What holds for both is asked for once.
                 match place {
-                    0 => {
-                        let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                        let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
-                        effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
-                    }
+                    0 => view_mode_ui(ui, look, effects),
                     _ => {
                         let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
                         let picked = segmented_ui(ui, "Displayed surface", &cards, self.card, false);
@@ -176,15 +175,8 @@ fn surface_ui(
         theme: Theme::of(ui),
     };
     let shown = view.show(ui, look.camera);
-    let camera = shown.camera;
     // The node of the same number is lit on the other surface.
-    if shown.response.contains_pointer() && shown.hovered_node != *node {
-        *node = shown.hovered_node;
-        ui.ctx().request_repaint();
-    }
-    if camera != look.camera {
-        effects.push(Effect::Look(Look { camera, ..look }));
-    }
+    follow_surface(&shown, look, node, effects);
 }
 
 /// The errors of each epoch of the runs that are chosen.

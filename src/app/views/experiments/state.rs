@@ -94,7 +94,7 @@ struct CheckedForm {
     checked: Result<usize, String>,
     /// Results to be filled in, with the published figures.
     preview: Option<Outcome>,
-    /// What the terminal needs to sweep it, or the reason for which it cannot.
+    /// The file with which the terminal sweeps it, or the reason for which it cannot.
     specification: Result<Value, String>,
 }
 
@@ -228,7 +228,7 @@ impl ExperimentsView {
         &self.forms[&self.topic].checked
     }
 
-    /// Returns what the terminal needs to sweep the form, or the reason for which it cannot.
+    /// Returns the file with which the terminal sweeps the form, or the reason for which it cannot.
     pub(super) fn specification(&self) -> &Result<Value, String> {
         &self.forms[&self.topic].specification
     }

@@ -6,7 +6,7 @@ use super::{Analysis, IdentifiabilityView, facts::facts_ui, form};
 use crate::{
     app::{
         plotting::titled_plots_ui,
-        shared::{Effect, Export, Look, Shared, View, colour_scale_ui, picture_exports},
+        shared::{Effect, Export, Look, Shared, View, colour_scale_ui, follow_surface, picture_exports, view_mode_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::Frame,
         theme::{Theme, semibold, space, type_size},
@@ -178,11 +178,7 @@ fn surface_ui(
         ui.set_min_height(space(7));
         ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| match surface.quantity {
-            Quantity::Pattern => {
-                let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
-                effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
-            }
+            Quantity::Pattern => view_mode_ui(ui, look, effects),
             _ => axes_ui(ui, axis, analysis),
         });
     });
@@ -199,14 +195,7 @@ fn surface_ui(
         theme,
     };
     let shown = view.show(&mut slot, look.camera);
-    if shown.camera != look.camera {
-        let camera = shown.camera;
-        effects.push(Effect::Look(Look { camera, ..look }));
-    }
-    if shown.response.contains_pointer() && shown.hovered_node != *node {
-        *node = shown.hovered_node;
-        ui.ctx().request_repaint();
-    }
+    follow_surface(&shown, look, node, effects);
     shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
     scale
 }

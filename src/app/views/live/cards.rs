@@ -5,14 +5,14 @@ use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use super::{LiveView, engine::LiveFrame};
 use crate::{
     app::{
-        shared::{Effect, Look, Shared, colour_scale_ui},
+        shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::{Frame, HeightScale},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, segmented_ui},
+        widgets::card_ui,
     },
     export::format_number,
-    figure::surface::{Quantity, Surface, SurfaceFigure, ViewMode},
+    figure::surface::{Quantity, Surface, SurfaceFigure},
 };
 
 /// The decoupled surface, the actual one beside it where it is known, and the scale of their colours.
@@ -33,7 +33,7 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared
                 ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     if index == 0 {
-                        modes_ui(ui, shared.look, effects);
+                        view_mode_ui(ui, shared.look, effects);
                     }
                 });
             });
@@ -74,12 +74,6 @@ pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-fn modes_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
-    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-    let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
-    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
-}
-
 fn surface_ui(
     ui: &mut Ui,
     surface: &Surface,
@@ -97,14 +91,7 @@ fn surface_ui(
         theme: Theme::of(ui),
     }
     .show(ui, look.camera);
-    if shown.camera != look.camera {
-        let camera = shown.camera;
-        effects.push(Effect::Look(Look { camera, ..look }));
-    }
-    if shown.response.contains_pointer() && shown.hovered_node != *node {
-        *node = shown.hovered_node;
-        ui.ctx().request_repaint();
-    }
+    follow_surface(&shown, look, node, effects);
     shown.node_tooltip_ui(|ui, node| {
         let per_row = frame.sensor.scale.nodes_per_row();
         let (Some(decoupled), Some(row)) = (frame.decoupled.nodes_mm.get(node), frame.rows.get(node / per_row)) else {

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Effect, Look, RightCard, colour_scale_ui},
+        shared::{Effect, Look, RightCard, colour_scale_ui, follow_surface, view_mode_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::HeightScale,
         theme::{Theme, semibold, space, type_size},
@@ -20,12 +20,12 @@ use crate::{
     export::format_number,
     figure::{
         TargetLattice,
-        surface::{Surface, SurfaceFigure, ViewMode},
+        surface::{Surface, SurfaceFigure},
     },
     import::Channel,
 };
 
-/// What is chosen of the surfaces, and those drawn last.
+/// Choices for the surfaces, and those drawn last.
 #[derive(Debug, Default)]
 pub(super) struct SurfacesChoice {
     beside: RightCard,
@@ -73,6 +73,13 @@ impl Drawn {
 }
 
 impl SurfacesChoice {
+    /// The surfaces of a sample: those drawn last, or new ones.
+    fn drawn(&self, tested: &Arc<Tested>, lattice: &TargetLattice, sample: usize, heights: HeightScale) -> Drawn {
+        let kept = self.drawn.as_ref().filter(|drawn| drawn.is_of(tested, sample, heights));
+        kept.cloned()
+            .unwrap_or_else(|| Drawn::new(tested, lattice, sample, heights))
+    }
+
     fn figure(&self, drawn: &Drawn, look: Look) -> SurfaceFigure {
         let [actual, decoded, error] = &drawn.surfaces;
         let beside = match self.beside {
@@ -99,11 +106,9 @@ pub(super) fn shown_surfaces(view: &OwnDataView, look: Look) -> Option<SurfaceFi
     let Positions::Grid(lattice) = &tested.positions else {
         return None;
     };
-    let sample = view.chart.sample_of(tested);
-    Some(
-        view.surfaces
-            .figure(&Drawn::new(tested, lattice, sample, look.heights), look),
-    )
+    let choice = &view.surfaces;
+    let drawn = choice.drawn(tested, lattice, view.chart.sample_of(tested), look.heights);
+    Some(choice.figure(&drawn, look))
 }
 
 /// Both surfaces side by side and the scales of their colours, or why there are none.
@@ -128,11 +133,7 @@ pub(super) fn surfaces_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
     };
     let sample = view.chart.sample_of(tested);
     let choice = &mut view.surfaces;
-    let kept = choice
-        .drawn
-        .take()
-        .filter(|drawn| drawn.is_of(tested, sample, look.heights));
-    let drawn = kept.unwrap_or_else(|| Drawn::new(tested, &lattice, sample, look.heights));
+    let drawn = choice.drawn(tested, &lattice, sample, look.heights);
     let figure = choice.figure(&drawn, look);
     let gap = space(3);
     let area = ui.available_rect_before_wrap();
@@ -146,11 +147,7 @@ pub(super) fn surfaces_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
                 ui.set_min_height(space(7));
                 ui.label(RichText::new(["Actual", "Network"][index]).font(semibold(type_size().body)));
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| match index {
-                    0 => {
-                        let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-                        let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
-                        effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
-                    }
+                    0 => view_mode_ui(ui, look, effects),
                     _ => {
                         let options = [(RightCard::Decoupled, "Decoded"), (RightCard::Error, "Error")];
                         let picked = segmented_ui(ui, "Network surface", &options, choice.beside, false);
@@ -185,12 +182,12 @@ fn surface_ui(
     ui: &mut Ui,
     (surface, figure): (&Surface, &SurfaceFigure),
     drawn: &Drawn,
-    (lattice, shown): (&TargetLattice, &Trained),
+    (lattice, trained): (&TargetLattice, &Trained),
     look: Look,
     marked: &mut Option<usize>,
     effects: &mut Vec<Effect>,
 ) {
-    let response = SurfaceView {
+    let shown = SurfaceView {
         label: &format!("{} surface of the sample", surface.title),
         surface,
         marked_node: figure.marked_node,
@@ -199,16 +196,9 @@ fn surface_ui(
         theme: Theme::of(ui),
     }
     .show(ui, look.camera);
-    if response.camera != look.camera {
-        let camera = response.camera;
-        effects.push(Effect::Look(Look { camera, ..look }));
-    }
-    if response.response.contains_pointer() && response.hovered_node != *marked {
-        *marked = response.hovered_node;
-        ui.ctx().request_repaint();
-    }
-    response.node_tooltip_ui(|ui, node| {
-        if let Some(target) = lattice.nodes().get(node).map(|at| &shown.file.targets[at.target]) {
+    follow_surface(&shown, look, marked, effects);
+    shown.node_tooltip_ui(|ui, node| {
+        if let Some(target) = lattice.nodes().get(node).map(|at| &trained.file.targets[at.target]) {
             node_ui(ui, target, drawn, node);
         }
     });

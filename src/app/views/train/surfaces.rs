@@ -10,14 +10,14 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Effect, Look, RightCard, Shared, colour_scale_ui},
+        shared::{Effect, RightCard, Shared, colour_scale_ui, follow_surface, view_mode_ui},
         surface_view::{ColourBar, SurfaceView},
         test_view::TestView,
         theme::{Theme, semibold, space, type_size},
         widgets::{Landmark, card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
     },
     export::format_number,
-    figure::surface::{Section, Surface, SurfaceFigure, ViewMode},
+    figure::surface::{Section, Surface, SurfaceFigure},
 };
 
 /// Work of the pointer on the actual surface.
@@ -134,10 +134,7 @@ fn actual_card_ui(
             space(56),
         );
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
-            let look = shared.look;
-            let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
-            effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+            view_mode_ui(ui, shared.look, effects);
             let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
             view.press.hand = picked.unwrap_or(view.press.hand);
         });
@@ -210,15 +207,7 @@ fn surface_ui(
         view.press
             .outline_ui(painter, &theme.palette, shown.response.hover_pos(), test.stroke_mm);
     }
-    if shown.camera != look.camera {
-        let camera = shown.camera;
-        effects.push(Effect::Look(Look { camera, ..look }));
-    }
-    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
-    if shown.response.contains_pointer() && shown.hovered_node != view.lights.node {
-        view.lights.node = shown.hovered_node;
-        ui.ctx().request_repaint();
-    }
+    follow_surface(&shown, look, &mut view.lights.node, effects);
     // What is pressed is cut too.
     let is_chosen = shown.response.clicked() || (is_touched && shown.response.is_pointer_button_down_on());
     if let (true, true, Some(at), Some(sight)) = (
