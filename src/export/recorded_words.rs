@@ -19,7 +19,7 @@ pub fn describe_standings(targets: &[Channel], told: &[Option<Determination>]) -
     targets.iter().zip(told).filter_map(of).collect()
 }
 
-/// Says how many targets have positions, and whether these are a grid; `None` if none has one.
+/// Says how many targets have positions, and whether these are a grid or scattered; `None` if none has one.
 pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     let count = match positions.len() {
         0 => return None,
@@ -28,7 +28,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     };
     Some(match TargetPosition::lattice(positions) {
         Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm().len(), lattice.y_mm().len()),
-        None => format!("{count}, which are no grid of every x with every y: no surface is laid through them"),
+        None => format!("{count}, scattered over the skin"),
     })
 }
 

@@ -46,7 +46,7 @@ pub use of_recorded::{position_error_map, target_regression_figure};
 pub use of_rows::singular_values_figure;
 pub use of_sample::sample_figure;
 pub use of_section::{SectionNodes, section_figure};
-pub use of_targets::TargetLattice;
+pub use of_targets::TargetSurface;
 pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;

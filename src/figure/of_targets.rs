@@ -10,26 +10,39 @@ use super::{
 };
 use crate::{
     import::{Channel, TargetPosition},
-    surface::SurfaceMap,
+    surface::{SurfaceError, SurfaceMap},
 };
 
-/// Targets whose positions are a lattice, and the surface through them.
+/// Targets that have positions, and the surface through them.
 #[derive(Clone, Debug)]
-pub struct TargetLattice {
+pub struct TargetSurface {
     map: Arc<SurfaceMap>,
     /// The targets at the nodes, in the order of the map.
     nodes: Vec<TargetPosition>,
     unit: Option<Arc<str>>,
 }
 
-impl TargetLattice {
-    /// Prepares the surface through the targets with these positions; `None` if the positions are no lattice.
-    pub fn new(positions: &[TargetPosition], targets: &[Channel]) -> Option<Self> {
-        let lattice = TargetPosition::lattice(positions)?;
+impl TargetSurface {
+    /// Prepares the surface through the targets with these positions: that of a lattice if they are one, else that of
+    /// scattered nodes.
+    ///
+    /// # Errors
+    /// [`SurfaceError`] if no surface goes through them: see [`SurfaceMap::scattered`].
+    pub fn new(positions: &[TargetPosition], targets: &[Channel]) -> Result<Self, SurfaceError> {
         let first = positions.first().and_then(|first| targets.get(first.target));
-        Some(Self {
-            map: Arc::new(SurfaceMap::new(lattice.x_mm(), lattice.y_mm()).ok()?),
-            nodes: lattice.places().iter().map(|&place| positions[place]).collect(),
+        let (map, nodes) = match TargetPosition::lattice(positions) {
+            Some(lattice) => (
+                SurfaceMap::new(lattice.x_mm(), lattice.y_mm())?,
+                lattice.places().iter().map(|&place| positions[place]).collect(),
+            ),
+            None => (
+                SurfaceMap::scattered(&TargetPosition::places_mm(positions))?,
+                positions.to_vec(),
+            ),
+        };
+        Ok(Self {
+            map: Arc::new(map),
+            nodes,
             unit: first.and_then(|first| first.unit.as_deref()).map(Arc::from),
         })
     }
@@ -96,7 +109,7 @@ mod tests {
     use super::*;
 
     /// 2 × 3 targets with others between them, in an order of their own, and a plane over the skin.
-    fn plane() -> (TargetLattice, Vec<f64>) {
+    fn plane() -> (TargetSurface, Vec<f64>) {
         let channel = |unit: &str| Channel {
             name: String::new(),
             unit: Some(unit.to_owned()),
@@ -115,14 +128,14 @@ mod tests {
         for position in &positions {
             values[position.target] = 1.0 + 0.5 * position.x_mm - 0.2 * position.y_mm;
         }
-        (TargetLattice::new(&positions, &targets).unwrap(), values)
+        (TargetSurface::new(&positions, &targets).unwrap(), values)
     }
 
     #[test]
     fn a_plane_over_the_skin_is_drawn_as_that_plane() {
-        let (lattice, actual) = plane();
+        let (surface, actual) = plane();
         let decoded = Vec::from_iter(actual.iter().map(|value| value + 0.25));
-        let [actual, decoded, error] = lattice.surfaces(&actual, &decoded, -1.0..=2.0);
+        let [actual, decoded, error] = surface.surfaces(&actual, &decoded, -1.0..=2.0);
         let grid = actual.map.grid();
         for (ix, x) in grid.x_mm().iter().enumerate() {
             for (iy, y) in grid.y_mm().iter().enumerate() {
@@ -132,7 +145,7 @@ mod tests {
                 assert!((error.values[at] - 0.25).abs() < 1e-9, "{x} {y}");
             }
         }
-        for (node, place) in actual.nodes.iter().zip(lattice.nodes()) {
+        for (node, place) in actual.nodes.iter().zip(surface.nodes()) {
             assert_eq!((node.x, node.y), (place.x_mm, place.y_mm));
             assert!((node.z - (1.0 + 0.5 * node.x - 0.2 * node.y)).abs() < 1e-12);
         }
@@ -143,9 +156,9 @@ mod tests {
 
     #[test]
     fn the_range_is_that_of_the_targets_with_positions() {
-        let (lattice, _) = plane();
+        let (surface, _) = plane();
         let mut ranges = vec![(-1.0, 1.0); 8];
         (ranges[3], ranges[6], ranges[0]) = ((-100.0, 100.0), (-3.0, 0.0), (0.0, 2.0));
-        assert_eq!(lattice.range_of(&ranges), -3.0..=2.0);
+        assert_eq!(surface.range_of(&ranges), -3.0..=2.0);
     }
 }

@@ -32,8 +32,15 @@ pub struct TargetPosition {
 impl TargetPosition {
     /// The lattice whose nodes are these positions; `None` if they are none, or no lattice.
     pub fn lattice(positions: &[Self]) -> Option<Lattice> {
-        let places = positions.iter().map(|position| [position.x_mm, position.y_mm]);
-        Lattice::of(&Vec::from_iter(places))
+        Lattice::of(&Self::places_mm(positions))
+    }
+
+    /// The positions (x, y), in millimetres.
+    pub fn places_mm(positions: &[Self]) -> Vec<[f64; 2]> {
+        positions
+            .iter()
+            .map(|position| [position.x_mm, position.y_mm])
+            .collect()
     }
 }
 

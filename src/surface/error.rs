@@ -5,9 +5,9 @@ use std::fmt;
 /// Axis of the coordinates at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// The x axis, with one coordinate per row-wire.
+    /// The x axis, in a lattice with one coordinate per row-wire.
     X,
-    /// The y axis, with one coordinate per node of a row.
+    /// The y axis, in a lattice with one coordinate per node of a row.
     Y,
 }
 
@@ -52,4 +52,28 @@ pub enum SurfaceError {
         /// Coordinate that they share, in millimetres.
         value_mm: f64,
     },
+    /// Two scattered nodes coincide, where the surface would have two heights.
+    #[error("nodes {first} and {second} coincide; nodes need places of their own")]
+    SamePlace {
+        /// Index of the first in the places given.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+    },
+    /// Scattered nodes are on one line.
+    #[error("all nodes are on one line, oblique to x and y; a surface needs nodes beside it")]
+    OnOneLine,
+    /// Scattered nodes are too many for a spline.
+    #[error(
+        "{count} scattered nodes are too many; a surface is laid through at most {most}, or through a lattice of any size"
+    )]
+    TooMany {
+        /// Number of nodes.
+        count: usize,
+        /// Largest number.
+        most: usize,
+    },
+    /// Scattered nodes of which some are much nearer to each other than to the rest.
+    #[error("a surface through the nodes would overshoot a thousandfold; leave out one of those that nearly coincide")]
+    Uneven,
 }

@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use super::error::{Axis, SurfaceError};
 
-/// A rectangular grid that passes through the nodes and extends half a pitch beyond them.
+/// A rectangular grid that passes through the nodes of a lattice and extends half a pitch beyond them; over scattered nodes,
+/// one that passes through the outermost of them.
 ///
 /// Values on it are `x points × y points`, x-major: point `(ix, iy)` has the index `ix · y_mm().len() + iy`.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,6 +121,24 @@ impl GridAxis {
             last_inside,
         }
     }
+
+    /// Divides the stretch between the outermost nodes, which are at no points of their own, into about `target` equal steps,
+    /// and goes on by `margin_mm` at both ends.
+    pub(super) fn spanning(first_mm: f64, last_mm: f64, target: usize, margin_mm: f64) -> Self {
+        let extent_mm = last_mm - first_mm;
+        let share = extent_mm / (extent_mm + 2.0 * margin_mm);
+        let steps = ((target as f64 * share) as usize).max(2);
+        let margin_steps = (target.saturating_sub(steps) / 2).max(1);
+        let along = |from: f64, to: f64, step: usize, steps: usize| from + (to - from) * step as f64 / steps as f64;
+        let before = (0..margin_steps).map(|step| along(first_mm - margin_mm, first_mm, step, margin_steps));
+        let between = (0..=steps).map(|step| along(first_mm, last_mm, step, steps));
+        let after = (1..=margin_steps).map(|step| along(last_mm, last_mm + margin_mm, step, margin_steps));
+        Self {
+            points_mm: before.chain(between).chain(after).collect(),
+            first_inside: margin_steps,
+            last_inside: margin_steps + steps,
+        }
+    }
 }
 
 /// Largest coordinate of which differences and products with the number of points do not overflow.
@@ -127,7 +146,23 @@ const LARGEST_MM: f64 = 1e300;
 
 /// Smallest distance between nodes, relative to their largest coordinate: some thousand roundings, so that the points
 /// between them can be told apart in double precision.
-const CLOSEST_RELATIVE: f64 = 1e-12;
+pub(super) const CLOSEST_RELATIVE: f64 = 1e-12;
+
+/// Checks that there are coordinates, all of them finite.
+pub(super) fn check_coordinates(axis: Axis, given_mm: &[f64]) -> Result<(), SurfaceError> {
+    if given_mm.is_empty() {
+        return Err(SurfaceError::NoNodes { axis });
+    }
+    let is_usable = |value_mm: &f64| value_mm.abs() <= LARGEST_MM;
+    match given_mm.iter().position(|value_mm| !is_usable(value_mm)) {
+        Some(index) => Err(SurfaceError::NotFinite {
+            axis,
+            index,
+            value_mm: given_mm[index],
+        }),
+        None => Ok(()),
+    }
+}
 
 /// Coordinates in ascending order, with the index of each in the order given.
 #[derive(Clone, Debug)]
@@ -138,17 +173,7 @@ pub(super) struct SortedAxis {
 
 impl SortedAxis {
     pub(super) fn new(axis: Axis, given_mm: &[f64]) -> Result<Self, SurfaceError> {
-        if given_mm.is_empty() {
-            return Err(SurfaceError::NoNodes { axis });
-        }
-        let is_usable = |value_mm: &f64| value_mm.abs() <= LARGEST_MM;
-        if let Some(index) = given_mm.iter().position(|value_mm| !is_usable(value_mm)) {
-            return Err(SurfaceError::NotFinite {
-                axis,
-                index,
-                value_mm: given_mm[index],
-            });
-        }
+        check_coordinates(axis, given_mm)?;
         let mut order: Vec<usize> = (0..given_mm.len()).collect();
         order.sort_by(|&a, &b| given_mm[a].total_cmp(&given_mm[b]));
         let nodes_mm: Vec<f64> = order.iter().map(|&index| given_mm[index]).collect();

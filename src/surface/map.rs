@@ -7,6 +7,7 @@ use ndarray::Array2;
 use super::bilinear::Bilinear;
 use super::error::{Axis, SurfaceError};
 use super::grid::{Grid, GridAxis, SortedAxis};
+use super::scattered::Scattered;
 use super::weights::{Point, Weights};
 use super::{natural_cubic, thin_plate};
 
@@ -42,13 +43,14 @@ impl fmt::Display for Interpolation {
     }
 }
 
-/// Interpolation through a lattice of nodes, factored once, so that each frame is one matrix-vector product.
+/// Interpolation through nodes, factored once, so that each frame is one matrix-vector product.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
     grid: Grid,
     nodes: usize,
     spline: Option<Spline>,
-    bilinear: Bilinear,
+    /// Between the nodes of a lattice.
+    bilinear: Option<Bilinear>,
 }
 
 #[derive(Clone, Debug)]
@@ -59,6 +61,8 @@ enum Spline {
     AlongX(Weights),
     /// Weights of the grid points along y, of nodes with one x.
     AlongY(Weights),
+    /// Weights of the grid points between scattered nodes.
+    Scattered(Scattered),
 }
 
 impl SurfaceMap {
@@ -71,17 +75,8 @@ impl SurfaceMap {
         let x = SortedAxis::new(Axis::X, x_mm)?;
         let y = SortedAxis::new(Axis::Y, y_mm)?;
         let nodes = x_mm.len() * y_mm.len();
-        let affordable = (MOST_WEIGHTS as f64 / nodes as f64).sqrt() as usize;
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
-        let spline_grid = grid(
-            &x,
-            &y,
-            if is_line {
-                GRID_POINTS
-            } else {
-                affordable.min(GRID_POINTS)
-            },
-        );
+        let spline_grid = grid(&x, &y, if is_line { GRID_POINTS } else { affordable(nodes) });
         let spline = if nodes > MOST_SPLINE_NODES {
             None
         } else if x_mm.len() == 1 {
@@ -103,7 +98,31 @@ impl SurfaceMap {
             grid,
             nodes,
             spline,
-            bilinear,
+            bilinear: Some(bilinear),
+        })
+    }
+
+    /// Prepares the thin-plate spline through nodes at these places (x, y), in millimetres, which need be no lattice. It has
+    /// gaps (NaN) beyond their convex hull, but for a margin of half the mean distance between neighbours, and at places that
+    /// are far from every node.
+    ///
+    /// # Errors
+    /// [`SurfaceError`] if there are no nodes, or more than a thousand, a coordinate is not finite, two nodes coincide or
+    /// nearly so, or all are on one line. A line along x or y is a lattice: see [`Self::new`].
+    pub fn scattered(places_mm: &[[f64; 2]]) -> Result<Self, SurfaceError> {
+        let nodes = places_mm.len();
+        if nodes > MOST_SPLINE_NODES {
+            return Err(SurfaceError::TooMany {
+                count: nodes,
+                most: MOST_SPLINE_NODES,
+            });
+        }
+        let (grid, scattered) = Scattered::new(places_mm, affordable(nodes))?;
+        Ok(Self {
+            grid,
+            nodes,
+            spline: Some(Spline::Scattered(scattered)),
+            bilinear: None,
         })
     }
 
@@ -112,7 +131,7 @@ impl SurfaceMap {
         &self.grid
     }
 
-    /// Number of nodes: rows × nodes per row.
+    /// Number of nodes; of a lattice, rows × nodes per row.
     pub fn node_count(&self) -> usize {
         self.nodes
     }
@@ -120,16 +139,17 @@ impl SurfaceMap {
     /// Returns the interpolation used between the nodes.
     pub fn interpolation(&self) -> Interpolation {
         match self.spline {
-            Some(Spline::Surface(_)) => Interpolation::ThinPlateSpline,
+            Some(Spline::Surface(_) | Spline::Scattered(_)) => Interpolation::ThinPlateSpline,
             Some(Spline::AlongX(_) | Spline::AlongY(_)) => Interpolation::CubicSpline,
             None => Interpolation::Bilinear,
         }
     }
 
-    /// Writes the surface through `node_values` (`rows × nodes_per_row`, row by row, in any unit) to `out`
+    /// Writes the surface through `node_values` (of a lattice `rows × nodes_per_row`, row by row; in any unit) to `out`
     /// (`x points × y points`, see [`Grid`]).
     ///
-    /// A missing value (NaN) leaves a gap around its node, and the rest of that frame is bilinear.
+    /// A missing value (NaN) leaves a gap around its node of a lattice, and the rest of that frame is bilinear; of scattered
+    /// nodes it leaves no surface.
     ///
     /// # Panics
     /// If `node_values` does not have [`Self::node_count`] entries, or `out` not [`Grid::len`].
@@ -154,7 +174,11 @@ impl SurfaceMap {
                 out.chunks_exact_mut(across)
                     .for_each(|line| line.copy_from_slice(&curve));
             }
-            None => self.bilinear.evaluate_into(node_values, out),
+            Some(Spline::Scattered(scattered)) => scattered.evaluate_into(node_values, out),
+            None => match &self.bilinear {
+                Some(bilinear) => bilinear.evaluate_into(node_values, out),
+                None => out.fill(f64::NAN),
+            },
         }
     }
 
@@ -167,6 +191,11 @@ impl SurfaceMap {
         self.evaluate_into(node_values, &mut out);
         out
     }
+}
+
+/// Number of grid points a side for a spline through so many nodes.
+fn affordable(nodes: usize) -> usize {
+    ((MOST_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }
 
 fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {

@@ -25,8 +25,7 @@ use ndarray::Array2;
 /// A place in the plane.
 pub(super) type Place = (f64, f64);
 
-/// Returns W (`points × nodes`) for the nodes of a lattice of at least two rows and columns; `None` if the equations are
-/// singular in the arithmetic.
+/// Returns W (`points × nodes`) for nodes that are not on one line; `None` if the equations are singular in the arithmetic.
 pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<f64>> {
     let local = LocalCoordinates::of(nodes_mm);
     let nodes = local.places(nodes_mm);
@@ -45,11 +44,13 @@ pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<
     solution -= (&system * basis) * at_points.transpose();
     remove_affine(basis, &mut solution);
 
+    // Before the projection, which leaves only rounding of three nodes.
+    let tau = system.norm_max();
     // Twice, once from each side: A is symmetric.
     remove_affine(basis, &mut system);
     system = system.transpose().to_owned();
     remove_affine(basis, &mut system);
-    system += (Scale(system.norm_max()) * basis) * basis.transpose();
+    system += (Scale(tau) * basis) * basis.transpose();
     system.llt(Side::Lower).ok()?.solve_in_place(&mut solution);
 
     remove_affine(basis, &mut solution);
@@ -108,39 +109,42 @@ impl LocalCoordinates {
     }
 }
 
-/// Affine functions that are orthonormal on the nodes of a lattice: a constant, and the distances from the means of x and
-/// y, which are orthogonal there.
+/// Affine functions that are orthonormal on the nodes: a constant, the distance from the mean of x, and that of y as far as
+/// it does not follow from the distance of x, which on a lattice is all of it.
 struct AffineBasis {
     constant: f64,
     mean: Place,
-    slopes: Place,
+    /// Change of y with x along the nodes.
+    tilt: f64,
+    scales: Place,
 }
 
 impl AffineBasis {
     fn of(nodes: &[Place]) -> Self {
         let count = nodes.len() as f64;
         let mean = |coordinate: fn(&Place) -> f64| nodes.iter().map(coordinate).sum::<f64>() / count;
-        let length = |coordinate: fn(&Place) -> f64, mean: f64| {
-            let squares = nodes.iter().map(|node| (coordinate(node) - mean).powi(2));
-            squares.sum::<f64>().sqrt()
-        };
         let mean = (mean(|place| place.0), mean(|place| place.1));
+        let centred = || nodes.iter().map(|node| (node.0 - mean.0, node.1 - mean.1));
+        let square = centred().map(|(x, _)| x * x).sum::<f64>();
+        let tilt = centred().map(|(x, y)| x * y).sum::<f64>() / square;
+        let rest = centred().map(|(x, y)| (y - tilt * x).powi(2)).sum::<f64>();
         Self {
             constant: 1.0 / count.sqrt(),
             mean,
-            slopes: (
-                1.0 / length(|place| place.0, mean.0),
-                1.0 / length(|place| place.1, mean.1),
-            ),
+            tilt,
+            scales: (1.0 / square.sqrt(), 1.0 / rest.sqrt()),
         }
     }
 
     /// Values of the three functions, `places × 3`.
     fn at(&self, places: &[Place]) -> Mat<f64> {
-        Mat::from_fn(places.len(), 3, |p, function| match function {
-            0 => self.constant,
-            1 => (places[p].0 - self.mean.0) * self.slopes.0,
-            _ => (places[p].1 - self.mean.1) * self.slopes.1,
+        Mat::from_fn(places.len(), 3, |p, function| {
+            let (x, y) = (places[p].0 - self.mean.0, places[p].1 - self.mean.1);
+            match function {
+                0 => self.constant,
+                1 => x * self.scales.0,
+                _ => (y - self.tilt * x) * self.scales.1,
+            }
         })
     }
 }

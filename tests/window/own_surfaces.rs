@@ -123,18 +123,51 @@ fn targets_with_positions_are_shown_as_surfaces_beside_the_other_charts() {
 }
 
 #[test]
-fn positions_that_are_no_grid_or_wrong_say_so_and_are_closed_again() {
+fn scattered_positions_have_surfaces_that_end_where_they_end() {
+    let folder = tempfile::tempdir().unwrap();
+    // A hexagon around d6.
+    let hexagon = "target,x,y\nd1,5,0\nd2,2.5,4.33\nd3,-2.5,4.33\nd4,-5,0\nd5,-2.5,-4.33\nd6,0,0\n";
+    let (path, taxels) = (skin(&folder), written(&folder, "taxels.csv", hexagon));
+    let mut driver = Driver::open();
+    driver.drop_files(&[&path, &taxels]);
+    driver.wait("the columns", |driver| driver.has("Meaning of d6"));
+    give_targets(&mut driver);
+    driver.wait("the positions", |driver| {
+        driver.says("6 targets have positions, scattered over the skin")
+    });
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    driver.wait("the surfaces", |driver| driver.has("Actual surface of the sample"));
+    assert!(
+        range(&driver, "Decoded").starts_with("value "),
+        "{}",
+        range(&driver, "Decoded")
+    );
+    driver.click("Top view");
+    driver.settle();
+    let picture = folder.path().join("surfaces.svg");
+    driver.save("Chart, SVG", &picture);
+    let svg = fs::read_to_string(&picture).unwrap();
+    assert!(
+        svg.contains("Between the nodes: thin-plate spline"),
+        "{:#?}",
+        driver.texts()
+    );
+}
+
+#[test]
+fn positions_on_an_oblique_line_or_wrong_say_so_and_are_closed_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = skin(&folder);
-    let scattered = written(&folder, "scattered.csv", "target,x,y\nd1,0,0\nd2,3,1\nd3,1,4\n");
+    let oblique = written(&folder, "oblique.csv", "target,x,y\nd1,0,0\nd2,3,1\nd3,6,2\n");
     let wrong = written(&folder, "wrong.csv", "target,x,y\nd1,0,0\nd9,4,0\n");
     let mut driver = Driver::open();
     driver.drop_files(&[&path]);
     driver.wait("the columns", |driver| driver.has("Meaning of d6"));
     give_targets(&mut driver);
-    driver.drop_files(&[&scattered]);
+    driver.drop_files(&[&oblique]);
     driver.wait("the positions", |driver| {
-        driver.says("3 targets have positions, which are no grid")
+        driver.says("3 targets have positions, scattered over the skin")
     });
     driver.limit_epochs("2");
     driver.train_own_data();
@@ -143,7 +176,8 @@ fn positions_that_are_no_grid_or_wrong_say_so_and_are_closed_again() {
     });
     driver.click("Surfaces");
     driver.settle();
-    assert!(driver.says("no surface is laid through them. The chart “Sample” shows all targets"));
+    assert!(driver.says("No surface goes through the positions of the targets: all nodes are on one line"));
+    assert!(driver.says("The chart “Sample” shows all targets."));
 
     // Another file, by its path.
     driver.click("Positions");

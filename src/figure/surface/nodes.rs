@@ -140,7 +140,11 @@ fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Stage<'_>) -> bool {
     let tolerance = 0.01 * (high - low);
     line_of_sight(node, sight, field.grid)
         .take_while(|(place, _)| place.z <= high)
-        .any(|(place, point)| field.values[point].min(high) > place.z + tolerance)
+        .any(|(place, point)| {
+            // A gap hides nothing.
+            let value = field.values[point];
+            value.is_finite() && value.min(high) > place.z + tolerance
+        })
 }
 
 /// Places from a little off `node` towards the eye, as long as they lie over the grid; each with the grid point before
@@ -162,8 +166,19 @@ fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item =
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::surface::SurfaceMap;
+    use crate::{
+        figure::{
+            SequentialMap,
+            surface::{
+                OrbitCamera, Quantity, Surface, ViewMode,
+                projection::{PlotBox, Projection},
+            },
+        },
+        surface::SurfaceMap,
+    };
 
     #[test]
     fn looking_along_a_stretched_array_takes_as_few_steps_as_along_a_square_one() {
@@ -191,5 +206,38 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_gap_hides_no_node() {
+        let places = Vec::from_iter((0..4).map(f64::from));
+        let map = Arc::new(SurfaceMap::new(&places, &places).unwrap());
+        let camera = OrbitCamera::default();
+        let hidden = |beside: f64| {
+            // Level at the node in the middle of the first wire, `beside` everywhere else.
+            let grid = map.grid();
+            let values = grid
+                .x_mm()
+                .iter()
+                .flat_map(|&x| grid.y_mm().iter().map(move |&y| (x, y)));
+            let values = values.map(|(x, y)| if (x - 1.0).hypot(y - 1.0) < 0.2 { 4.2 } else { beside });
+            let surface = Surface {
+                title: String::new(),
+                values: values.collect(),
+                nodes: Arc::new([]),
+                map: Arc::clone(&map),
+                quantity: Quantity::Height,
+                range: 4.0..=5.0,
+                mode: ViewMode::ThreeD,
+                colours: SequentialMap::default(),
+            };
+            let field = Field::new(&surface);
+            let (min_mm, max_mm) = field.box_mm();
+            let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
+            let projection = Projection::fit(PlotBox::new(min_mm, max_mm, 1.0), camera, screen);
+            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &Stage::Space(&projection))
+        };
+        assert!(hidden(5.0), "walls around it hide it");
+        assert!(!hidden(f64::NAN), "nothing does");
     }
 }

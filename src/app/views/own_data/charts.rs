@@ -84,8 +84,8 @@ impl ChartChoice {
         let is_probe = targets.len() <= 3;
         self.target = 0;
         self.tab = match trained.positions() {
-            Positions::Grid(_) => ChartTab::Surfaces,
-            Positions::NoGrid => ChartTab::Sample,
+            Positions::Surface(_) => ChartTab::Surfaces,
+            Positions::NoSurface(_) => ChartTab::Sample,
             Positions::None if is_probe && position_pair(targets).is_some() => ChartTab::Map,
             Positions::None => ChartTab::Regression,
         };

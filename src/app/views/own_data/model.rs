@@ -7,8 +7,9 @@ use crate::{
     dataset::Dataset,
     evaluation::{TargetErrors, TargetRow},
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
-    figure::TargetLattice,
+    figure::TargetSurface,
     import::{Channel, Recording},
+    surface::SurfaceError,
 };
 
 /// A network trained on recordings, as far as the window knows it.
@@ -51,10 +52,10 @@ pub(super) struct Tested {
 pub(super) enum Positions {
     /// No target has one.
     None,
-    /// They are no grid, so that no surface is laid through them.
-    NoGrid,
-    /// They are a grid.
-    Grid(Arc<TargetLattice>),
+    /// No surface goes through them.
+    NoSurface(SurfaceError),
+    /// The surface through them.
+    Surface(Arc<TargetSurface>),
 }
 
 impl Positions {
@@ -63,8 +64,10 @@ impl Positions {
         if recording.positions.is_empty() {
             return Self::None;
         }
-        let lattice = TargetLattice::new(&recording.positions, &recording.targets);
-        lattice.map_or(Self::NoGrid, |lattice| Self::Grid(Arc::new(lattice)))
+        match TargetSurface::new(&recording.positions, &recording.targets) {
+            Ok(surface) => Self::Surface(Arc::new(surface)),
+            Err(reason) => Self::NoSurface(reason),
+        }
     }
 }
 

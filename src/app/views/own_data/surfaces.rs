@@ -19,7 +19,7 @@ use crate::{
     },
     export::format_number,
     figure::{
-        TargetLattice,
+        TargetSurface,
         surface::{Surface, SurfaceFigure},
     },
     import::Channel,
@@ -45,10 +45,10 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn new(tested: &Arc<Tested>, lattice: &TargetLattice, sample: usize, heights: HeightScale) -> Self {
+    fn new(tested: &Arc<Tested>, through: &TargetSurface, sample: usize, heights: HeightScale) -> Self {
         let actual = tested.set().targets().row(sample).to_vec();
         let decoded = tested.answers.row(sample).to_vec();
-        let of_all = lattice.range_of(&tested.ranges);
+        let of_all = through.range_of(&tested.ranges);
         let range = match heights {
             HeightScale::Stroke => of_all,
             HeightScale::Fitted => {
@@ -56,14 +56,14 @@ impl Drawn {
                     .iter()
                     .zip(&decoded)
                     .map(|(&one, &other)| (one.min(other), one.max(other)));
-                lattice.range_of(&Vec::from_iter(ends))
+                through.range_of(&Vec::from_iter(ends))
             }
         };
         Self {
             tested: Arc::clone(tested),
             sample,
             heights,
-            surfaces: lattice.surfaces(&actual, &decoded, range),
+            surfaces: through.surfaces(&actual, &decoded, range),
         }
     }
 
@@ -74,10 +74,10 @@ impl Drawn {
 
 impl SurfacesChoice {
     /// The surfaces of a sample: those drawn last, or new ones.
-    fn drawn(&self, tested: &Arc<Tested>, lattice: &TargetLattice, sample: usize, heights: HeightScale) -> Drawn {
+    fn drawn(&self, tested: &Arc<Tested>, through: &TargetSurface, sample: usize, heights: HeightScale) -> Drawn {
         let kept = self.drawn.as_ref().filter(|drawn| drawn.is_of(tested, sample, heights));
         kept.cloned()
-            .unwrap_or_else(|| Drawn::new(tested, lattice, sample, heights))
+            .unwrap_or_else(|| Drawn::new(tested, through, sample, heights))
     }
 
     fn figure(&self, drawn: &Drawn, look: Look) -> SurfaceFigure {
@@ -100,14 +100,14 @@ impl SurfacesChoice {
     }
 }
 
-/// The surfaces of this sample on show; `None` without test samples or where the positions are no grid.
+/// The surfaces of this sample on show; `None` without test samples or where no surface goes through the positions.
 pub(super) fn shown_surfaces(view: &OwnDataView, look: Look) -> Option<SurfaceFigure> {
     let tested = view.shown.as_ref()?.tested.as_ref()?;
-    let Positions::Grid(lattice) = &tested.positions else {
+    let Positions::Surface(through) = &tested.positions else {
         return None;
     };
     let choice = &view.surfaces;
-    let drawn = choice.drawn(tested, lattice, view.chart.sample_of(tested), look.heights);
+    let drawn = choice.drawn(tested, through, view.chart.sample_of(tested), look.heights);
     Some(choice.figure(&drawn, look))
 }
 
@@ -120,20 +120,20 @@ pub(super) fn surfaces_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
     else {
         return;
     };
-    let lattice = match &tested.positions {
-        Positions::Grid(lattice) => Arc::clone(lattice),
-        Positions::None | Positions::NoGrid => {
-            placeholder_ui(
-                ui,
-                "The positions of the targets are no grid of every x with every y, so no surface is laid through them. The \
-                 chart “Sample” shows all targets of a sample.",
+    let through = match &tested.positions {
+        Positions::Surface(through) => Arc::clone(through),
+        Positions::NoSurface(reason) => {
+            let text = format!(
+                "No surface goes through the positions of the targets: {reason}. The chart “Sample” shows all targets."
             );
+            placeholder_ui(ui, &text);
             return;
         }
+        Positions::None => return,
     };
     let sample = view.chart.sample_of(tested);
     let choice = &mut view.surfaces;
-    let drawn = choice.drawn(tested, &lattice, sample, look.heights);
+    let drawn = choice.drawn(tested, &through, sample, look.heights);
     let figure = choice.figure(&drawn, look);
     let gap = space(3);
     let area = ui.available_rect_before_wrap();
@@ -159,7 +159,7 @@ pub(super) fn surfaces_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
                 ui,
                 (surface, &figure),
                 &drawn,
-                (&lattice, shown),
+                (&through, shown),
                 look,
                 &mut choice.node,
                 effects,
@@ -182,7 +182,7 @@ fn surface_ui(
     ui: &mut Ui,
     (surface, figure): (&Surface, &SurfaceFigure),
     drawn: &Drawn,
-    (lattice, trained): (&TargetLattice, &Trained),
+    (through, trained): (&TargetSurface, &Trained),
     look: Look,
     marked: &mut Option<usize>,
     effects: &mut Vec<Effect>,
@@ -198,7 +198,7 @@ fn surface_ui(
     .show(ui, look.camera);
     follow_surface(&shown, look, marked, effects);
     shown.node_tooltip_ui(|ui, node| {
-        if let Some(target) = lattice.nodes().get(node).map(|at| &trained.file.targets[at.target]) {
+        if let Some(target) = through.nodes().get(node).map(|at| &trained.file.targets[at.target]) {
             node_ui(ui, target, drawn, node);
         }
     });
