@@ -54,6 +54,11 @@ impl Grid {
         self.y.first_inside..=self.y.last_inside
     }
 
+    /// 0 within the bounding rectangle of the nodes, 1 at the ends of the grid, linear between.
+    pub(super) fn beyond(&self, ix: usize, iy: usize) -> f64 {
+        self.x.beyond(ix).max(self.y.beyond(iy))
+    }
+
     /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. A
     /// single row or column has no extent; the strip that stands for it counts as inside.
     pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
@@ -70,6 +75,15 @@ pub(super) struct GridAxis {
 }
 
 impl GridAxis {
+    fn beyond(&self, index: usize) -> f64 {
+        if index < self.first_inside {
+            (self.first_inside - index) as f64 / self.first_inside as f64
+        } else {
+            let margin = self.points_mm.len() - 1 - self.last_inside;
+            index.saturating_sub(self.last_inside) as f64 / margin.max(1) as f64
+        }
+    }
+
     /// Divides every interval of the ascending `nodes_mm` into equal steps, for about `target` points in all.
     ///
     /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch of its own; larger where that would be

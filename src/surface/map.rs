@@ -131,6 +131,15 @@ impl SurfaceMap {
         &self.grid
     }
 
+    /// How far a grid point is beyond the nodes: 0 between them, in their bounding rectangle or, of scattered nodes, their
+    /// hull; 1 where the surface ends, and where scattered nodes have none.
+    pub fn beyond(&self, ix: usize, iy: usize) -> f64 {
+        match &self.spline {
+            Some(Spline::Scattered(scattered)) => scattered.beyond(self.grid.index(ix, iy)),
+            _ => self.grid.beyond(ix, iy),
+        }
+    }
+
     /// Number of nodes; of a lattice, rows × nodes per row.
     pub fn node_count(&self) -> usize {
         self.nodes

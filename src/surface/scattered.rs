@@ -21,6 +21,8 @@ const REACH: f64 = 1.5;
 pub(super) struct Scattered {
     /// Indices of the grid points that have a surface.
     points: Vec<usize>,
+    /// Distance of each grid point from the hull, as a part of the margin; 1 where there is no surface.
+    beyond: Vec<f64>,
     /// Weights at these points, and after them at the places themselves.
     weights: Weights,
 }
@@ -51,24 +53,37 @@ impl Scattered {
         let drawn = at.enumerate().filter_map(|(index, at)| {
             let beyond_mm = hull.distance_mm(at);
             let is_near = || places.iter().any(|place| place.distance(at) <= reach_mm);
-            (beyond_mm <= margin_mm && is_near()).then_some((index, at, beyond_mm == 0.0))
+            (beyond_mm <= margin_mm && is_near()).then_some((index, at, beyond_mm))
         });
         let drawn = Vec::from_iter(drawn);
         let evaluated = drawn.iter().map(|(_, at, _)| *at).chain(places.iter().copied());
         let tuples = |places: &[DVec2]| Vec::from_iter(places.iter().map(|at| (at.x, at.y)));
         let weights = thin_plate::weights(&tuples(&places), &tuples(&Vec::from_iter(evaluated)));
-        let known = drawn.iter().map(|&(_, _, is_inside)| Point { is_inside, node: None });
+        let known = drawn.iter().map(|&(_, _, beyond_mm)| Point {
+            is_inside: beyond_mm == 0.0,
+            node: None,
+        });
         // At the places the spline must give their values, or it is rounding.
         let at_places = (0..places.len()).map(|node| Point {
             is_inside: true,
             node: Some(node),
         });
         let weights = weights.and_then(|weights| Weights::checked(weights, known.chain(at_places)));
+        let mut beyond = vec![1.0; grid.len()];
+        for &(index, _, beyond_mm) in &drawn {
+            beyond[index] = beyond_mm / margin_mm;
+        }
         let scattered = Self {
+            beyond,
             points: drawn.iter().map(|&(index, ..)| index).collect(),
             weights: weights.ok_or(SurfaceError::Uneven)?,
         };
         Ok((grid, scattered))
+    }
+
+    /// How far a grid point is beyond the nodes: see [`super::SurfaceMap::beyond`].
+    pub(super) fn beyond(&self, point: usize) -> f64 {
+        self.beyond[point]
     }
 
     /// Writes the surface, with NaN where there is none.

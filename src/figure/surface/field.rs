@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::surface_figure::{Surface, ViewMode};
-use crate::surface::Grid;
+use crate::surface::{Grid, SurfaceMap};
 
 /// Room for overshoots of the surface above and below the range, as a part of it.
 const HEADROOM: f64 = 0.08;
@@ -25,6 +25,7 @@ pub(super) enum CellPart {
 
 /// A surface on its grid.
 pub(super) struct Field<'a> {
+    map: &'a SurfaceMap,
     pub(super) grid: &'a Grid,
     /// `x points × y points`; NaN leaves a gap. Empty if there are not as many as grid points.
     pub(super) values: &'a [f64],
@@ -42,6 +43,7 @@ impl<'a> Field<'a> {
         let headroom = HEADROOM * (range.end() - range.start());
         let values = Some(&*surface.values).filter(|values| values.len() == grid.len());
         Self {
+            map: &surface.map,
             grid,
             values: values.unwrap_or_default(),
             shown: range.start() - headroom..=range.end() + headroom,
@@ -65,18 +67,9 @@ impl<'a> Field<'a> {
         ((value - self.range.start()) / (self.range.end() - self.range.start())) as f32
     }
 
-    /// 0 within the nodes' rectangle, 1 at the rim of the extrapolated margin.
+    /// 0 between the nodes, 1 at the rim of the extrapolated margin.
     pub(super) fn beyond(&self, ix: usize, iy: usize) -> f32 {
-        let outside = |index: usize, inside: &RangeInclusive<usize>, count: usize| {
-            if index < *inside.start() {
-                (inside.start() - index) as f32 / *inside.start() as f32
-            } else {
-                index.saturating_sub(*inside.end()) as f32 / (count - 1 - inside.end()).max(1) as f32
-            }
-        };
-        let along_x = outside(ix, &self.grid.inside_x(), self.grid.x_mm().len());
-        let along_y = outside(iy, &self.grid.inside_y(), self.grid.y_mm().len());
-        along_x.max(along_y)
+        self.map.beyond(ix, iy) as f32
     }
 
     /// Corners of the cell at `(ix, iy)`, going round it.
@@ -132,7 +125,8 @@ impl<'a> Field<'a> {
     }
 
     fn is_between_nodes(&self, ix: usize, iy: usize) -> bool {
-        self.grid.is_inside(ix, iy) && self.grid.is_inside(ix + 1, iy + 1)
+        let corners = [(ix, iy), (ix + 1, iy), (ix + 1, iy + 1), (ix, iy + 1)];
+        corners.iter().all(|&(ix, iy)| self.map.beyond(ix, iy) == 0.0)
     }
 
     /// Values that the box has room for.
