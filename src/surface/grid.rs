@@ -111,7 +111,6 @@ impl GridAxis {
                 (margin_mm, margin_mm)
             }
         };
-        let along = |from: f64, to: f64, step: usize, steps: usize| from + (to - from) * step as f64 / steps as f64;
         let (first_mm, last_mm) = (nodes_mm[0], nodes_mm[last]);
         let mut points_mm: Vec<f64> = (0..margin_steps)
             .map(|step| along(first_mm - before_mm, first_mm, step, margin_steps))
@@ -136,14 +135,13 @@ impl GridAxis {
         }
     }
 
-    /// Divides the stretch between the outermost nodes, which are at no points of their own, into about `target` equal steps,
-    /// and goes on by `margin_mm` at both ends.
+    /// Divides the stretch between the outermost nodes into equal steps, and goes on by `margin_mm` at both ends, with about
+    /// `target` steps in all.
     pub(super) fn spanning(first_mm: f64, last_mm: f64, target: usize, margin_mm: f64) -> Self {
         let extent_mm = last_mm - first_mm;
         let share = extent_mm / (extent_mm + 2.0 * margin_mm);
         let steps = ((target as f64 * share) as usize).max(2);
         let margin_steps = (target.saturating_sub(steps) / 2).max(1);
-        let along = |from: f64, to: f64, step: usize, steps: usize| from + (to - from) * step as f64 / steps as f64;
         let before = (0..margin_steps).map(|step| along(first_mm - margin_mm, first_mm, step, margin_steps));
         let between = (0..=steps).map(|step| along(first_mm, last_mm, step, steps));
         let after = (1..=margin_steps).map(|step| along(last_mm, last_mm + margin_mm, step, margin_steps));
@@ -153,6 +151,11 @@ impl GridAxis {
             last_inside: margin_steps + steps,
         }
     }
+}
+
+/// Place after so many of equal steps.
+fn along(from: f64, to: f64, step: usize, steps: usize) -> f64 {
+    from + (to - from) * step as f64 / steps as f64
 }
 
 /// Largest coordinate of which differences and products with the number of points do not overflow.

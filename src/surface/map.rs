@@ -131,8 +131,8 @@ impl SurfaceMap {
         &self.grid
     }
 
-    /// How far a grid point is beyond the nodes: 0 between them, in their bounding rectangle or, of scattered nodes, their
-    /// hull; 1 where the surface ends, and where scattered nodes have none.
+    /// Distance of a grid point from the nodes as a part of the margin: 0 between them, in their bounding rectangle or, of
+    /// scattered nodes, their hull; 1 where the surface ends, and where scattered nodes have none.
     pub fn beyond(&self, ix: usize, iy: usize) -> f64 {
         match &self.spline {
             Some(Spline::Scattered(scattered)) => scattered.beyond(self.grid.index(ix, iy)),

@@ -81,7 +81,7 @@ impl Scattered {
         Ok((grid, scattered))
     }
 
-    /// How far a grid point is beyond the nodes: see [`super::SurfaceMap::beyond`].
+    /// Distance of a grid point from the nodes as a part of the margin: see [`super::SurfaceMap::beyond`].
     pub(super) fn beyond(&self, point: usize) -> f64 {
         self.beyond[point]
     }

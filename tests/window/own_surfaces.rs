@@ -1,6 +1,10 @@
 //! Surfaces of own data: targets that have positions on the skin, actual and decoded, and what is said where there are none.
 
-use std::{fmt::Write as _, fs};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use decoupler::{app::Notice, export::RecipeFile};
 use eframe::egui::vec2;
@@ -13,7 +17,7 @@ use crate::{
 };
 
 /// Two readings of a press on 2 × 3 taxels, and the force.
-fn skin(folder: &TempDir) -> std::path::PathBuf {
+fn skin(folder: &TempDir) -> PathBuf {
     let mut text = "time (s),u1 (V),u2 (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),d5 (mm),d6 (mm),force (N)\n".to_owned();
     for row in 0..60 {
         let t = f64::from(row);
@@ -46,20 +50,24 @@ fn give_targets(driver: &mut Driver) {
     }
 }
 
+/// Trains on a skin whose targets have positions, of which the window says this, until the surfaces are there.
+fn with_surfaces(files: [&Path; 2], positions: &str) -> Driver {
+    let mut driver = Driver::open();
+    driver.drop_files(&files);
+    driver.wait("the columns", |driver| driver.has("Meaning of d6"));
+    give_targets(&mut driver);
+    driver.wait("the positions", |driver| driver.says(positions));
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    driver.wait("the surfaces", |driver| driver.has("Actual surface of the sample"));
+    driver
+}
+
 #[test]
 fn targets_with_positions_are_shown_as_surfaces_beside_the_other_charts() {
     let folder = tempfile::tempdir().unwrap();
     let (path, taxels) = (skin(&folder), written(&folder, "taxels.csv", GRID));
-    let mut driver = Driver::open();
-    driver.drop_files(&[&path, &taxels]);
-    driver.wait("the columns", |driver| driver.has("Meaning of d6"));
-    give_targets(&mut driver);
-    driver.wait("the positions", |driver| {
-        driver.says("6 targets have positions: a grid of 2 × 3")
-    });
-    driver.limit_epochs("3");
-    driver.train_own_data();
-    driver.wait("the surfaces", |driver| driver.has("Actual surface of the sample"));
+    let mut driver = with_surfaces([&path, &taxels], "6 targets have positions: a grid of 2 × 3");
     // The first of the last 12 samples: d1 is the lowest and d6 the highest, or the other way round.
     let of_sample = |row: f64| {
         let (u, v) = ((0.37 * row).sin(), (0.23 * row).cos());
@@ -128,16 +136,7 @@ fn scattered_positions_have_surfaces_that_end_where_they_end() {
     // A hexagon around d6.
     let hexagon = "target,x,y\nd1,5,0\nd2,2.5,4.33\nd3,-2.5,4.33\nd4,-5,0\nd5,-2.5,-4.33\nd6,0,0\n";
     let (path, taxels) = (skin(&folder), written(&folder, "taxels.csv", hexagon));
-    let mut driver = Driver::open();
-    driver.drop_files(&[&path, &taxels]);
-    driver.wait("the columns", |driver| driver.has("Meaning of d6"));
-    give_targets(&mut driver);
-    driver.wait("the positions", |driver| {
-        driver.says("6 targets have positions, scattered over the skin")
-    });
-    driver.limit_epochs("3");
-    driver.train_own_data();
-    driver.wait("the surfaces", |driver| driver.has("Actual surface of the sample"));
+    let mut driver = with_surfaces([&path, &taxels], "6 targets have positions, scattered over the skin");
     assert!(
         range(&driver, "Decoded").starts_with("value "),
         "{}",

@@ -214,7 +214,7 @@ mod tests {
         let map = Arc::new(SurfaceMap::new(&places, &places).unwrap());
         let camera = OrbitCamera::default();
         let hidden = |beside: f64| {
-            // Level at the node in the middle of the first wire, `beside` everywhere else.
+            // Level around the node, `beside` everywhere else.
             let grid = map.grid();
             let values = grid
                 .x_mm()
