@@ -17,7 +17,7 @@ use egui_kittest::{
     kittest::{By, NodeT as _, Queryable as _},
 };
 
-use crate::support::rasterise::Rasteriser;
+use crate::rasterise::Rasteriser;
 
 /// Time after which something awaited counts as never coming.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);

@@ -22,17 +22,17 @@ mod own_findings;
 mod own_surfaces;
 mod pictures;
 mod pressing;
+mod rasterise;
 mod reading_errors;
 mod recordings;
 mod remembering;
 mod scenes;
 mod scrubbing;
 mod snapshots;
+mod surface_view;
 mod trading;
 mod training;
 mod typing;
 
 #[path = "../support/folders.rs"]
 mod folders;
-#[path = "../support/mod.rs"]
-mod support;

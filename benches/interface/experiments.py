@@ -1,0 +1,94 @@
+"""The window while the experiment of Table 1 trains on all cores: time from a movement of the pointer until a button lights
+up, frames a second while a column is drawn wider, time from Cancel until Run is offered again.
+
+    cargo build --release
+    python3 benches/interface/experiments.py target/release/decoupler
+
+What it needs stands in `screen.py`.
+"""
+
+import json
+import math
+import os
+import random
+import sys
+import time
+
+from screen import Window, quantiles, shell
+
+MOVEMENTS = 60
+FRAMES_S = 10.0
+CANCELS = 10
+# Where the pointer lights up the button Search, and its left, right, top and bottom beside the pointer, in pixels.
+SEARCH = (1334, 42)
+SEARCH_BESIDE = (1300, 1308, 34, 52)
+# Where the edge of the left column is taken, how far it is drawn, and the headings that move with it, in pixels.
+EDGE = (272, 700)
+DRAWN = 120
+HEADINGS = (280, 1000, 90, 130)
+# The button Run, which is watched, and Cancel, which is pressed.
+RUN = (16, 130, 410, 432)
+CANCEL = (200, 422)
+
+
+def show_experiments(folder):
+    os.makedirs(f"{folder}/decoupler")
+    with open(f"{folder}/decoupler/window.json", "w") as file:
+        json.dump({"has_toured": True, "view": "Experiments"}, file)
+
+
+def measure(window):
+    shell("xdotool", "key", "ctrl+Return")
+    time.sleep(5)
+    print(f"pointer to pixel, ms: {quantiles([hover(window) for _ in range(MOVEMENTS)])}")
+    print(f"frames a second while a column is drawn: {frames(window) / FRAMES_S:.0f}")
+    print(f"Cancel to Run, ms: {quantiles([cancel(window) for _ in range(CANCELS)])}")
+    window.save_picture()
+
+
+def hover(window):
+    """Moves the pointer to a button; returns the time until the button lights up."""
+    window.move((EDGE[0] + 200, EDGE[1]))
+    time.sleep(0.2 + 0.1 * random.random())
+    before = window.screen.pixels(SEARCH_BESIDE)
+    window.move(SEARCH)
+    return window.until_changed(SEARCH_BESIDE, before, "The light of the button")
+
+
+def frames(window):
+    """Draws the left column wider and narrower for `FRAMES_S` seconds; returns how often the headings beside it move."""
+    window.move(EDGE)
+    time.sleep(0.5)
+    window.press()
+    begun, count, before = time.perf_counter(), 0, window.screen.pixels(HEADINGS)
+    while (now := time.perf_counter() - begun) < FRAMES_S:
+        drawn = DRAWN * 0.5 * (1 - math.cos(2 * math.pi * now / 2.0))
+        window.move((round(EDGE[0] + drawn), EDGE[1]))
+        after = window.screen.pixels(HEADINGS)
+        count += after != before
+        before = after
+        # A mouse tells where it is some 200 times a second.
+        time.sleep(0.005)
+    window.move(EDGE)
+    time.sleep(0.5)
+    window.release()
+    return count
+
+
+def cancel(window):
+    """Presses Cancel; returns the time from its release until Run can be pressed again. Then the experiment runs again."""
+    window.move(CANCEL)
+    time.sleep(1 + random.random())
+    before = window.screen.pixels(RUN)
+    window.press()
+    time.sleep(0.05)
+    window.release()
+    taken = window.until_changed(RUN, before, "The end of the experiment")
+    time.sleep(0.5)
+    shell("xdotool", "key", "ctrl+Return")
+    time.sleep(2)
+    return taken
+
+
+with Window(sys.argv[1], show_experiments) as window:
+    measure(window)

@@ -1,0 +1,154 @@
+//! A real sensor in the terminal: calibrated, trained on its calibrated model, fine-tuned on its frames.
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use decoupler::{
+    dataset::{Dataset, Seed, Stream},
+    scene::{Loading, Noise, Scene},
+    sensor::SensorModel,
+};
+use serde_json::Value;
+
+use crate::terminal::decoupler;
+
+const ARRAY: &str = "4x4_3x12";
+const FRAMES: &str = "--data frames.csv --inputs r_1..r_12 --depths d_1..d_4 --row-wire row --group frame";
+
+/// Writes frames of a sensor that is not quite as drawn; only how far its nodes are pressed is told.
+fn record(folder: &Path) -> SensorModel {
+    let nominal = SensorModel::new(ARRAY.parse().unwrap());
+    let mut real = nominal;
+    real.geometry.height_mm *= 1.05;
+    real.geometry.node_pitch_mm *= 0.95;
+    real.geometry.column_node_x0_mm *= 1.05;
+    let scene = Scene {
+        loading: Loading::SmoothField {
+            correlation_length_mm: 4.0,
+        },
+        noise: Noise::relative(1e-3),
+        ..Scene::default()
+    };
+    let mut set = Dataset::simulate(&real, &scene, 240, &mut Seed(1).rng(Stream::Training)).unwrap();
+    set.disturb(&real, &scene.noise, &mut Seed(1).rng(Stream::TrainingNoise))
+        .unwrap();
+    let names = |letter: &str, count| {
+        (1..=count)
+            .map(|number| format!("{letter}_{number}"))
+            .collect::<Vec<_>>()
+    };
+    let mut text = format!("frame,row,{},{}\n", names("r", 12).join(","), names("d", 4).join(","));
+    for sample in 0..set.samples() {
+        let row = set.row_wire(sample).unwrap();
+        write!(text, "{},{}", set.groups()[sample], row + 1).unwrap();
+        set.sample_readings(sample)
+            .iter()
+            .for_each(|ohm| write!(text, ",{ohm}").unwrap());
+        let rest = real.geometry.height_mm;
+        let depths = set.sample_targets(sample).chunks(3).map(|node| rest - node[2]);
+        depths.for_each(|depth| write!(text, ",{depth}").unwrap());
+        text.push('\n');
+    }
+    fs::write(folder.join("frames.csv"), text).unwrap();
+    real
+}
+
+fn json(arguments: &str, folder: &Path) -> Value {
+    let output = decoupler(arguments, folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments}: {message}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_real_sensor_is_calibrated_trained_for_and_tuned_to() {
+    let folder = tempfile::tempdir().unwrap();
+    let real = record(folder.path());
+    let path = folder.path();
+    let report = json(
+        &format!("calibrate --array {ARRAY} {FRAMES} --out sensor.json --json"),
+        path,
+    );
+    let told = |name: &str| {
+        let parameters = report["parameters"].as_array().unwrap();
+        let found = parameters.iter().find(|parameter| parameter["name"] == name).unwrap();
+        (found["value"].as_f64().unwrap(), found["half_width"].as_f64().unwrap())
+    };
+    for (name, truth) in [
+        ("height", real.geometry.height_mm),
+        ("node pitch", real.geometry.node_pitch_mm),
+        ("x of the first column node", real.geometry.column_node_x0_mm),
+    ] {
+        let (value, half_width) = told(name);
+        assert!(
+            (value - truth).abs() <= half_width && half_width < 0.03 * truth,
+            "{name}: {value} ± {half_width}"
+        );
+    }
+    let residual = |name: &str| report[name].as_f64().unwrap();
+    assert!(residual("residual") < 1.2e-3 && residual("nominal_residual") > 1e-2);
+    let train = "--rows known --inputs conductance --loading smooth:4 --noise 1e-3 --samples 400 --validation-samples 80 \
+                 --hidden 6 --epochs 15 --decoder mean --json";
+    json(
+        &format!("train --sensor sensor.json {train} --out calibrated.json"),
+        path,
+    );
+    json(&format!("train --array {ARRAY} {train} --out nominal.json"), path);
+    let tune = |network: &str| {
+        let arguments =
+            format!("fine-tune --network {network}.json {FRAMES} --epochs 15 --out {network}_tuned.json --json");
+        let report = json(&arguments, path);
+        ["z_mm_before", "z_mm_after"].map(|name| report[name].as_f64().unwrap())
+    };
+    let (calibrated, nominal) = (tune("calibrated"), tune("nominal"));
+    assert!(calibrated[0] < 0.5 * nominal[0], "{calibrated:?} {nominal:?}");
+    assert!(
+        nominal[1] < nominal[0] && calibrated[1] < 1.2 * calibrated[0],
+        "{calibrated:?} {nominal:?}"
+    );
+    let output = decoupler(
+        "export --network calibrated_tuned.json --format numpy --out bundle",
+        path,
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(decoupler(&format!("calibrate --array {ARRAY} {FRAMES}"), path).stdout).unwrap();
+    assert!(text.contains("height: 5.2") && text.contains(" before, "), "{text}");
+}
+
+#[test]
+fn frames_that_do_not_fit_the_array_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path());
+    for (arguments, cause) in [
+        (
+            format!("--array 4x4_3x15 {FRAMES}"),
+            "--inputs: 12 columns, where a row-wire of the array 4×4_3×15 needs 15",
+        ),
+        (
+            format!("--array 3x4_4x12 {FRAMES}"),
+            "'row' has row 4, and the array 3×4_4×12 has 3",
+        ),
+        (
+            format!("--array {ARRAY} {}", FRAMES.replace("--row-wire row ", "")),
+            "--row-wire: name the column",
+        ),
+        (
+            format!("--array {ARRAY} {}", FRAMES.replace("--depths", "--targets")),
+            "--targets: 4 columns",
+        ),
+        (
+            format!("--array {ARRAY} --sensor x.json {FRAMES}"),
+            "cannot be used with",
+        ),
+    ] {
+        let output = decoupler(&format!("calibrate {arguments}"), folder.path());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+        assert!(message.contains(cause), "{arguments}: {message}");
+    }
+    fs::write(folder.path().join("x.json"), "{}").unwrap();
+    let output = decoupler("train --sensor x.json", folder.path());
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("is not a sensor file"),
+        "{output:?}"
+    );
+}

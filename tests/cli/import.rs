@@ -1,0 +1,266 @@
+//! Own data in the terminal: inspected, trained on, resumed and decoded, and what belongs to a simulated sensor refused.
+
+use std::{
+    fs,
+    io::Write as _,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::terminal::decoupler;
+
+const TRAIN: &str = "train --data sensor.csv --join states.csv --time c1 --inputs c2..c4 --targets states.c2,states.c3 \
+                     --where states.c4<3 --unit states.c2=mm --hidden 6 --starts 1 --epochs 60";
+
+/// Two recordings with clocks 2 ms apart: three readings, and two positions and a height behind them.
+fn recordings() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let (mut sensor, mut states) = (String::new(), String::new());
+    for frame in 0..300 {
+        let (x, y): (f64, f64) = (rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
+        let time = 0.1 * f64::from(frame);
+        let height = if frame % 10 == 0 { 5 } else { 1 };
+        sensor += &format!("{time},{},{},{}\n", x + 0.5 * y * y, y - 0.3 * x * x, x * y);
+        states += &format!("{},{x},{y},{height}\n", time + 0.002);
+    }
+    fs::write(folder.path().join("sensor.csv"), sensor).unwrap();
+    fs::write(folder.path().join("states.csv"), states).unwrap();
+    folder
+}
+
+fn json(arguments: &str, folder: &Path) -> Value {
+    let output = decoupler(arguments, folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments}: {message}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn failure(arguments: &str, folder: &Path, status: i32) -> String {
+    let output = decoupler(arguments, folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(
+        (output.status.code(), message.lines().count()),
+        (Some(status), 1),
+        "{arguments}: {message}"
+    );
+    message
+}
+
+#[test]
+fn a_network_is_trained_on_joined_files_and_judged_target_by_target() {
+    let folder = recordings();
+    let report = json(
+        &format!("{TRAIN} --split time --test-fraction 0.2 --json"),
+        folder.path(),
+    );
+    assert_eq!(report["split"], "time");
+    let count = |name: &str| report[name].as_u64().unwrap();
+    assert_eq!(
+        count("samples") + count("validation_samples") + count("test_samples"),
+        270
+    );
+    assert_eq!(count("test_samples"), 54);
+    assert_eq!(report["dropped"][0]["rows"], 30);
+    assert_eq!(report["dropped"][0]["reason"], "states.c4<3 is not met");
+    assert_eq!(report["files"][1]["join"]["without_partner"], 0);
+    for (index, (name, unit)) in [("states.c2", Value::from("mm")), ("states.c3", Value::Null)]
+        .into_iter()
+        .enumerate()
+    {
+        let target = &report["targets"][index];
+        assert_eq!((&target["name"], &target["unit"]), (&Value::from(name), &unit));
+        let rmse = |from: &Value| from[index]["rmse"].as_f64().unwrap();
+        let [network, ridge, mean] = [
+            &report["targets"],
+            &report["baselines"]["ridge"],
+            &report["baselines"]["mean"],
+        ]
+        .map(rmse);
+        assert!(network < 0.5 * ridge && ridge < mean, "{network} {ridge} {mean}");
+        assert!(target["r2"].as_f64().unwrap() > 0.9 && target["worst"].as_f64().unwrap() >= network);
+    }
+}
+
+#[test]
+fn a_recipe_trains_the_same_network_and_folds_test_every_sample() {
+    let folder = recordings();
+    let first = json(&format!("{TRAIN} --save-recipe import.json --json"), folder.path());
+    let again = json(
+        "train --recipe import.json --hidden 6 --starts 1 --epochs 60 --json",
+        folder.path(),
+    );
+    assert_eq!(
+        (&first["targets"], &first["dropped"]),
+        (&again["targets"], &again["dropped"])
+    );
+    let folds = json(
+        "train --recipe import.json --hidden 6 --starts 1 --epochs 30 --folds 3 --json",
+        folder.path(),
+    );
+    assert_eq!(
+        (folds["folds"].as_u64(), folds["test_samples"].as_u64()),
+        (Some(3), Some(270))
+    );
+    assert!(folds["targets"][0]["r2"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn a_checkpoint_resumes_unless_its_samples_have_changed() {
+    let folder = recordings();
+    let whole = json(&format!("{TRAIN} --json"), folder.path());
+    let part = TRAIN.replace("--epochs 60", "--epochs 5");
+    json(&format!("{part} --checkpoint c.json --json"), folder.path());
+    fs::copy(folder.path().join("c.json"), folder.path().join("d.json")).unwrap();
+    let resumed = json("train --checkpoint c.json --resume --epochs 60 --json", folder.path());
+    assert_eq!(
+        (&resumed["targets"], &resumed["epochs"]),
+        (&whole["targets"], &whole["epochs"])
+    );
+    let sensor = folder.path().join("sensor.csv");
+    fs::write(&sensor, fs::read_to_string(&sensor).unwrap().replacen("0.", "0.1", 9)).unwrap();
+    let message = failure("train --checkpoint d.json --resume --epochs 60", folder.path(), 1);
+    assert!(message.contains("are not those of the checkpoint"), "{message}");
+}
+
+#[test]
+fn a_network_of_own_data_decodes_files_and_lines_under_its_names() {
+    let folder = recordings();
+    json(&format!("{TRAIN} --out n.json --json"), folder.path());
+    let output = decoupler(
+        "decode --network n.json --input sensor.csv --output decoded.csv",
+        folder.path(),
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let decoded = fs::read_to_string(folder.path().join("decoded.csv")).unwrap();
+    let lines: Vec<&str> = decoded.lines().collect();
+    assert_eq!(
+        (lines[0], lines.len()),
+        ("states.c2 (mm),states.c3,readings_outside,targets_outside", 301)
+    );
+    let states = fs::read_to_string(folder.path().join("states.csv")).unwrap();
+    let number = |line: &str, column: usize| line.split(',').nth(column).unwrap().parse::<f64>().unwrap();
+    let errors = lines[1..]
+        .iter()
+        .zip(states.lines())
+        .map(|(decoded, state)| (number(decoded, 0) - number(state, 1)).abs());
+    assert!(errors.sum::<f64>() / 300.0 < 0.1);
+    // The same readings as lines, without the time.
+    let mut follow = Command::new(env!("CARGO_BIN_EXE_decoupler"));
+    follow
+        .args(["decode", "--network", "n.json", "--follow"])
+        .current_dir(folder.path());
+    let mut follow = follow
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let sensor = fs::read_to_string(folder.path().join("sensor.csv")).unwrap();
+    let readings: String = sensor
+        .lines()
+        .take(5)
+        .map(|line| line.split_once(',').unwrap().1.to_owned() + "\n")
+        .collect();
+    follow
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(format!("a,b,c\n{readings}1,2\n").as_bytes())
+        .unwrap();
+    let output = follow.wait_with_output().unwrap();
+    let followed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(followed.lines().collect::<Vec<_>>(), lines[..6]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("line 7: 2 cells where 3 are needed"), "{message}");
+    let message = failure(
+        "decode --network n.json --input states.csv --output x.csv --noise 1",
+        folder.path(),
+        2,
+    );
+    assert!(message.contains("--follow"), "{message}");
+}
+
+#[test]
+fn what_belongs_to_a_simulated_sensor_is_refused_with_a_reason() {
+    let folder = recordings();
+    for (arguments, cause) in [
+        ("--array 2x2_2x6", "--array: own data (--data) have no array"),
+        ("--noise 0.1", "--noise: own data (--data) have their own noise"),
+        ("--loading random", "--loading: own data (--data) have no scene"),
+        ("--samples 10", "--samples: all rows"),
+        ("--rows known", "--row-wire"),
+        ("--decoder newton", "--decoder: own data"),
+        ("--split group", "--group"),
+        ("--targets states.c9", "there is no column 'states.c9'"),
+    ] {
+        let message = failure(&format!("{TRAIN} {arguments}"), folder.path(), 2);
+        assert!(message.contains(cause), "{arguments}: {message}");
+    }
+    for (arguments, cause) in [
+        ("train --split time", "--split needs --data or --recipe"),
+        ("train --inputs c2,c3", "columns need --data"),
+        ("train --inputs volt", "volt"),
+        ("train --data sensor.csv --inputs c2", "--targets: name the columns"),
+    ] {
+        let message = failure(arguments, folder.path(), 2);
+        assert!(message.contains(cause), "{arguments}: {message}");
+    }
+    let message = failure("train --data none.csv --inputs c1 --targets c2", folder.path(), 1);
+    assert!(message.contains("there is no such file"), "{message}");
+}
+
+#[test]
+fn an_inspection_prints_layout_columns_and_times() {
+    let folder = recordings();
+    let report = json("inspect --data states.csv --json", folder.path());
+    assert_eq!(
+        (&report["rows"], &report["dialect"]["separator"]),
+        (&Value::from(300), &Value::from("comma"))
+    );
+    assert_eq!(report["columns"][3]["kind"], "integer");
+    assert_eq!(report["time"]["column"], "c1");
+    assert!((report["time"]["median_interval"].as_f64().unwrap() - 0.1).abs() < 1e-9);
+    let text = String::from_utf8(decoupler("inspect --data states.csv", folder.path()).stdout).unwrap();
+    assert!(
+        text.contains("300 rows × 4 columns") && text.contains("separator comma"),
+        "{text}"
+    );
+    assert!(text.contains('█') && text.contains("median interval"), "{text}");
+}
+
+#[test]
+fn positions_of_targets_are_told_kept_in_the_recipe_and_refused_by_line() {
+    let folder = recordings();
+    let positions = |text: &str| fs::write(folder.path().join("taxels.csv"), text).unwrap();
+    positions("target,x,y\nstates.c2,0,0\nstates.c3,4,0\n");
+    let arguments = TRAIN.replace("--unit states.c2=mm", "--positions taxels.csv");
+    let output = decoupler(&format!("{arguments} --save-recipe import.json"), folder.path());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("2 targets have positions: a grid of 2 × 1"), "{text}");
+    let report = json("train --recipe import.json --hidden 2 --epochs 3 --json", folder.path());
+    assert_eq!(report["positions"][1]["target"], "states.c3");
+    assert_eq!(report["positions"][1]["x_mm"], 4.0);
+
+    let units = format!("{TRAIN} --positions taxels.csv");
+    let message = failure(&units, folder.path(), 1);
+    assert!(
+        message.contains("states.c2 (mm) and states.c3 have positions and not the same unit"),
+        "{message}"
+    );
+    positions("target,x,y\nstates.c2,0,0\nstates.c4,4,0\n");
+    let message = failure(&arguments, folder.path(), 1);
+    assert!(
+        message.contains("'taxels.csv': line 3: there is no target 'states.c4'"),
+        "{message}"
+    );
+    let message = failure("inspect --data sensor.csv --positions taxels.csv", folder.path(), 2);
+    assert!(
+        message.contains("--positions needs --inputs and --targets"),
+        "{message}"
+    );
+}

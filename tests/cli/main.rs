@@ -1,0 +1,25 @@
+//! The program in the terminal, run as its users run it.
+
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod calibrate;
+mod causes;
+mod commands;
+mod export;
+mod files;
+#[cfg(all(unix, feature = "serial"))]
+mod follow;
+mod import;
+mod own_export;
+mod own_trade;
+mod recorded;
+mod reproduce;
+mod resume;
+mod scenes;
+mod sweep;
+
+#[path = "../support/folders.rs"]
+mod folders;
+#[path = "../support/terminal.rs"]
+mod terminal;

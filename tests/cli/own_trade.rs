@@ -1,0 +1,194 @@
+//! The trade-off of own data in the terminal: every decoder measured on the test samples, and what belongs to a simulated
+//! sensor refused.
+
+use std::{fs, path::Path};
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::terminal::decoupler;
+
+const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5 --unit c4=mm --unit c5=N";
+
+/// Three readings of a position and a force: no affine map tells the position, and neither the force.
+fn recording() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut rows = String::new();
+    for _ in 0..200 {
+        let (x, force): (f64, f64) = (rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
+        rows += &format!(
+            "{},{},{},{},{}\n",
+            x + 0.6 * force * force,
+            force - 0.5 * x * x,
+            x * force,
+            x,
+            40.0 * force
+        );
+    }
+    fs::write(folder.path().join("skin.csv"), rows).unwrap();
+    folder
+}
+
+fn success(arguments: &str, folder: &Path) -> String {
+    let output = decoupler(arguments, folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(arguments: &str, folder: &Path) -> Value {
+    serde_json::from_str(&success(&format!("{arguments} --json"), folder)).unwrap()
+}
+
+#[test]
+fn each_decoder_has_its_errors_times_and_place_on_the_fronts() {
+    let folder = recording();
+    let arguments = format!(
+        "trade {DATA} --hidden 2,6 --method br,lm --epochs 40 --split time --under-percent 0.0001 --under-us 1e9"
+    );
+    let report = json(&arguments, folder.path());
+    assert_eq!(
+        (&report["decoded"], &report["test_samples"]),
+        (&"a sample".into(), &40.into())
+    );
+    let points = report["points"].as_array().unwrap();
+    // Four without a network, and twice two networks in 64 and 32 bits.
+    assert_eq!(points.len(), 4 + 2 * 2 * 2);
+    let number = |point: &Value, name: &str| point[name].as_f64().unwrap();
+    for point in points {
+        let targets = point["targets"].as_array().unwrap();
+        let units: Vec<&str> = targets.iter().map(|target| target["unit"].as_str().unwrap()).collect();
+        assert_eq!(units, ["mm", "N"]);
+        let mean = targets
+            .iter()
+            .map(|target| number(target, "percent_of_range"))
+            .sum::<f64>()
+            / 2.0;
+        assert!(
+            (number(point, "percent_of_range") - mean).abs() < 1e-12 * mean,
+            "{point}"
+        );
+        assert!(
+            number(point, "frame_us") > 0.0 && number(point, "training_s") >= 0.0,
+            "{point}"
+        );
+        let is_network = point["decoder"] == "network";
+        assert_eq!(
+            (point["hidden"].is_u64(), point["method"].is_string()),
+            (is_network, is_network)
+        );
+        // Levenberg-Marquardt holds a fifth of the other samples out.
+        let held_out = if point["method"] == "lm" { 32 } else { 0 };
+        assert_eq!(
+            (&point["samples"], &point["validation_samples"]),
+            (&(160 - held_out).into(), &held_out.into())
+        );
+        // No other is faster with as little error: written out anew.
+        for (front, cost) in [("on_decoding_front", "frame_us"), ("on_training_front", "training_s")] {
+            let of = |point: &Value| (number(point, cost), number(point, "percent_of_range"));
+            let (own_cost, own_error) = of(point);
+            let is_beaten = points
+                .iter()
+                .map(of)
+                .any(|(cost, error)| cost <= own_cost && error <= own_error && (cost, error) != (own_cost, own_error));
+            assert_eq!(point[front], !is_beaten, "{front} {point}");
+        }
+    }
+    let error = |decoder: &str, hidden: Value| {
+        let mut points = points
+            .iter()
+            .filter(|point| point["decoder"] == decoder && point["hidden"] == hidden);
+        number(points.next().unwrap(), "percent_of_range")
+    };
+    let [mean, ridge, network] = [("mean", Value::Null), ("ridge", Value::Null), ("network", 6.into())]
+        .map(|(decoder, hidden)| error(decoder, hidden));
+    assert!(network < 0.5 * ridge && ridge < mean, "{network} {ridge} {mean}");
+    assert_eq!(report["fastest_under"]["point"], Value::Null, "no decoder is so good");
+    let best = report["most_accurate_under"]["point"].as_u64().unwrap() as usize;
+    assert!(
+        points
+            .iter()
+            .all(|point| number(point, "percent_of_range") >= number(&points[best], "percent_of_range"))
+    );
+}
+
+#[test]
+fn the_command_of_a_point_trains_its_network() {
+    let folder = recording();
+    let given = "--where c4<0.95 --split random --test-fraction 0.3";
+    let arguments = format!(
+        "trade {DATA} {given} --hidden 3 --method lm --epochs 30 --seed 7 --decoder network --save-recipe r.json"
+    );
+    let of_arguments = json(&arguments, folder.path());
+    let of_recipe = "trade --recipe r.json --hidden 3 --method lm --epochs 30 --seed 7 --decoder network";
+    let of_recipe = json(of_recipe, folder.path());
+    for report in [&of_arguments, &of_recipe] {
+        let warnings = report["warnings"].to_string();
+        assert!(warnings.contains("random test samples flatter"), "{warnings}");
+        let point = &report["points"][0];
+        let command = point["command"].as_str().unwrap().strip_prefix("decoupler ").unwrap();
+        // The shell takes the quotes away.
+        let trained = json(&command.replace('\'', ""), folder.path());
+        let [of_train, of_point] = [&trained, point].map(|from| from["targets"][1]["rmse"].as_f64().unwrap());
+        // The trade-off times compiled networks, which round otherwise.
+        assert!(
+            (of_train / of_point - 1.0).abs() < 1e-9,
+            "{command}: {of_train} {of_point}"
+        );
+        assert_eq!(trained["validation_samples"], point["validation_samples"]);
+    }
+}
+
+#[test]
+fn the_table_tells_the_errors_of_each_target_in_its_unit() {
+    let folder = recording();
+    let text = success(
+        &format!("trade {DATA} --hidden 2 --epochs 5 --decoder ridge,network --under-us 1e9"),
+        folder.path(),
+    );
+    for expected in [
+        "160 samples for training, 0 for validation, 40 for the test (split by time)",
+        "Time to decode a sample",
+        "% of range",
+        "c4 (mm)",
+        "c5 (N)",
+        "network_f32, 2, br",
+        "Most accurate under 1000000000 us: ",
+    ] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+}
+
+#[test]
+fn what_belongs_to_a_simulated_sensor_is_refused_and_the_other_way_round() {
+    let folder = recording();
+    let own = |argument: &str| format!("trade {DATA} {argument}");
+    let cases = [
+        (own("--array 2x3_2x9"), "no array"),
+        (own("--samples 10"), "--where"),
+        (own("--test-samples 10"), "--test-fraction"),
+        (own("--preset best"), "no scene"),
+        (own("--noise 0,1e-3"), "their own noise"),
+        (
+            own("--decoder ridge,newton"),
+            "--decoder newton: it solves the equations of a simulated sensor",
+        ),
+        (own("--folds 3"), "on the test samples"),
+        (own("--rows known"), "--row-wire"),
+        ("trade --method lm".to_owned(), "the presets name the methods"),
+        ("trade --split time".to_owned(), "--split needs --data"),
+        ("trade --data skin.csv --inputs c1".to_owned(), "--targets"),
+    ];
+    for (arguments, expected) in cases {
+        let output = decoupler(&arguments, folder.path());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(
+            (output.status.code(), message.lines().count()),
+            (Some(2), 1),
+            "{arguments}: {message}"
+        );
+        assert!(message.contains(expected), "{arguments}: {message}");
+    }
+}

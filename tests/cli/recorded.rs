@@ -1,0 +1,158 @@
+//! What a recording tells, in the terminal.
+
+use std::{fs, path::Path};
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::terminal::decoupler;
+
+/// A recording of four readings, of which d repeats a and e is constant: they tell x, and nothing of y, which is noise.
+fn recording() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut text = "a,b,d,e,x (mm),y\n".to_owned();
+    for _ in 0..300 {
+        let [a, b, noise, y]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+        text += &format!("{a},{b},{},7,{},{y}\n", 3.0 - 2.0 * a, a + 0.3 * b + 0.05 * noise);
+    }
+    fs::write(folder.path().join("r.csv"), text).unwrap();
+    folder
+}
+
+fn json(arguments: &str, folder: &Path) -> Value {
+    let output = decoupler(arguments, folder);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments}: {message}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+const TELL: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
+
+#[test]
+fn each_target_and_channel_is_judged_with_an_interval() {
+    let folder = recording();
+    let report = json(&format!("{TELL} --model ridge --json"), folder.path());
+    let target = |index: usize| &report["targets"][index];
+    assert_eq!(
+        (&target(0)["standing"], &target(0)["unit"]),
+        (&"told".into(), &"mm".into())
+    );
+    // Of x, the readings miss 0.05²/3 of (1 + 0.3² + 0.05²)/3.
+    let r2 = &target(0)["r2"];
+    let expected = 1.0 - 0.0025 / 1.0925;
+    let value = r2["value"].as_f64().unwrap();
+    assert!((value - expected).abs() < 1e-3, "{r2}");
+    assert!(
+        r2["low"].as_f64().unwrap() < value && value < r2["high"].as_f64().unwrap(),
+        "{r2}"
+    );
+    assert_eq!(target(1)["standing"], "not told");
+    assert!(
+        target(1)["sentence"]
+            .as_str()
+            .unwrap()
+            .starts_with("the readings do not tell y: R² ")
+    );
+    let channel = |index: usize| &report["channels"][index];
+    // Without b the error of x is √(0.3² + 0.05²)/0.05 times as large; without a nothing is lost, because d repeats it.
+    let growth = channel(1)["growth"][0]["value"].as_f64().unwrap();
+    assert!((growth / 6.08 - 1.0).abs() < 0.15, "{growth}");
+    assert_eq!(
+        (&channel(0)["is_dispensable"], &channel(1)["is_dispensable"]),
+        (&true.into(), &false.into())
+    );
+    let warnings = report["warnings"].to_string();
+    assert!(
+        warnings.contains("d repeats a") && warnings.contains("e is 7 in every sample"),
+        "{warnings}"
+    );
+    let curve = target(0)["learning_curve"].as_array().unwrap();
+    assert!(curve.len() >= 5 && target(0)["outlook"].is_string());
+    let text = String::from_utf8(decoupler(&format!("{TELL} --model ridge"), folder.path()).stdout).unwrap();
+    for expected in [
+        "The readings tell x: R² 0.99",
+        "do not tell y",
+        "dispensable",
+        "samples   ",
+    ] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+}
+
+#[test]
+fn networks_are_compared_with_ridge_and_with_a_random_split() {
+    let folder = recording();
+    let arguments = "inspect --data r.csv --inputs a,b,d,e --targets x --hidden 2 --folds 2 --json";
+    let report = json(arguments, folder.path());
+    // x is linear: a network is worth no more.
+    assert_eq!(report["model"], "ridge", "{report}");
+    let target = &report["targets"][0];
+    for figure in ["r2_network", "r2_ridge", "network_to_ridge"] {
+        let value = &target[figure];
+        assert!(
+            value["low"].as_f64().unwrap() <= value["high"].as_f64().unwrap(),
+            "{figure}: {value}"
+        );
+    }
+    assert!(
+        report["warnings"]
+            .to_string()
+            .contains("do not support more than a linear map")
+    );
+    assert_eq!(target["splits"]["by"], "time");
+    assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));
+}
+
+#[test]
+fn a_random_split_says_by_how_much_it_flatters() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    // A target that drifts with the time, which the reading tells only as long as it does not go on.
+    let lines = (0..200).map(|frame| {
+        let time = f64::from(frame) / 20.0;
+        format!("{time},{}\n", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))
+    });
+    fs::write(folder.path().join("r.csv"), lines.collect::<String>()).unwrap();
+    let arguments = "train --data r.csv --inputs c1 --targets c2 --split random --hidden 6 --epochs 40 --json";
+    for folds in ["", " --folds 4"] {
+        let report = json(&format!("{arguments}{folds}"), folder.path());
+        let warnings = report["warnings"].to_string();
+        assert!(
+            warnings.contains("a random split would report an RMSE of") && warnings.contains("random flatters by"),
+            "{warnings}"
+        );
+        let interval = &report["targets"][0]["r2_interval"];
+        assert!(
+            interval[0].as_f64().unwrap() <= report["targets"][0]["r2"].as_f64().unwrap(),
+            "{interval}"
+        );
+    }
+}
+
+#[test]
+fn what_needs_targets_is_refused_without_them() {
+    let folder = recording();
+    for (arguments, cause) in [
+        (
+            "inspect --data r.csv --split time",
+            "--split needs --inputs and --targets",
+        ),
+        ("inspect --data r.csv --inputs a", "--targets: name the columns"),
+        ("inspect", "--data: name the file"),
+        (
+            "inspect --data r.csv --inputs a --targets x --test-data r.csv",
+            "leave the test files out",
+        ),
+        ("inspect --data r.csv --inputs a --targets x --folds 999", "999 folds"),
+    ] {
+        let output = decoupler(arguments, folder.path());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+        assert!(
+            message.contains(cause) && message.lines().count() == 1,
+            "{arguments}: {message}"
+        );
+    }
+}

@@ -1,0 +1,98 @@
+use std::fs;
+
+use serde_json::Value;
+
+use super::driver::{failure, fill, folder_with, merged, six};
+
+#[test]
+fn merging_names_what_is_missing_and_what_conflicts() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    fill("--out runs", folder);
+    fill("--out others", folder);
+    let whole = merged("runs others", folder);
+    let id = |hidden: u64, seed: u64| {
+        let trials = whole["trials"].as_array().unwrap().iter();
+        let mut found = trials.filter(|trial| trial["options"]["hidden"] == hidden && trial["options"]["seed"] == seed);
+        format!("{}.json", found.next().unwrap()["trial"].as_str().unwrap())
+    };
+    fs::remove_file(folder.join("runs").join(id(3, 7))).unwrap();
+    fs::remove_file(folder.join("others").join(id(10, 0))).unwrap();
+    assert_eq!(merged("runs others", folder), whole, "each has what the other lacks");
+    let (said, told) = failure("sweep --merge runs --out table.csv", folder, 1);
+    assert!(said.contains("missing: trial 2 (hidden 3, seed 7)\n"), "{said}");
+    assert!(told.contains("1 missing, 0 conflicting"), "{told}");
+    assert_eq!(fs::read_to_string(folder.join("table.csv")).unwrap().lines().count(), 6);
+
+    // Another result for the same options.
+    let path = folder.join("others").join(id(4, 0));
+    let text = fs::read_to_string(&path).unwrap();
+    let (heading, record) = text.trim_end().split_once("\"run\":").unwrap();
+    let record = record.strip_suffix('}').unwrap();
+    let changed = record.replace("\"weights\":", "\"weights\":1");
+    assert_ne!(record, changed);
+    let old = format!("{:08x}", crc32(record.as_bytes()));
+    assert!(heading.contains(&old), "the checksum is the usual CRC-32");
+    let heading = heading.replace(&old, &format!("{:08x}", crc32(changed.as_bytes())));
+    fs::write(&path, format!("{heading}\"run\":{changed}}}\n")).unwrap();
+    let (said, told) = failure("sweep --merge runs others --out table.json", folder, 1);
+    let line = said.lines().find(|line| line.starts_with("conflicting: ")).unwrap();
+    assert!(
+        line.contains(&id(4, 0)) && line.contains("runs") && line.contains("others"),
+        "{said}"
+    );
+    assert!(told.contains("0 missing, 1 conflicting"), "{told}");
+    let table: Value = serde_json::from_slice(&fs::read(folder.join("table.json")).unwrap()).unwrap();
+    assert_eq!(table["trials"].as_array().unwrap().len(), 5, "neither result is taken");
+
+    // A digit changed without its checksum, and a result under another name.
+    fs::write(&path, text.replace("\"weights\":", "\"weights\":1")).unwrap();
+    fs::copy(
+        folder.join("runs").join(id(4, 7)),
+        folder.join("others").join(id(10, 0)),
+    )
+    .unwrap();
+    let (said, told) = failure("sweep --merge others --out table.csv", folder, 1);
+    assert!(
+        said.contains("checksum") && said.contains("its name belongs to another trial"),
+        "{said}"
+    );
+    assert!(told.contains("2 missing, 0 conflicting, 2 files unreadable"), "{told}");
+}
+
+/// CRC-32 of ISO 3309, bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    let mut remainder = u32::MAX;
+    for &byte in bytes {
+        remainder ^= u32::from(byte);
+        for _ in 0..8 {
+            remainder = (remainder >> 1) ^ (0xEDB8_8320 & (remainder & 1).wrapping_neg());
+        }
+    }
+    !remainder
+}
+
+#[test]
+fn a_wrong_merge_is_refused() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    fs::create_dir(folder.join("empty")).unwrap();
+    for (arguments, status, expected) in [
+        ("--merge empty --out table.txt", 2, "ends in .csv or .json"),
+        ("--merge empty --out none/table.csv", 1, "does not exist"),
+        ("--merge empty --out table.csv", 1, "no sweep in 'empty'"),
+        ("--merge none --out table.csv", 1, "cannot read 'none'"),
+        (
+            "--merge empty --spec sweep.json --out table.csv",
+            2,
+            "cannot be used with",
+        ),
+        ("--out runs", 2, "--spec"),
+        ("--spec sweep.json --out runs --shard 3/2", 2, "I/N"),
+        ("--spec sweep.json --out runs --jobs 2", 2, "--engine"),
+        ("--spec sweep.json --out sweep.json", 1, "cannot make the folder"),
+    ] {
+        let (_, told) = failure(&format!("sweep {arguments}"), folder, status);
+        assert!(told.contains(expected), "{arguments}: {told}");
+    }
+}

@@ -1,0 +1,9 @@
+//! Sweeps in the terminal: divided, repeated, killed, by several programs at once, and merged.
+
+mod driver;
+mod filling;
+#[cfg(target_os = "linux")]
+mod job_scripts;
+mod merging;
+mod specifications;
+mod stopping;

@@ -1,0 +1,154 @@
+use std::fs::{self, File};
+#[cfg(target_os = "linux")]
+use std::process::Command;
+
+use serde_json::{Value, json};
+#[cfg(target_os = "linux")]
+use tempfile::TempDir;
+
+use super::driver::{command, fill, folder_with, merged, names, results, six, spawn, wait_until};
+
+#[test]
+fn a_killed_sweep_loses_nothing_that_was_finished() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    let runs = folder.join("runs");
+    let mut child = spawn(&mut command("sweep --spec sweep.json --out runs --threads 1", folder));
+    wait_until("two results", || runs.is_dir() && results(&runs).len() >= 2);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let before = results(&runs);
+    let again = fill("--out runs --threads 2", folder);
+    assert_eq!(again["present"], before.len());
+    assert_eq!(again["trained"], 6 - before.len());
+    assert!(results(&runs).is_superset(&before), "what was there is not touched");
+    assert!(
+        names(&runs).iter().all(|name| name.ends_with(".json")),
+        "{:?}",
+        names(&runs)
+    );
+    fill("--out whole", folder);
+    assert_eq!(merged("runs", folder), merged("whole", folder));
+}
+
+#[test]
+fn what_a_program_leaves_that_is_killed_after_its_result_is_cleared() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    let runs = folder.join("runs");
+    fill("--out runs", folder);
+    let whole = names(&runs);
+    let (first, _) = results(&runs).pop_first().unwrap();
+    for extension in ["claim", "checkpoint"] {
+        File::create(runs.join(first.replace("json", extension))).unwrap();
+    }
+    assert_eq!(fill("--out runs", folder)["present"], 6);
+    assert_eq!(names(&runs), whole);
+}
+
+#[test]
+fn two_programs_fill_one_folder_together() {
+    let folder = folder_with(&six());
+    let folder = folder.path();
+    let start = || {
+        spawn(&mut command(
+            "sweep --spec sweep.json --out runs --threads 1 --json",
+            folder,
+        ))
+    };
+    let outputs = [start(), start()].map(|child| child.wait_with_output().unwrap());
+    let reports = outputs.map(|output| {
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    });
+    let sum = |field: &str| {
+        reports
+            .iter()
+            .map(|report| report[field].as_u64().unwrap())
+            .sum::<u64>()
+    };
+    assert_eq!((sum("trained"), sum("present")), (6, 6), "nothing twice");
+    assert_eq!(names(&folder.join("runs")).len(), 7, "six results and the plan");
+}
+
+/// The test stands for the other program: it holds the lock of the first trial that is missing. Once a later one is there,
+/// the program has passed it.
+#[test]
+fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
+    let folder = folder_with(&json!({
+        "train": {"array": "10x6_3x18", "samples": 100, "epochs": 8, "decoder": "network"},
+        "axes": {"seed": [0, 1, 2]},
+    }));
+    let folder = folder.path();
+    fill("--out runs", folder);
+    let runs = folder.join("runs");
+    let trials = merged("runs", folder);
+    let [first, second] = [0, 1].map(|index| trials["trials"][index]["trial"].as_str().unwrap().to_owned());
+    let result = |id: &str| runs.join(format!("{id}.json"));
+    for id in [&first, &second] {
+        fs::remove_file(result(id)).unwrap();
+    }
+    let other = File::create(runs.join(format!("{first}.claim"))).unwrap();
+    other.lock().unwrap();
+    let mut child = spawn(&mut command(
+        "sweep --spec sweep.json --out runs --threads 1 --json",
+        folder,
+    ));
+    wait_until("the second trial", || result(&second).exists());
+    assert!(!result(&first).exists(), "the lock counts");
+    assert!(child.try_wait().unwrap().is_none(), "it waits");
+    drop(other);
+    let report: Value = serde_json::from_slice(&child.wait_with_output().unwrap().stdout).unwrap();
+    assert_eq!((&report["present"], &report["trained"]), (&json!(1), &json!(2)));
+    assert_eq!(merged("runs", folder), trials);
+}
+
+/// A trial of so many epochs that is stopped after its beginning: its folder, the exit status, and what it said.
+#[cfg(target_os = "linux")]
+fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
+    let folder = folder_with(&json!({
+        "train": {"array": "10x6_3x18", "samples": 200, "hidden": 6, "max-fail": 1_000_000, "min-gradient": 0,
+                  "decoder": "network", "epochs": epochs},
+        "axes": {"seed": [3]},
+    }));
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT", env!("CARGO_BIN_EXE_decoupler")]);
+    command
+        .args("sweep --spec sweep.json --out runs".split(' '))
+        .current_dir(folder.path());
+    let child = spawn(&mut command);
+    let runs = folder.path().join("runs");
+    let is_begun = || names(&runs).iter().any(|name| name.ends_with(".claim"));
+    wait_until("the trial is begun", || runs.is_dir() && is_begun());
+    let kill = format!("kill -{signal} {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    (folder, output.status.code().unwrap(), told)
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_trial_is_resumed_with_the_same_bits() {
+    for (signal, status) in [("INT", 130), ("TERM", 143)] {
+        // A busy machine may send the signal late.
+        let attempts = [1000, 10_000, 100_000].into_iter();
+        let mut attempts = attempts.map(|epochs| (epochs, stopped_by(signal, epochs)));
+        let (epochs, (folder, ended, told)) = attempts.find(|(_, (_, ended, _))| *ended != 0).unwrap();
+        let folder = folder.path();
+        assert_eq!(ended, status, "{told}");
+        let last = told.lines().last().unwrap();
+        assert_eq!(
+            last,
+            "interrupted after 0 of 1 trials; the same command trains the rest"
+        );
+        let runs = names(&folder.join("runs"));
+        assert!(runs.iter().any(|name| name.ends_with(".checkpoint")), "{runs:?}");
+        assert_eq!(fill("--out runs", folder)["trained"], 1);
+        assert_eq!(names(&folder.join("runs")).len(), 2, "the result and the plan");
+        fill("--out whole", folder);
+        let whole = merged("whole", folder);
+        assert_eq!(merged("runs", folder), whole);
+        assert_eq!(whole["trials"][0]["result"]["epochs"], epochs);
+    }
+}

@@ -1,0 +1,10 @@
+//! Surfaces against independent implementations, and figures on the screen and in print.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod lattice;
+#[cfg(feature = "figures")]
+mod print;
+mod scattered;
+#[cfg(feature = "figures")]
+mod surfaces;

@@ -1,0 +1,10 @@
+//! The sensor: its model, its faults, its calibration, and what its readings tell.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod calibration;
+mod faults;
+mod model;
+mod posterior_rows;
+mod recorded;
+mod rounding;
