@@ -7,7 +7,7 @@ use decoupler::{
 };
 use ndarray::Array2;
 
-use crate::problems::{trainer, wave};
+use crate::problems::{start, trainer, wave};
 
 fn named(name: &str) -> Method {
     let method = Method::all().into_iter().find(|method| method.short_name() == name);
@@ -216,12 +216,8 @@ fn extremes_end_with_a_reason_and_without_nan() {
                 {
                     *limit.value = limit.value.max(value);
                 }
-                let weights = training_problems::start()
-                    .weights()
-                    .iter()
-                    .map(|weight| scale * weight)
-                    .collect();
-                let start = Mlp::from_weights(training_problems::start().shape(), weights);
+                let weights = start().weights().iter().map(|weight| scale * weight).collect();
+                let start = Mlp::from_weights(start().shape(), weights);
                 let stopping = StoppingRules {
                     epochs: 60,
                     ..StoppingRules::default()
