@@ -7,9 +7,8 @@ use decoupler::{
     scene::{Loading, Noise, Scene},
     sensor::SensorModel,
 };
-use serde_json::Value;
 
-use crate::terminal::decoupler;
+use crate::{printed::json, terminal::decoupler};
 
 const ARRAY: &str = "4x4_3x12";
 const FRAMES: &str = "--data frames.csv --inputs r_1..r_12 --depths d_1..d_4 --row-wire row --group frame";
@@ -50,13 +49,6 @@ fn record(folder: &Path) -> SensorModel {
     }
     fs::write(folder.join("frames.csv"), text).unwrap();
     real
-}
-
-fn json(arguments: &str, folder: &Path) -> Value {
-    let output = decoupler(arguments, folder);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments}: {message}");
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]

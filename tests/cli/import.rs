@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::terminal::decoupler;
+use crate::{printed::json, terminal::decoupler};
 
 const TRAIN: &str = "train --data sensor.csv --join states.csv --time c1 --inputs c2..c4 --targets states.c2,states.c3 \
                      --where states.c4<3 --unit states.c2=mm --hidden 6 --starts 1 --epochs 60";
@@ -31,13 +31,6 @@ fn recordings() -> TempDir {
     fs::write(folder.path().join("sensor.csv"), sensor).unwrap();
     fs::write(folder.path().join("states.csv"), states).unwrap();
     folder
-}
-
-fn json(arguments: &str, folder: &Path) -> Value {
-    let output = decoupler(arguments, folder);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments}: {message}");
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn failure(arguments: &str, folder: &Path, status: i32) -> String {

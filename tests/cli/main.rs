@@ -13,6 +13,7 @@ mod follow;
 mod import;
 mod own_export;
 mod own_trade;
+mod printed;
 mod recorded;
 mod reproduce;
 mod resume;

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::terminal::decoupler;
+use crate::{printed::success, terminal::decoupler};
 
 const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5 --unit c4=mm --unit c5=N";
 
@@ -29,13 +29,6 @@ fn recording() -> TempDir {
     }
     fs::write(folder.path().join("skin.csv"), rows).unwrap();
     folder
-}
-
-fn success(arguments: &str, folder: &Path) -> String {
-    let output = decoupler(arguments, folder);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments}: {message}");
-    String::from_utf8(output.stdout).unwrap()
 }
 
 fn json(arguments: &str, folder: &Path) -> Value {

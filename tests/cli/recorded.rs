@@ -1,12 +1,11 @@
 //! What a recording tells, in the terminal.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::terminal::decoupler;
+use crate::{printed::json, terminal::decoupler};
 
 /// A recording of four readings, of which d repeats a and e is constant: they tell x, and nothing of y, which is noise.
 fn recording() -> TempDir {
@@ -19,13 +18,6 @@ fn recording() -> TempDir {
     }
     fs::write(folder.path().join("r.csv"), text).unwrap();
     folder
-}
-
-fn json(arguments: &str, folder: &Path) -> Value {
-    let output = decoupler(arguments, folder);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments}: {message}");
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 const TELL: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";

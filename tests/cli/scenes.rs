@@ -4,14 +4,7 @@ use std::{fs, path::Path};
 
 use serde_json::Value;
 
-use crate::terminal::decoupler;
-
-fn success(arguments: &str, folder: &Path) -> String {
-    let output = decoupler(arguments, folder);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments}: {errors}");
-    String::from_utf8(output.stdout).unwrap()
-}
+use crate::{printed::success, terminal::decoupler};
 
 fn failure(arguments: &str, folder: &Path, status: i32) -> String {
     let output = decoupler(arguments, folder);
