@@ -206,7 +206,7 @@ pub(super) fn print(
         .chain(flattery.iter().cloned())
         .chain(flaw.map(ToString::to_string))
         .chain(describe_standings(&file.targets, told))
-        .chain(describe_worse_than_ridge(&file.targets, &file.errors, &file.ridge))
+        .chain(describe_worse_than_ridge(file))
         .collect();
     if is_json {
         return print_object(&Trained {

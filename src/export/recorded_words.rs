@@ -1,10 +1,11 @@
-use super::format_number;
+use super::{MeasuredNetworkFile, format_number};
 use crate::{
     evaluation::{
         TargetErrors,
         recorded::{Determination, Findings, Standing, TargetFindings},
     },
     import::{Channel, TargetPosition},
+    training::Method,
 };
 
 /// Warns of targets that the readings do not tell, or hardly, by what was measured of each.
@@ -52,17 +53,21 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
 }
 
 /// Warns of targets on which the network is worse than ridge.
-pub fn describe_worse_than_ridge(targets: &[Channel], network: &[TargetErrors], ridge: &[TargetErrors]) -> Vec<String> {
-    let errors = network.iter().zip(ridge);
-    let worse = targets
+pub fn describe_worse_than_ridge(file: &MeasuredNetworkFile) -> Vec<String> {
+    let errors = file.errors.iter().zip(&file.ridge);
+    let worse = file
+        .targets
         .iter()
         .zip(errors)
         // Of a target that is constant in the test samples nothing can be judged.
         .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
+    let cure = match file.settings.training.method {
+        Method::BayesianRegularization(_) => "record more samples, or use fewer hidden nodes",
+        _ => "record more samples, or use fewer hidden nodes or Bayesian regularisation",
+    };
     let warning = |(target, (network, ridge)): (&Channel, (&TargetErrors, &TargetErrors))| {
         format!(
-            "for {} the network is worse than ridge regression (RMSE {} against {}): take ridge, record more samples, or use \
-             fewer hidden nodes or Bayesian regularisation",
+            "for {} the network is worse than ridge regression (RMSE {} against {}): take ridge, {cure}",
             target.name,
             format_number(network.rmse),
             format_number(ridge.rmse)

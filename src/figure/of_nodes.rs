@@ -133,11 +133,16 @@ pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) ->
 
 /// Decoupled against actual z, with the line on which they would be equal and the line fitted to them.
 pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
-    regression(pairs_mm, ("z", Some("mm")), "nodes of the test set")
+    regression(pairs_mm, ("z", Some("mm")), ["decoupled", "nodes of the test set"])
 }
 
-/// Decoupled against actual values of a quantity (its name and unit) in pairs of `what`.
-pub(super) fn regression(pairs: &[(f64, f64)], (name, unit): (&str, Option<&str>), what: &str) -> PlotFigure {
+/// Actual values of a quantity (its name and unit), and against them what a network makes of the readings, called `answer`,
+/// in pairs of `what`.
+pub(super) fn regression(
+    pairs: &[(f64, f64)],
+    (name, unit): (&str, Option<&str>),
+    [answer, what]: [&str; 2],
+) -> PlotFigure {
     let numbered: Vec<(usize, (f64, f64))> = pairs.iter().copied().enumerate().collect();
     let dots = thinned(&numbered).map(|(pair, (actual, decoupled))| PlotPoint {
         item: Some(pair),
@@ -168,7 +173,7 @@ pub(super) fn regression(pairs: &[(f64, f64)], (name, unit): (&str, Option<&str>
         let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
         notes = vec![
             format!("Correlation R = {}", format_number(fit.correlation)),
-            format!("Fitted line: decoupled = {slope} · actual {sign} {offset}{unit}"),
+            format!("Fitted line: {answer} = {slope} · actual {sign} {offset}{unit}"),
         ];
     }
     let title = match unit {
@@ -184,7 +189,7 @@ pub(super) fn regression(pairs: &[(f64, f64)], (name, unit): (&str, Option<&str>
             has_equal_scales: true,
             ..Plot::new(
                 PlotAxis::linear(format!("actual {title}")),
-                PlotAxis::linear(format!("decoupled {title}")),
+                PlotAxis::linear(format!("{answer} {title}")),
                 series,
             )
         }],

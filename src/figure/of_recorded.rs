@@ -20,7 +20,7 @@ const CELLS: usize = 16;
 /// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and the
 /// line fitted to them. `pairs` are actual and decoded values.
 pub fn target_regression_figure(pairs: &[(f64, f64)], name: &str, unit: Option<&str>) -> PlotFigure {
-    regression(pairs, (name, unit), "samples of the test set")
+    regression(pairs, (name, unit), ["decoded", "samples of the test set"])
 }
 
 /// Error of a position over the position: root mean square of the distance between the decoded and the actual one, for
@@ -166,10 +166,10 @@ mod tests {
         let pairs = [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)];
         let figure = target_regression_figure(&pairs, "force", Some("N"));
         assert_eq!(figure.plots[0].x.name, "actual force (N)");
-        assert_eq!(figure.notes[1], "Fitted line: decoupled = 2.00 · actual + 1.00 N");
+        assert_eq!(figure.notes[1], "Fitted line: decoded = 2.00 · actual + 1.00 N");
         assert_eq!(
             target_regression_figure(&pairs, "c2", None).plots[0].y.name,
-            "decoupled c2"
+            "decoded c2"
         );
     }
 }

@@ -5,9 +5,10 @@ use std::{fs, ops::ControlFlow, path::Path};
 use decoupler::{
     dataset::{Division, Seed, SplitBy},
     evaluation::{Measured, Run, RunSettings},
-    export::{MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
+    export::{MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile, describe_worse_than_ridge},
     import::{Plan, Progress, Recipe},
     scene::RowModel,
+    training::Method,
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
@@ -81,6 +82,26 @@ fn networks_of_own_data_are_saved_with_the_names_of_their_columns() {
             .to_string()
             .contains("checksum")
     );
+}
+
+#[test]
+fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = curved(&folder);
+    let sets = plan.sets(folder.path(), Seed(0), &mut go_on).unwrap();
+    let (inputs, targets) = (sets.recording.inputs.clone(), sets.recording.targets.clone());
+    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
+    run.step();
+    let mut file = MeasuredNetworkFile::from_run(&run, plan, (&inputs, &targets)).unwrap();
+    file.errors[0].rmse = 0.5 * file.ridge[0].rmse;
+    assert!(describe_worse_than_ridge(&file).is_empty());
+    file.errors[0].rmse = 2.0 * file.ridge[0].rmse;
+    for (method, is_advised) in [(Method::default(), true), (Method::recorded_regularization(), false)] {
+        file.settings.training.method = method;
+        let warnings = describe_worse_than_ridge(&file);
+        assert_eq!(warnings.len(), 1);
+        assert_eq!(warnings[0].contains("Bayesian"), is_advised, "{warnings:?}");
+    }
 }
 
 #[test]

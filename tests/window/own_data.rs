@@ -53,7 +53,7 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
     assert!(driver.has("Error over the position"));
     driver.click("Regression");
     driver.settle();
-    assert!(driver.says("decoupled x (mm) against actual x (mm)"));
+    assert!(driver.says("decoded x (mm) against actual x (mm)"));
     driver.click("Sample");
     driver.settle();
     assert!(

@@ -193,7 +193,7 @@ impl<'a> Training<'a> {
                 let mut rng = self.run.settings().seed.rng(Stream::Resampling);
                 let told = Determination::measure(self.run.test(), answers.view(), plan.division.by, &mut rng);
                 let mut remarks = describe_standings(targets, &told);
-                remarks.extend(describe_worse_than_ridge(targets, &file.errors, &file.ridge));
+                remarks.extend(describe_worse_than_ridge(&file));
                 remarks
             } else {
                 Vec::new()
