@@ -52,6 +52,24 @@ fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
 }
 
 #[test]
+fn news_above_a_field_does_not_interrupt_who_types_in_it() {
+    let mut driver = Driver::open();
+    driver.enter("Array scale", "20×20_5×60");
+    driver.click_button("x, y, z");
+    driver.type_into("Training samples", "300");
+    // The notes on this scene come above the field while it is being typed in.
+    driver.wait("the scene's outlook", |driver| {
+        let (preview, draft) = (driver.state().preview.as_ref(), &driver.state().draft.source);
+        preview.is_some_and(|preview| {
+            let source = &preview.settings.source;
+            (source.sensor, source.scene) == (draft.sensor, draft.scene) && preview.test.outlook.is_some()
+        })
+    });
+    driver.press(Key::Enter);
+    assert_eq!(driver.state().draft.source.samples, 300);
+}
+
+#[test]
 fn a_reason_is_near_its_field_and_goes_with_escape() {
     let mut driver = Driver::open();
     driver.enter("Hidden nodes", "0");

@@ -18,8 +18,10 @@ pub fn focus_ring_ui(ui: &Ui, response: &Response) {
 /// `contents` is added only while it is unfolded.
 pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mut Ui)) {
     let dim = Theme::of(ui).palette.dim;
+    // What stands above may come and go without a change to the ids in here: who types in a field keeps it.
+    let scope = UiBuilder::new().scope_id(ui.scope_id().with(name));
     let header = ui
-        .scope(|ui| {
+        .scope_builder(scope, |ui| {
             let visuals = ui.visuals_mut();
             // The whole line can be clicked, and shows so under the pointer.
             visuals.collapsing_header_frame = true;
