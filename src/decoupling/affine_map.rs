@@ -1,6 +1,6 @@
 use ndarray::{Array2, Axis, Slice};
 
-use super::{DecodeError, Decoder, distinct::distinct, least_squares::fit_least_squares, linear_fit::LinearFit};
+use super::{DecodeError, Decoder, least_squares::fit_least_squares, linear_fit::LinearFit, units::Units};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
@@ -19,7 +19,6 @@ pub struct AffineMap {
     base: Vec<f64>,
     /// Indices of the varying targets.
     varying: Vec<usize>,
-    penalty: f64,
     /// Buffer for the centred channels of one row.
     values: Vec<f64>,
     /// Buffer for the changes of the varying targets in one row.
@@ -35,12 +34,12 @@ impl AffineMap {
         let values = training.readings().mapv(|reading| quantity.of(reading));
         let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
         let outputs = MinMax::fit(training.targets())?;
-        let coefficients = fit_least_squares(training, &inputs, &outputs);
-        Ok(Self::folded(&inputs, &coefficients, &outputs, 0.0))
+        let coefficients = fit_least_squares(training, &inputs, &outputs)?;
+        Ok(Self::folded(&inputs, &coefficients, &outputs))
     }
 
-    /// Fits the map to `training` by ridge regression, with the penalty of the least leave-one-out error; `unseen` is as
-    /// in [`Inputs::fit`].
+    /// Fits the map to `training` by ridge regression, each target with the penalty of its least leave-one-out error;
+    /// `unseen` is as in [`Inputs::fit`].
     ///
     /// # Errors
     /// If values cannot be scaled.
@@ -48,14 +47,14 @@ impl AffineMap {
         let inputs = Inputs::fit_all(choice, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
         let y = outputs.scale(training.targets());
-        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let units = Units::of(training, inputs.of(training.readings()), y);
         let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
-        let fit = LinearFit::new(&inputs, x.view(), y.view(), changes.view())?;
-        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs, fit.penalty()))
+        let fit = LinearFit::new(&inputs, &units, changes.view())?;
+        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs))
     }
 
     /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).
-    fn folded(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax, penalty: f64) -> Self {
+    fn folded(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax) -> Self {
         let (centre, to_inputs) = inputs.affine();
         let ranges = outputs.middles_and_half_widths();
         let varying = outputs.varying();
@@ -75,14 +74,7 @@ impl AffineMap {
             base,
             changes: vec![0.0; varying.len()],
             varying,
-            penalty,
         }
-    }
-
-    /// Ridge penalty, in units of squared singular values of the centred inputs, the largest of which has deviation 1 if
-    /// they are whitened; 0 for plain least squares, and infinite where the mean is better than any map.
-    pub fn penalty(&self) -> f64 {
-        self.penalty
     }
 }
 

@@ -21,7 +21,6 @@ mod affine_start;
 mod clusters;
 mod compiled;
 mod decoder;
-mod distinct;
 mod equation_decoders;
 mod gauss_newton;
 mod kind;
@@ -44,6 +43,7 @@ mod takagi_sugeno;
 mod training_mean;
 mod triangle;
 mod twins;
+mod units;
 
 pub use affine_map::AffineMap;
 pub use compiled::{CompiledNetworks, Real};

@@ -12,6 +12,9 @@ use crate::network::ScalingError;
 /// wrong by residual_i / (1 − leverage_i) (Golub, Heath and Wahba 1979). Residual and 1 − leverage are here what they are
 /// without penalty, plus U t Uᵀ(y − ȳ) and Σ t u²: where the map goes through every sample and both vanish, they do so
 /// with all their digits.
+///
+/// A sample may stand for several with the same inputs, y being their mean output. Its row of A and of y is then multiplied by
+/// the root of their number, and the error is that of leaving out all of them at once.
 pub(super) struct Ridge {
     x_mean: Vec<f64>,
     y_mean: Vec<f64>,
@@ -28,41 +31,55 @@ pub(super) struct Ridge {
 struct LeftOut {
     /// Left singular vectors U of the samples: samples × singular values.
     samples: Mat<f64>,
-    /// The same of the noise: its sources × singular values.
+    /// Their squares.
+    squares: Mat<f64>,
+    /// The same vectors of the noise: its sources × singular values.
     noise: Mat<f64>,
     /// Residuals without penalty: samples × outputs.
     residual: Mat<f64>,
     /// 1 − leverage of each sample without penalty.
     free: Vec<f64>,
-    /// Sum of the squared errors of the mean of all other samples.
-    of_mean: f64,
+    /// Sum of the squared errors of the mean of all other samples, for each output.
+    of_mean: Vec<f64>,
 }
 
 /// Samples that are left out in turn: of more, evenly spaced ones, which are as good an estimate.
 const MOST_LEFT_OUT: usize = 4000;
 
 impl Ridge {
-    /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs).
+    /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs); `weights` are the numbers of
+    /// samples that each stands for.
     ///
     /// `unseen` (sources × inputs) are the changes of the inputs by one standard deviation of each source of noise that
     /// `x` lacks. The coefficients then minimise the error expected with this noise.
+    ///
+    /// # Panics
+    /// If the lengths differ.
     pub fn new(
         x: ArrayView2<'_, f64>,
         y: ArrayView2<'_, f64>,
+        weights: &[f64],
         unseen: ArrayView2<'_, f64>,
     ) -> Result<Self, ScalingError> {
         let (samples, inputs) = x.dim();
-        let mean = |values: &ArrayView2<'_, f64>| values.mean_axis(Axis(0)).ok_or(ScalingError::Empty);
-        let (x_mean, y_mean) = (mean(&x)?, mean(&y)?);
+        assert_eq!((y.nrows(), weights.len()), (samples, samples));
+        if samples == 0 {
+            return Err(ScalingError::Empty);
+        }
+        let total: f64 = weights.iter().sum();
+        let column = ArrayView2::from_shape((samples, 1), weights).expect("as many as samples");
+        let mean = |values: &ArrayView2<'_, f64>| (values * &column).sum_axis(Axis(0)) / total;
+        let (x_mean, y_mean) = (mean(&x), mean(&y));
+        let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
         // The sum over all samples of the squared error that noise adds is that of these additional rows.
-        let root = (samples as f64).sqrt();
+        let root = total.sqrt();
         let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| {
             match row.checked_sub(samples) {
-                None => x[[row, i]] - x_mean[i],
+                None => roots[row] * (x[[row, i]] - x_mean[i]),
                 Some(source) => root * unseen[[source, i]],
             }
         });
-        let b = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - y_mean[t]);
+        let b = Mat::from_fn(samples, y.ncols(), |s, t| roots[s] * (y[[s, t]] - y_mean[t]));
         let svd = a.thin_svd().map_err(|_| ScalingError::NotConverged)?;
         let mut singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let smallest = f64::EPSILON * inputs as f64 * singular.first().copied().unwrap_or(0.0);
@@ -75,9 +92,9 @@ impl Ridge {
         let stride = samples.div_ceil(MOST_LEFT_OUT);
         let chosen: Vec<usize> = (0..samples).step_by(stride).collect();
         let is_all_spanned = unseen.nrows() == 0 && kept + 1 >= samples;
-        let share = 1.0 - 1.0 / samples as f64;
+        let share = |sample: usize| 1.0 - weights[sample] / total;
         let free = |&sample: &usize| {
-            let free = share - of_samples.row(sample).squared_norm_l2();
+            let free = share(sample) - of_samples.row(sample).squared_norm_l2();
             // A sample that alone spans a direction; the rest is rounding.
             let is_rounding = free < f64::EPSILON * samples as f64;
             if is_all_spanned || is_rounding { 0.0 } else { free }
@@ -85,13 +102,20 @@ impl Ridge {
         let free: Vec<f64> = chosen.iter().map(free).collect();
         let rows = chosen.len();
         let residual = |row: usize, t: usize| if free[row] > 0.0 { rest[(chosen[row], t)] } else { 0.0 };
-        let squares = chosen.iter().map(|&sample| b.row(sample).squared_norm_l2());
-        let part = (rows as f64 / samples as f64).sqrt();
+        let of_mean = |t: usize| {
+            chosen
+                .iter()
+                .map(|&sample| (b[(sample, t)] / share(sample)).powi(2))
+                .sum()
+        };
+        let part = (chosen.iter().map(|&sample| weights[sample]).sum::<f64>() / total).sqrt();
+        let of_chosen = Mat::from_fn(rows, kept, |row, k| of_samples[(chosen[row], k)]);
         let left_out = LeftOut {
-            samples: Mat::from_fn(rows, kept, |row, k| of_samples[(chosen[row], k)]),
+            squares: Mat::from_fn(rows, kept, |row, k| of_chosen[(row, k)] * of_chosen[(row, k)]),
+            samples: of_chosen,
             noise: Mat::from_fn(unseen.nrows(), kept, |row, k| part * of_noise[(row, k)]),
             residual: Mat::from_fn(rows, y.ncols(), residual),
-            of_mean: squares.sum::<f64>() / (share * share),
+            of_mean: (0..y.ncols()).map(of_mean).collect(),
             free,
         };
         Ok(Self {
@@ -104,49 +128,86 @@ impl Ridge {
         })
     }
 
-    /// Returns the penalty with the least leave-one-out error; infinite if none is better than the mean of the outputs.
-    pub fn best_penalty(&self) -> f64 {
-        let (Some(largest), Some(smallest)) = (self.singular.first(), self.singular.last()) else {
+    /// Returns the penalty of the least leave-one-out error for each output; infinite where none is better than the mean.
+    pub fn best_penalties(&self) -> Vec<f64> {
+        let Some(decades) = self.decades() else {
+            return vec![f64::INFINITY; self.y_mean.len()];
+        };
+        let errors = |decades: &[f64]| {
+            let penalties: Vec<f64> = decades.iter().map(|decade| 10.0_f64.powf(*decade)).collect();
+            self.leave_one_out(&penalties)
+        };
+        let found = least(decades, self.y_mean.len(), errors);
+        let penalty = |((decade, error), of_mean): ((f64, f64), &f64)| {
+            if error < *of_mean {
+                10.0_f64.powf(decade)
+            } else {
+                f64::INFINITY
+            }
+        };
+        found.into_iter().zip(&self.left_out.of_mean).map(penalty).collect()
+    }
+
+    /// Returns the penalty with the least leave-one-out error of all outputs together; infinite if none is better than the
+    /// mean.
+    pub fn common_penalty(&self) -> f64 {
+        let Some(decades) = self.decades() else {
             return f64::INFINITY;
         };
-        // Further out, a penalty takes away nothing in double precision, or nearly everything.
-        let decades = (2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0);
-        let (decade, error) = least(decades, |decade| self.leave_one_out(10.0_f64.powf(decade)));
-        if error < self.left_out.of_mean {
+        let error = |decades: &[f64]| {
+            let penalties = vec![10.0_f64.powf(decades[0]); self.y_mean.len()];
+            vec![self.leave_one_out(&penalties).iter().sum()]
+        };
+        let (decade, error) = least(decades, 1, error)[0];
+        if error < self.left_out.of_mean.iter().sum() {
             10.0_f64.powf(decade)
         } else {
             f64::INFINITY
         }
     }
 
-    /// Sum of the squared errors of the samples, each left out in turn, with what noise adds.
-    fn leave_one_out(&self, penalty: f64) -> f64 {
+    /// Range of the logarithms of penalties. Further out, a penalty takes away nothing in double precision, or nearly
+    /// everything.
+    fn decades(&self) -> Option<(f64, f64)> {
+        let (largest, smallest) = (self.singular.first()?, self.singular.last()?);
+        Some((2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0))
+    }
+
+    /// Sum of the squared errors of the samples for each output with its penalty, each sample left out in turn, with what
+    /// noise adds.
+    fn leave_one_out(&self, penalties: &[f64]) -> Vec<f64> {
         let LeftOut {
             samples,
+            squares,
             noise,
             residual,
             free,
             ..
         } = &self.left_out;
-        let taken: Vec<f64> = self.singular.iter().map(|s| penalty / (s * s + penalty)).collect();
         let (kept, outputs) = self.projected.shape();
-        let residual = residual + samples * Mat::from_fn(kept, outputs, |k, t| taken[k] * self.projected[(k, t)]);
-        let answers = noise * Mat::from_fn(kept, outputs, |k, t| (1.0 - taken[k]) * self.projected[(k, t)]);
-        let errors = free.iter().enumerate().map(|(row, free)| {
-            let leverages = samples.row(row).iter().zip(&taken);
-            let free = free + leverages.map(|(u, taken)| u * u * taken).sum::<f64>();
-            residual.row(row).squared_norm_l2() / (free * free)
+        let taken = Mat::from_fn(kept, outputs, |k, t| {
+            let square = self.singular[k] * self.singular[k];
+            penalties[t] / (square + penalties[t])
         });
-        errors.sum::<f64>() + answers.squared_norm_l2()
+        let residual = residual + samples * Mat::from_fn(kept, outputs, |k, t| taken[(k, t)] * self.projected[(k, t)]);
+        let answered = |k, t| (1.0 - taken[(k, t)]) * self.projected[(k, t)];
+        let answers = noise * Mat::from_fn(kept, outputs, answered);
+        let leverages = squares * &taken;
+        let of_output = |t: usize| {
+            let rows = free.iter().enumerate();
+            let errors = rows.map(|(row, free)| (residual[(row, t)] / (free + leverages[(row, t)])).powi(2));
+            errors.sum::<f64>() + answers.col(t).squared_norm_l2()
+        };
+        (0..outputs).map(of_output).collect()
     }
 
-    /// Coefficients with this penalty: inputs + 1 × outputs, the constant last. With an infinite one they are 0, and the
-    /// constant the mean.
-    pub fn coefficients(&self, penalty: f64) -> Array2<f64> {
+    /// Coefficients with a penalty for each output: inputs + 1 × outputs, the constant last. With an infinite one they are 0,
+    /// and the constant the mean.
+    pub fn coefficients(&self, penalties: &[f64]) -> Array2<f64> {
         let (kept, outputs) = self.projected.shape();
         let shrunk = Mat::from_fn(kept, outputs, |k, t| {
             let s = self.singular[k];
-            s / (s * s + penalty) * self.projected[(k, t)]
+            s / (s * s + penalties[t]) * self.projected[(k, t)]
         });
         let gains = &self.directions * shrunk;
         Array2::from_shape_fn((gains.nrows() + 1, outputs), |(i, t)| {
@@ -162,6 +223,7 @@ impl Ridge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::Array1;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
     use crate::scene::normal::standard_normal;
@@ -175,10 +237,14 @@ mod tests {
         Array2::zeros((0, inputs))
     }
 
-    fn fit(x: &Array2<f64>, y: &Array2<f64>) -> (Array2<f64>, f64) {
-        let ridge = Ridge::new(x.view(), y.view(), none(x.ncols()).view()).unwrap();
-        let penalty = ridge.best_penalty();
-        (ridge.coefficients(penalty), penalty)
+    fn ones(x: &Array2<f64>) -> Vec<f64> {
+        vec![1.0; x.nrows()]
+    }
+
+    fn fit(x: &Array2<f64>, y: &Array2<f64>) -> (Array2<f64>, Vec<f64>) {
+        let ridge = Ridge::new(x.view(), y.view(), &ones(x), none(x.ncols()).view()).unwrap();
+        let penalties = ridge.best_penalties();
+        (ridge.coefficients(&penalties), penalties)
     }
 
     /// Coefficients without the constant.
@@ -194,8 +260,8 @@ mod tests {
         assert!((exact[[0, 0]] - 3.0).abs() < 1e-8 && (exact[[5, 0]] + 1.0).abs() < 1e-8);
         assert!((exact[[20, 0]] - 0.5).abs() < 1e-8);
         // Pure noise: nearly everything is left out.
-        let (fitted, penalty) = fit(&x, &normal(60, 1, 2));
-        assert!(penalty > 1.0);
+        let (fitted, penalties) = fit(&x, &normal(60, 1, 2));
+        assert!(penalties[0] > 1.0);
         assert!(fitted.iter().take(20).map(|c| c * c).sum::<f64>() < 0.2);
     }
 
@@ -211,7 +277,7 @@ mod tests {
             let y = normal(samples, 2, 4);
             let noise = normal(3, inputs, 5) * 0.03;
             for unseen in [none(inputs), noise] {
-                let ridge = Ridge::new(x.view(), y.view(), unseen.view()).unwrap();
+                let ridge = Ridge::new(x.view(), y.view(), &ones(&x), unseen.view()).unwrap();
                 for penalty in [1e-9, 1e-4, 1.0] {
                     let mut expected = 0.0;
                     for left_out in 0..samples {
@@ -219,15 +285,21 @@ mod tests {
                         let (x_others, y_others) = (x.select(Axis(0), &others), y.select(Axis(0), &others));
                         // The noise weighs as it does for all samples.
                         let weight = (samples as f64 / others.len() as f64).sqrt();
-                        let fit = Ridge::new(x_others.view(), y_others.view(), (&unseen * weight).view()).unwrap();
-                        let map = fit.coefficients(penalty);
+                        let fit = Ridge::new(
+                            x_others.view(),
+                            y_others.view(),
+                            &ones(&x_others),
+                            (&unseen * weight).view(),
+                        )
+                        .unwrap();
+                        let map = fit.coefficients(&[penalty; 2]);
                         let answer = x.row(left_out).dot(&gains(&map)) + map.row(inputs);
                         expected += (&answer - &y.row(left_out)).mapv(|error| error * error).sum();
                     }
-                    let map = ridge.coefficients(penalty);
+                    let map = ridge.coefficients(&[penalty; 2]);
                     let added = unseen.dot(&gains(&map));
                     expected += samples as f64 * added.mapv(|change| change * change).sum();
-                    let ratio = ridge.leave_one_out(penalty) / expected;
+                    let ratio = ridge.leave_one_out(&[penalty; 2]).iter().sum::<f64>() / expected;
                     assert!((ratio - 1.0).abs() < 1e-6, "{samples}×{inputs}, {penalty}: {ratio}");
                 }
             }
@@ -238,8 +310,8 @@ mod tests {
     #[test]
     fn fits_through_every_sample_are_still_told_apart() {
         let x = normal(12, 30, 6);
-        let ridge = Ridge::new(x.view(), normal(12, 1, 7).view(), none(30).view()).unwrap();
-        let smooth = [1e-3, 1e-6, 1e-9, 1e-12].map(|penalty| ridge.leave_one_out(penalty));
+        let ridge = Ridge::new(x.view(), normal(12, 1, 7).view(), &ones(&x), none(30).view()).unwrap();
+        let smooth = [1e-3, 1e-6, 1e-9, 1e-12].map(|penalty| ridge.leave_one_out(&[penalty])[0]);
         for pair in smooth.windows(2) {
             assert!((pair[1] / pair[0] - 1.0).abs() < 1e-3, "{smooth:?}");
         }
@@ -250,14 +322,71 @@ mod tests {
         // One input of variance 1 and noise of variance 1/4: the best gain is 1 / (1 + 1/4).
         let x = normal(20_000, 1, 8);
         let unseen = Array2::from_elem((1, 1), 0.5);
-        let ridge = Ridge::new(x.view(), x.view(), unseen.view()).unwrap();
-        let gain = ridge.coefficients(ridge.best_penalty())[[0, 0]];
+        let ridge = Ridge::new(x.view(), x.view(), &ones(&x), unseen.view()).unwrap();
+        let gain = ridge.coefficients(&ridge.best_penalties())[[0, 0]];
         assert!((gain - 0.8).abs() < 0.01, "{gain}");
+    }
+
+    /// The truth are fits to all copies, without all those of each sample in turn.
+    #[test]
+    fn weighted_samples_are_as_many_copies_that_are_left_out_together() {
+        let (x, y) = (normal(9, 4, 9), normal(9, 2, 10));
+        let weights = [1.0, 3.0, 2.0, 7.0, 1.0, 1.0, 5.0, 2.0, 4.0];
+        let copies: Vec<usize> = (0..9).flat_map(|s| vec![s; weights[s] as usize]).collect();
+        let fit_to = |samples: &[usize]| {
+            let (x, y) = (x.select(Axis(0), samples), y.select(Axis(0), samples));
+            Ridge::new(x.view(), y.view(), &ones(&x), none(4).view()).unwrap()
+        };
+        let ridge = Ridge::new(x.view(), y.view(), &weights, none(4).view()).unwrap();
+        // An own penalty for each output.
+        for penalties in [[1e-6, 0.3], [10.0, 1e-2]] {
+            let (ours, truth) = (ridge.coefficients(&penalties), fit_to(&copies).coefficients(&penalties));
+            assert!(
+                (&ours - &truth).iter().all(|error| error.abs() < 1e-12),
+                "{ours} {truth}"
+            );
+            let mut expected = Array1::<f64>::zeros(2);
+            for (left_out, weight) in weights.iter().enumerate() {
+                let others: Vec<usize> = copies.iter().copied().filter(|&s| s != left_out).collect();
+                let map = fit_to(&others).coefficients(&penalties);
+                let answer = x.row(left_out).dot(&gains(&map)) + map.row(4);
+                expected += &(*weight * (&answer - &y.row(left_out)).mapv(|error| error * error));
+            }
+            let errors = ridge.leave_one_out(&penalties);
+            for (ours, truth) in errors.iter().zip(&expected) {
+                assert!((ours / truth - 1.0).abs() < 1e-9, "{errors:?} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_output_has_the_penalty_that_it_would_have_alone() {
+        let x = normal(40, 12, 11);
+        let mut y = normal(40, 3, 12);
+        // Exact, noisy, and noise alone.
+        for s in 0..40 {
+            y[[s, 0]] = x[[s, 3]] - x[[s, 4]];
+            y[[s, 1]] += x[[s, 7]];
+        }
+        let (together, penalties) = fit(&x, &y);
+        for t in 0..3 {
+            let (alone, penalty) = fit(&x, &y.select(Axis(1), &[t]));
+            assert!((penalties[t] / penalty[0]).ln().abs() < 0.1 || penalties[t] == penalty[0]);
+            assert!(
+                (&together.column(t) - &alone.column(0))
+                    .iter()
+                    .all(|error| error.abs() < 1e-2)
+            );
+        }
+        assert!(
+            penalties[0] < 1e-6 && penalties[1] > 1e-3 && penalties[2] > 10.0,
+            "{penalties:?}"
+        );
     }
 
     #[test]
     fn no_or_one_sample_and_no_inputs_or_outputs() {
-        assert!(Ridge::new(normal(0, 3, 0).view(), normal(0, 2, 0).view(), none(3).view()).is_err());
+        assert!(Ridge::new(normal(0, 3, 0).view(), normal(0, 2, 0).view(), &[], none(3).view()).is_err());
         for (samples, inputs, outputs) in [(1, 3, 2), (2, 3, 2), (5, 0, 2), (5, 3, 0)] {
             let (map, _) = fit(&normal(samples, inputs, 1), &normal(samples, outputs, 2));
             assert_eq!(map.dim(), (inputs + 1, outputs));

@@ -51,8 +51,11 @@ pub enum ScalingError {
         /// Largest value of the channel.
         maximum: f64,
     },
-    /// The decomposition into principal components did not converge.
-    #[error("the principal components of the readings did not converge: scale by their range instead")]
+    /// A decomposition did not converge, or sums overflowed.
+    #[error(
+        "the equations of the fit or of the principal components have no finite solution: look for extreme values in the \
+         readings and targets, or scale the readings by their range"
+    )]
     NotConverged,
     /// The scaling in a file is inconsistent.
     #[error("its parts are missing, not finite, or of sizes that do not fit")]

@@ -11,8 +11,8 @@ use super::{
     DecodeError, Decoder,
     clusters::k_means,
     compiled::padded_layer::PaddedLayer,
-    distinct::{distinct, with_noise},
     ridge::Ridge,
+    units::{Units, with_noise},
 };
 use crate::{
     dataset::Dataset,
@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear output
-/// layer with a constant, fitted by ridge regression with the penalty of the least leave-one-out error.
+/// layer with a constant, fitted by ridge regression, each target with the penalty of its least leave-one-out error.
 ///
 /// The scalings are folded into the layers, and decoding allocates nothing.
 #[derive(Clone, Debug)]
@@ -103,12 +103,13 @@ impl RadialBasisNetwork {
         let spread2 = 2.0 * x.var_axis(Axis(0), 0.0).sum();
         let width2 = settings.relative_width.powi(2) * spread2;
         let sharpness = if width2 > 0.0 { 0.5 / width2 } else { 0.0 };
-        let (x, y) = distinct(x.view(), y.view());
+        let Units { x, y, weights } = Units::of(&training, x, y);
         let basis = Array2::from_shape_fn((x.nrows(), centres.nrows()), |(s, c)| {
             gaussian(x.row(s), centres.row(c), sharpness)
         });
-        let ridge = Ridge::new(basis.view(), y.view(), Array2::zeros((0, centres.nrows())).view())?;
-        let coefficients = ridge.coefficients(ridge.best_penalty());
+        let none = Array2::zeros((0, centres.nrows()));
+        let ridge = Ridge::new(basis.view(), y.view(), &weights, none.view())?;
+        let coefficients = ridge.coefficients(&ridge.best_penalties());
         Ok(Self::folded(&inputs, &centres, sharpness, &coefficients, &outputs))
     }
 
@@ -271,8 +272,8 @@ mod tests {
         let centres = k_means(x.view(), 100, &mut rng);
         let sharpness = 0.5 / (4.0 * 2.0 * x.var_axis(Axis(0), 0.0).sum());
         let basis = Array2::from_shape_fn((300, 100), |(s, c)| gaussian(x.row(s), centres.row(c), sharpness));
-        let ridge = Ridge::new(basis.view(), y.view(), Array2::zeros((0, 100)).view()).unwrap();
-        let coefficients = ridge.coefficients(ridge.best_penalty());
+        let ridge = Ridge::new(basis.view(), y.view(), &[1.0; 300], Array2::zeros((0, 100)).view()).unwrap();
+        let coefficients = ridge.coefficients(&ridge.best_penalties());
         let mut network = RadialBasisNetwork::folded(&inputs, &centres, sharpness, &coefficients, &outputs);
         let (channel_centres, to_inputs) = inputs.affine();
         let ranges = outputs.middles_and_half_widths();

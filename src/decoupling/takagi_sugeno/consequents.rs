@@ -7,9 +7,10 @@ use faer::{
         solvers::Solve,
     },
 };
-use ndarray::{Array2, ArrayView2, Axis, Slice};
+use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
 use super::antecedents::Antecedents;
+use crate::{decoupling::units::Units, network::ScalingError};
 
 /// Normal equations of the consequents on some samples: AᵀA and AᵀT of the regressors A and the targets T.
 #[derive(Clone)]
@@ -46,15 +47,19 @@ impl NormalEquations {
         }
     }
 
-    /// Those of all samples, without holding all regressors at once.
-    pub fn in_blocks(antecedents: &Antecedents, x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>) -> Self {
-        let blocks = (0..x.nrows()).step_by(BLOCK).map(|start| {
-            let block = Slice::from(start..x.nrows().min(start + BLOCK));
-            let regressors = regressors(antecedents, x.slice_axis(Axis(0), block));
+    /// Those of all units, whose targets are `y`, without holding all regressors at once.
+    pub fn in_blocks(antecedents: &Antecedents, units: &Units, y: ArrayView2<'_, f64>) -> Self {
+        let (count, inputs) = units.x.dim();
+        let blocks = (0..count).step_by(BLOCK).map(|start| {
+            let samples = start..count.min(start + BLOCK);
+            let block = Slice::from(samples.clone());
+            let weights = &units.weights[samples];
+            let regressors = regressors(antecedents, units.x.slice_axis(Axis(0), block), weights);
+            let targets = weighted(y.slice_axis(Axis(0), block), weights);
             let samples = 0..regressors.nrows();
-            Self::of(&regressors, &matrix(y.slice_axis(Axis(0), block)), samples)
+            Self::of(&regressors, &targets, samples)
         });
-        let order = antecedents.rules() * (x.ncols() + 1);
+        let order = antecedents.rules() * (inputs + 1);
         blocks.fold(Self::zeros(order, y.ncols()), |sum, block| sum.plus(&block))
     }
 
@@ -79,8 +84,8 @@ impl NormalEquations {
 
     /// Consequents (regressors × outputs) that minimise the squared errors expected when the inputs have additional
     /// noise of these variances, with a penalty of `ridge`, in proportion to the mean of the diagonal of AᵀA, on their squares. A penalty
-    /// too small for the rounding of AᵀA is raised.
-    pub fn consequents(&self, ridge: f64, noise: Option<&[f64]>) -> Mat<f64> {
+    /// too small for the rounding of AᵀA is raised; `None` if none is large enough, because sums overflow.
+    pub fn consequents(&self, ridge: f64, noise: Option<&[f64]>) -> Option<Mat<f64>> {
         let order = self.gram.nrows();
         let mean = self.gram.diagonal().column_vector().iter().sum::<f64>() / order as f64;
         let mut with_noise = self.gram.clone();
@@ -96,12 +101,12 @@ impl NormalEquations {
             if let Ok(factor) = penalised.llt(Side::Lower) {
                 let solution = factor.solve(&self.right);
                 if solution.is_all_finite() {
-                    return solution;
+                    return Some(solution);
                 }
             }
             ridge *= 100.0;
         }
-        Mat::zeros(order, self.right.ncols())
+        None
     }
 
     /// Adds to the lower triangle of AᵀA what noise of the inputs with these variances does, the firing strengths taken as
@@ -119,9 +124,13 @@ impl NormalEquations {
     }
 }
 
-/// Regressors (samples × rules·(inputs + 1)) of the inputs `x`: the firing strength of each rule times [x, 1].
-pub(super) fn regressors(antecedents: &Antecedents, x: ArrayView2<'_, f64>) -> Mat<f64> {
-    let strengths = antecedents.firing_strengths(x);
+/// Regressors (samples × rules·(inputs + 1)) of the inputs `x`: the firing strength of each rule times [x, 1], times the root
+/// of the weight of the sample.
+pub(super) fn regressors(antecedents: &Antecedents, x: ArrayView2<'_, f64>, weights: &[f64]) -> Mat<f64> {
+    let mut strengths = antecedents.firing_strengths(x);
+    for (mut row, weight) in strengths.rows_mut().into_iter().zip(weights) {
+        row *= weight.sqrt();
+    }
     let inputs = x.ncols();
     Mat::from_fn(x.nrows(), antecedents.rules() * (inputs + 1), |sample, column| {
         let (rule, input) = (column / (inputs + 1), column % (inputs + 1));
@@ -130,33 +139,65 @@ pub(super) fn regressors(antecedents: &Antecedents, x: ArrayView2<'_, f64>) -> M
     })
 }
 
-/// The same values as a matrix of the solvers.
-pub(super) fn matrix(values: ArrayView2<'_, f64>) -> Mat<f64> {
-    Mat::from_fn(values.nrows(), values.ncols(), |i, j| values[[i, j]])
+/// The targets `y` (samples × outputs) times the roots of the weights of the samples.
+pub(super) fn weighted(y: ArrayView2<'_, f64>, weights: &[f64]) -> Mat<f64> {
+    Mat::from_fn(y.nrows(), y.ncols(), |i, j| weights[i].sqrt() * y[[i, j]])
 }
 
-/// Consequents (regressors × outputs) of `y` on `x`. The penalty draws them to the mean of the targets, not to 0.
+/// Mean of the targets of all samples, each as often as it occurs; `None` without samples.
+pub(super) fn mean_target(units: &Units) -> Option<Array1<f64>> {
+    let column = ArrayView2::from_shape((units.weights.len(), 1), &units.weights).ok()?;
+    let total: f64 = units.weights.iter().sum();
+    (total > 0.0).then(|| (&units.y * &column).sum_axis(Axis(0)) / total)
+}
+
+/// Penalty on the consequents of one output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Penalty {
+    /// In proportion to the mean of the diagonal of AᵀA.
+    pub ridge: f64,
+    /// True if the consequents are those expected with noise of the inputs.
+    pub is_noisy: bool,
+}
+
+/// Consequents (regressors × outputs) of `units`, each output with its penalty, which draws them to the mean of the targets,
+/// not to 0; `noise` are the variances of the noise of the inputs.
+///
+/// # Errors
+/// If the equations have no finite solution.
 pub(super) fn fit_consequents(
     antecedents: &Antecedents,
-    x: ArrayView2<'_, f64>,
-    y: ArrayView2<'_, f64>,
-    ridge: f64,
-    noise: Option<&[f64]>,
-) -> Array2<f64> {
-    let order = antecedents.rules() * (x.ncols() + 1);
-    let Some(mean) = y.mean_axis(Axis(0)) else {
-        return Array2::zeros((order, y.ncols()));
-    };
-    let solution = NormalEquations::in_blocks(antecedents, x, (&y - &mean).view()).consequents(ridge, noise);
-    // Firing strengths add up to 1, and so the constants of all rules together are one.
-    Array2::from_shape_fn((order, y.ncols()), |(row, output)| {
-        let constant = if row % (x.ncols() + 1) == x.ncols() {
-            mean[output]
-        } else {
-            0.0
+    units: &Units,
+    penalties: &[Penalty],
+    noise: &[f64],
+) -> Result<Array2<f64>, ScalingError> {
+    let (inputs, outputs) = (units.x.ncols(), units.y.ncols());
+    let order = antecedents.rules() * (inputs + 1);
+    let mean = mean_target(units).ok_or(ScalingError::Empty)?;
+    let equations = NormalEquations::in_blocks(antecedents, units, (&units.y - &mean).view());
+    // Each penalty is solved for once.
+    let mut solutions: Vec<(Penalty, Mat<f64>)> = Vec::new();
+    let mut consequents = Array2::zeros((order, outputs));
+    for (output, &penalty) in penalties.iter().enumerate() {
+        let place = match solutions.iter().position(|(solved, _)| *solved == penalty) {
+            Some(place) => place,
+            None => {
+                let solution = equations.consequents(penalty.ridge, penalty.is_noisy.then_some(noise));
+                solutions.push((penalty, solution.ok_or(ScalingError::NotConverged)?));
+                solutions.len() - 1
+            }
         };
-        solution[(row, output)] + constant
-    })
+        for row in 0..order {
+            // Firing strengths add up to 1, and so the constants of all rules together are one.
+            let constant = if row % (inputs + 1) == inputs {
+                mean[output]
+            } else {
+                0.0
+            };
+            consequents[[row, output]] = solutions[place].1[(row, output)] + constant;
+        }
+    }
+    Ok(consequents)
 }
 
 #[cfg(test)]
@@ -180,6 +221,20 @@ mod tests {
         consequents: Vec<Vec<f64>>,
     }
 
+    fn units(x: &Array2<f64>, y: &Array2<f64>) -> Units {
+        Units {
+            x: x.clone(),
+            y: y.clone(),
+            weights: vec![1.0; x.nrows()],
+        }
+    }
+
+    /// Consequents with one penalty for all outputs.
+    fn fit(antecedents: &Antecedents, units: &Units, ridge: f64) -> Array2<f64> {
+        let penalty = Penalty { ridge, is_noisy: false };
+        fit_consequents(antecedents, units, &vec![penalty; units.y.ncols()], &[]).unwrap()
+    }
+
     fn array(rows: &[Vec<f64>]) -> Array2<f64> {
         Array2::from_shape_fn((rows.len(), rows[0].len()), |(i, j)| rows[i][j])
     }
@@ -199,8 +254,8 @@ mod tests {
         let y = &y - y.mean().unwrap();
         let antecedents = Antecedents::new(ndarray::array![[-1.0, 0.5], [1.0, -0.5]], 1.0);
         let variances = [0.09, 0.2];
-        let clean = NormalEquations::in_blocks(&antecedents, x.view(), y.view());
-        let ours = clean.consequents(1e-9, Some(&variances));
+        let clean = NormalEquations::in_blocks(&antecedents, &units(&x, &y), y.view());
+        let ours = clean.consequents(1e-9, Some(&variances)).unwrap();
         let strengths = antecedents.firing_strengths(x.view());
         let copies = 4000;
         let draws = Array2::from_shape_simple_fn((30 * copies, 2), || standard_normal(&mut rng));
@@ -228,7 +283,7 @@ mod tests {
             let strengths = antecedents.firing_strengths(x.view());
             let error = largest_difference(&strengths, &array(&case.firing_strengths));
             assert!(error < 1e-12, "firing strengths: {error}");
-            let ours = fit_consequents(&antecedents, x.view(), y.view(), case.ridge, None);
+            let ours = fit(&antecedents, &units(&x, &y), case.ridge);
             let error = largest_difference(&ours, &array(&case.consequents));
             assert!(error < 1e-8, "consequents with penalty {}: {error}", case.ridge);
         }
@@ -245,7 +300,7 @@ mod tests {
             let (first, second) = (membership(a, b, -1.0, 0.5), membership(a, b, 1.0, -0.5));
             (first * (0.3 * a - 0.7 * b + 0.1) + second * (-0.2 * a + 0.4)) / (first + second)
         });
-        let consequents = fit_consequents(&antecedents, x.view(), truth.view(), 1e-12, None);
+        let consequents = fit(&antecedents, &units(&x, &truth), 1e-12);
         let expected = ndarray::array![[0.3], [-0.7], [0.1], [-0.2], [0.0], [0.4]];
         let error = largest_difference(&consequents, &expected);
         assert!(error < 1e-8, "{error}");
@@ -256,11 +311,47 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let x = Array2::from_shape_simple_fn((5000, 4), || standard_normal(&mut rng));
         let y = Array2::from_shape_fn((5000, 2), |(s, t)| (x[[s, t]] + 0.3 * x[[s, 3]]).exp());
-        let ours = fit_consequents(&Antecedents::everywhere(), x.view(), y.view(), 1e-12, None);
+        let ours = fit(&Antecedents::everywhere(), &units(&x, &y), 1e-12);
         let dense = Mat::from_fn(5000, 5, |s, k| if k < 4 { x[[s, k]] } else { 1.0 });
-        let least_squares = dense.qr().solve_lstsq(matrix(y.view()));
+        let least_squares = dense.qr().solve_lstsq(weighted(y.view(), &[1.0; 5000]));
         let expected = Array2::from_shape_fn((5, 2), |(k, t)| least_squares[(k, t)]);
         let error = largest_difference(&ours, &expected);
         assert!(error < 1e-9, "{error}");
+    }
+
+    /// The truth are fits to as many copies, and to each output alone.
+    #[test]
+    fn weights_are_copies_and_each_output_has_its_penalty() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let x = Array2::from_shape_simple_fn((12, 2), || standard_normal(&mut rng));
+        let y = Array2::from_shape_fn((12, 2), |(s, t)| (x[[s, t]] - 0.4 * x[[s, 1]]).sin());
+        let weights: Vec<f64> = (0..12).map(|s| 1.0 + (s % 4) as f64).collect();
+        let copies: Vec<usize> = (0..12).flat_map(|s| vec![s; weights[s] as usize]).collect();
+        let antecedents = Antecedents::new(ndarray::array![[-1.0, 0.5], [1.0, -0.5]], 1.0);
+        let gathered = Units {
+            weights,
+            ..units(&x, &y)
+        };
+        let all = units(&x.select(Axis(0), &copies), &y.select(Axis(0), &copies));
+        let ridges = [1e-2, 1e-4];
+        let penalties = ridges.map(|ridge| Penalty { ridge, is_noisy: false });
+        let ours = fit_consequents(&antecedents, &gathered, &penalties, &[]).unwrap();
+        for (t, ridge) in ridges.into_iter().enumerate() {
+            let truth = fit(&antecedents, &all, ridge);
+            let error = (&ours.column(t) - &truth.column(t)).mapv(f64::abs).sum();
+            assert!(error < 1e-10, "{error}");
+        }
+    }
+
+    #[test]
+    fn equations_that_overflow_are_an_error_and_no_rules_of_zeros() {
+        let x = Array2::from_shape_fn((20, 1), |(s, _)| 1e200 * s as f64);
+        let y = Array2::from_shape_fn((20, 1), |(s, _)| s as f64);
+        let penalty = Penalty {
+            ridge: 1e-6,
+            is_noisy: false,
+        };
+        let fitted = fit_consequents(&Antecedents::everywhere(), &units(&x, &y), &[penalty], &[]);
+        assert_eq!(fitted, Err(ScalingError::NotConverged));
     }
 }

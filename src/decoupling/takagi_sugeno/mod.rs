@@ -10,8 +10,8 @@ use rand::Rng;
 use self::antecedents::{Antecedents, normalise};
 use super::{
     DecodeError, Decoder,
-    distinct::{distinct, with_noise},
     linear_fit::LinearFit,
+    units::{Units, with_noise},
 };
 use crate::{
     dataset::Dataset,
@@ -24,7 +24,7 @@ use crate::{
 ///
 /// The antecedents are Gaussian memberships on whitened readings, centred on clusters of the training samples; the
 /// consequents of all rules are found together by least squares with a small ridge penalty. A cross-validation chooses the
-/// number of rules, how many inputs their memberships look at, and the penalty.
+/// number of rules, how many inputs their memberships look at, and the penalty of each target.
 ///
 /// In 30 dimensions distances hardly differ, so memberships look at the leading 3 or 10 principal components only, and are
 /// four times as wide as their centres are apart. Measured on the simulated 10×10_5×30 array with 12 rules, the held-out
@@ -67,12 +67,11 @@ impl TakagiSugeno {
         let inputs = Inputs::fit_all(InputChoice { quantity, scaling }, training.readings())?;
         let outputs = MinMax::fit(training.targets())?;
         let y = outputs.scale(training.targets());
-        let (x, y) = distinct(inputs.of(training.readings()).view(), y.view());
+        let units = Units::of(&training, inputs.of(training.readings()), y);
         let none = Array2::zeros((0, inputs.count()));
-        let linear = LinearFit::new(&inputs, x.view(), y.view(), none.view())?.variances(x.nrows());
-        let choice = selection::choose(x.view(), y.view(), &linear, rng);
-        let noise = choice.is_noisy.then_some(&linear[..]);
-        let scaled = consequents::fit_consequents(&choice.antecedents, x.view(), y.view(), choice.ridge, noise);
+        let noise = LinearFit::new(&inputs, &units, none.view())?.variances();
+        let choice = selection::choose(&units, &noise, rng);
+        let scaled = consequents::fit_consequents(&choice.antecedents, &units, &choice.penalties, &noise)?;
         Ok(Self::new(&inputs, &choice.antecedents, &scaled, &outputs))
     }
 
@@ -172,7 +171,7 @@ fn add_products(sums: &mut [f64], values: &[f64], factor: f64, matrix: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{consequents::Penalty, *};
     use crate::{
         dataset::{Seed, Stream},
         decoupling::{RadialBasisNetwork, RadialBasisSettings, decode_set},
@@ -253,13 +252,23 @@ mod tests {
         let mut rng = Seed(0).rng(Stream::Expectation);
         let (centres, distance) = Antecedents::clusters(x.view(), 3, 8, &mut rng);
         let antecedents = Antecedents::new(centres, distance);
-        let scaled = consequents::fit_consequents(&antecedents, x.view(), y.view(), 1e-6, None);
+        let units = Units {
+            weights: vec![1.0; x.nrows()],
+            x,
+            y,
+        };
+        let penalty = Penalty {
+            ridge: 1e-6,
+            is_noisy: false,
+        };
+        let outputs_count = units.y.ncols();
+        let scaled = consequents::fit_consequents(&antecedents, &units, &vec![penalty; outputs_count], &[]).unwrap();
         let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
         assert_eq!(folded.rules(), 8);
         // Rule by rule in the scaled inputs and targets.
         let x = inputs.of(test.readings());
         let strengths = antecedents.firing_strengths(x.view());
-        let expected = Array2::from_shape_fn((test.samples(), y.ncols()), |(s, t)| {
+        let expected = Array2::from_shape_fn((test.samples(), outputs_count), |(s, t)| {
             let affine = |rule: usize| {
                 let of_input = |k: usize| if k < x.ncols() { x[[s, k]] } else { 1.0 };
                 let term = |k: usize| scaled[[rule * (x.ncols() + 1) + k, t]] * of_input(k);
@@ -324,7 +333,16 @@ mod tests {
         let (centres, distance) = Antecedents::clusters(x.view(), 10, 16, &mut rng);
         assert_eq!(centres.dim(), (5, 10));
         let antecedents = Antecedents::new(centres, distance);
-        let consequents = consequents::fit_consequents(&antecedents, x.view(), x.view(), 0.0, None);
+        let units = Units {
+            x: x.to_owned(),
+            y: x.to_owned(),
+            weights: vec![1.0; 5],
+        };
+        let penalty = Penalty {
+            ridge: 0.0,
+            is_noisy: false,
+        };
+        let consequents = consequents::fit_consequents(&antecedents, &units, &[penalty; 12], &[]).unwrap();
         assert!(consequents.iter().all(|value| value.is_finite()));
     }
 

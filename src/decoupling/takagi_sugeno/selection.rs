@@ -1,11 +1,12 @@
 use faer::Mat;
-use ndarray::{ArrayView2, Axis};
+use ndarray::Axis;
 use rand::{Rng, seq::SliceRandom};
 
 use super::{
     antecedents::Antecedents,
-    consequents::{NormalEquations, matrix, regressors},
+    consequents::{NormalEquations, Penalty, mean_target, regressors, weighted},
 };
+use crate::decoupling::units::Units;
 
 /// Numbers of rules that are tried.
 const RULES: [usize; 8] = [1, 2, 4, 8, 12, 16, 24, 32];
@@ -30,29 +31,36 @@ const WORTHWHILE: f64 = 0.99;
 /// Choice of a cross-validation.
 pub(super) struct Choice {
     pub antecedents: Antecedents,
-    pub ridge: f64,
-    /// True if the consequents are those expected with noise of the inputs.
-    pub is_noisy: bool,
+    /// Penalty of each output.
+    pub penalties: Vec<Penalty>,
 }
 
-/// The antecedents and penalty, with `noise` of the inputs (variances) or without, of the least held-out error of `y` (samples × outputs) on `x` (samples × inputs) in
-/// a k-fold cross-validation.
+/// The antecedents of the least held-out error of all outputs in a k-fold cross-validation over `units`, and the penalty, with
+/// `noise` of the inputs (variances) or without, of the least error of each.
 ///
-/// The centres are those of all samples; the consequents of each fold know nothing of its targets.
-pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f64], rng: &mut impl Rng) -> Choice {
-    let mut order: Vec<usize> = (0..x.nrows()).collect();
+/// The centres are those of all units; the consequents of each fold know nothing of its targets.
+pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice {
+    let mut order: Vec<usize> = (0..units.weights.len()).collect();
     order.shuffle(rng);
     order.truncate(MOST_VALIDATED);
-    let (x, y) = (x.select(Axis(0), &order), y.select(Axis(0), &order));
-    let mut best = Choice {
-        antecedents: Antecedents::everywhere(),
+    let units = Units {
+        x: units.x.select(Axis(0), &order),
+        y: units.y.select(Axis(0), &order),
+        weights: order.iter().map(|&unit| units.weights[unit]).collect(),
+    };
+    let (x, y) = (units.x.view(), units.y.view());
+    let first = Penalty {
         ridge: RIDGES[0],
         is_noisy: true,
     };
-    let Some(mean) = y.mean_axis(Axis(0)) else {
+    let mut best = Choice {
+        antecedents: Antecedents::everywhere(),
+        penalties: vec![first; y.ncols()],
+    };
+    let Some(mean) = mean_target(&units) else {
         return best;
     };
-    let targets = matrix((&y - &mean).view());
+    let targets = weighted((&y - &mean).view(), &units.weights);
     let (samples, inputs) = x.dim();
     let most = MOST_REGRESSORS.min((REGRESSORS_PER_SAMPLE * samples as f64) as usize);
     let affordable = RULES.into_iter().filter(|rules| rules * (inputs + 1) <= most);
@@ -64,14 +72,13 @@ pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f6
         let candidate = if rules == 1 {
             Antecedents::everywhere()
         } else {
-            let (centres, distance) = Antecedents::clusters(x.view(), components, rules, rng);
+            let (centres, distance) = Antecedents::clusters(x, components, rules, rng);
             Antecedents::new(centres, RELATIVE_WIDTH * distance)
         };
-        let (error, ridge, noise) = held_out(&regressors(&candidate, x.view()), &targets, noises);
+        let (error, penalties) = held_out(&regressors(&candidate, x, &units.weights), &targets, noises);
         let choice = Choice {
             antecedents: candidate,
-            ridge,
-            is_noisy: noise.is_some(),
+            penalties,
         };
         (error, choice)
     };
@@ -79,13 +86,17 @@ pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f6
     let pilot = pilot.copied().unwrap_or(1);
     let pilots = COMPONENTS.map(|components| (validated(pilot, components, &[None, Some(noise)]), components));
     let pilot = pilots.into_iter().min_by(|a, b| a.0.0.total_cmp(&b.0.0));
-    let chosen = pilot.map(|((_, choice), components)| (components, choice.is_noisy));
-    let (components, is_noisy) = chosen.unwrap_or((COMPONENTS[0], true));
+    let (penalties, components) = pilot.map_or((vec![first], COMPONENTS[0]), |((_, choice), components)| {
+        (choice.penalties, components)
+    });
+    // What the pilot took for no output is not tried again.
+    let mut noises = [None, Some(noise)].to_vec();
+    noises.retain(|noise| penalties.iter().any(|penalty| penalty.is_noisy == noise.is_some()));
     let mut least = f64::INFINITY;
     for rules in affordable {
         // A single rule is the linear map, whose penalty is the noise.
-        let noise = (is_noisy || rules == 1).then_some(noise);
-        let (error, choice) = validated(rules, components, &[noise]);
+        let noises = if rules == 1 { &[Some(noise)] } else { &noises[..] };
+        let (error, choice) = validated(rules, components, noises);
         if error < WORTHWHILE * least {
             least = error;
             best = choice;
@@ -94,13 +105,9 @@ pub(super) fn choose(x: ArrayView2<'_, f64>, y: ArrayView2<'_, f64>, noise: &[f6
     best
 }
 
-/// Sum of squared held-out errors in a cross-validation over folds of adjacent samples with the best penalty and the best of
-/// `noises`, and these two. Larger penalties are tried until the error rises.
-fn held_out<'a>(
-    regressors: &Mat<f64>,
-    targets: &Mat<f64>,
-    noises: &[Option<&'a [f64]>],
-) -> (f64, f64, Option<&'a [f64]>) {
+/// Sum of squared held-out errors of all outputs in a cross-validation over folds of adjacent samples, each output with the best
+/// penalty and the best of `noises`, and these penalties. Larger ones are tried until no error falls.
+fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>, noises: &[Option<&[f64]>]) -> (f64, Vec<Penalty>) {
     let samples = regressors.nrows();
     let folds = FOLDS.min(samples);
     let bounds = |fold: usize| fold * samples / folds..(fold + 1) * samples / folds;
@@ -110,27 +117,48 @@ fn held_out<'a>(
     let empty = NormalEquations::zeros(regressors.ncols(), targets.ncols());
     let all = parts.iter().fold(empty, NormalEquations::plus);
     let others: Vec<_> = parts.iter().map(|part| all.clone().minus(part)).collect();
-    let mut best = (f64::INFINITY, RIDGES[0], None);
-    for &noise in noises {
-        let mut least = f64::INFINITY;
-        for ridge in RIDGES {
-            let errors = others.iter().enumerate().map(|(fold, others)| {
-                let held_out = bounds(fold);
-                let a = regressors.subrows(held_out.start, held_out.len());
-                let t = targets.subrows(held_out.start, held_out.len());
-                (a * others.consequents(ridge, noise) - t).squared_norm_l2()
-            });
-            let error: f64 = errors.sum();
-            if error > least {
-                break;
+    // Errors of each output; infinite where a fold has no solution.
+    let errors = |ridge: f64, noise: Option<&[f64]>| {
+        let mut errors = vec![0.0; targets.ncols()];
+        for (fold, others) in others.iter().enumerate() {
+            let held_out = bounds(fold);
+            let a = regressors.subrows(held_out.start, held_out.len());
+            let t = targets.subrows(held_out.start, held_out.len());
+            match others.consequents(ridge, noise) {
+                Some(consequents) => {
+                    let off = a * consequents - t;
+                    let squares = off.col_iter().map(|column| column.squared_norm_l2());
+                    errors.iter_mut().zip(squares).for_each(|(sum, square)| *sum += square);
+                }
+                None => errors.fill(f64::INFINITY),
             }
-            least = error;
-            if error < best.0 {
-                best = (error, ridge, noise);
+        }
+        errors
+    };
+    let first = Penalty {
+        ridge: RIDGES[0],
+        is_noisy: false,
+    };
+    let mut best = vec![(f64::INFINITY, first); targets.ncols()];
+    for &noise in noises {
+        let mut least = vec![f64::INFINITY; targets.ncols()];
+        for ridge in RIDGES {
+            let mut falls = false;
+            for (output, error) in errors(ridge, noise).into_iter().enumerate() {
+                falls |= error <= least[output];
+                least[output] = error.min(least[output]);
+                if error < best[output].0 {
+                    let is_noisy = noise.is_some();
+                    best[output] = (error, Penalty { ridge, is_noisy });
+                }
+            }
+            if !falls {
+                break;
             }
         }
     }
-    best
+    let total = best.iter().map(|(error, _)| error).sum();
+    (total, best.into_iter().map(|(_, penalty)| penalty).collect())
 }
 
 #[cfg(test)]
@@ -152,7 +180,10 @@ mod tests {
             affine + bend + 0.05 * standard_normal(&mut rng)
         });
         let mut rng = Seed(seed).rng(Stream::Expectation);
-        choose(x.view(), y.view(), &[0.0; 3], &mut rng).antecedents.rules()
+        let weights = vec![1.0; 300];
+        choose(&Units { x, y, weights }, &[0.0; 3], &mut rng)
+            .antecedents
+            .rules()
     }
 
     #[test]

@@ -30,15 +30,7 @@ impl Bottleneck {
         let mean = targets.mean_axis(Axis(0)).ok_or(ScalingError::Empty)?;
         let deviations = Mat::from_fn(samples, channels, |s, t| targets[[s, t]] - mean[t]);
         let kept = hidden.min(samples).min(channels);
-        // Finite values always converge; if they ever do not, the identity gives a bound of 0.
-        let (components, left_out) = match deviations.thin_svd() {
-            Ok(svd) => {
-                let components = Array2::from_shape_fn((channels, kept), |(t, k)| svd.V()[(t, k)]);
-                let singular = svd.S().column_vector();
-                (components, singular.iter().skip(kept).map(|value| value * value).sum())
-            }
-            Err(_) => (Array2::eye(channels), 0.0),
-        };
+        let (components, left_out) = principal_components(&deviations, kept)?;
         Ok(Self {
             outputs,
             mean,
@@ -58,6 +50,15 @@ impl Bottleneck {
         let projected = deviations.dot(&self.components).dot(&self.components.t()) + &self.mean;
         self.outputs.restore(projected.view())
     }
+}
+
+/// Returns the first `kept` principal components of `deviations` (samples × channels) as channels × kept, and the sum of
+/// squares that they leave out.
+fn principal_components(deviations: &Mat<f64>, kept: usize) -> Result<(Array2<f64>, f64), ScalingError> {
+    let svd = deviations.thin_svd().map_err(|_| ScalingError::NotConverged)?;
+    let components = Array2::from_shape_fn((deviations.ncols(), kept), |(t, k)| svd.V()[(t, k)]);
+    let left_out = svd.S().column_vector().iter().skip(kept).map(|value| value * value);
+    Ok((components, left_out.sum()))
 }
 
 #[cfg(test)]
@@ -100,5 +101,11 @@ mod tests {
         let bottleneck = Bottleneck::fit(array![[1.0, 2.0], [1.0, 2.0]].view(), 3).unwrap();
         assert_eq!(bottleneck.least_mse(), 0.0);
         assert_eq!(bottleneck.reconstruct(array![[1.0, 2.0]].view()), array![[1.0, 2.0]]);
+    }
+
+    #[test]
+    fn what_does_not_converge_is_an_error_and_no_bound_of_zero() {
+        let deviations = Mat::from_fn(5, 3, |s, t| if (s, t) == (2, 1) { f64::NAN } else { 1.0 });
+        assert_eq!(principal_components(&deviations, 2), Err(ScalingError::NotConverged));
     }
 }

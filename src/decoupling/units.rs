@@ -1,0 +1,179 @@
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
+};
+
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
+use rand::Rng;
+
+use crate::{dataset::Dataset, scene::NoiseSource};
+
+/// Training samples gathered into units, each of which is left out as a whole when a fit is validated.
+///
+/// A unit is a sample with its copies, which all have the same readings: it counts as often as it occurs, but a copy that is
+/// trained on while another is held out would make the validation optimistic. Equal readings are copies
+///
+/// - if they follow each other, as in a recording that holds its values between two conversions;
+/// - wherever they are, if a channel identifies the samples as a measurement with many digits does.
+///
+/// Equal readings of coarse channels are not copies: that two of a thousand readings of a switch agree is no coincidence, and
+/// each is evidence of its own.
+pub(super) struct Units {
+    /// Inputs: units × inputs.
+    pub x: Array2<f64>,
+    /// Mean outputs: units × outputs.
+    pub y: Array2<f64>,
+    /// Number of samples in each unit.
+    pub weights: Vec<f64>,
+}
+
+impl Units {
+    /// Fewest units that can be left out in turn: with less, what is left says too little of the whole, and samples are left
+    /// out one by one.
+    const FEWEST: usize = 10;
+    /// Distinct values of an identifying channel in proportion to the distinct samples.
+    const IDENTIFYING: f64 = 0.9;
+
+    /// Gathers the samples of `training`, whose inputs are `x` (samples × inputs) and outputs `y` (samples × outputs).
+    pub fn of(training: &Dataset, x: Array2<f64>, y: Array2<f64>) -> Self {
+        let members = Self::members(training.readings(), training.targets());
+        if members.len() == x.nrows() {
+            return Self {
+                weights: vec![1.0; members.len()],
+                x,
+                y,
+            };
+        }
+        let first: Vec<usize> = members.iter().map(|samples| samples[0]).collect();
+        let mean = |unit: usize, output: usize| {
+            let samples = &members[unit];
+            samples.iter().map(|&sample| y[[sample, output]]).sum::<f64>() / samples.len() as f64
+        };
+        Self {
+            x: x.select(Axis(0), &first),
+            y: Array2::from_shape_fn((members.len(), y.ncols()), |(unit, output)| mean(unit, output)),
+            weights: members.iter().map(|samples| samples.len() as f64).collect(),
+        }
+    }
+
+    /// Samples of each unit, in the order of their first ones.
+    fn members(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Vec<Vec<usize>> {
+        let samples = readings.nrows();
+        let singles = || (0..samples).map(|sample| vec![sample]).collect();
+        // The number of the first sample with the same readings, for each.
+        let mut seen = HashMap::new();
+        let first: Vec<usize> = (0..samples)
+            .map(|sample| *seen.entry(bits(readings.row(sample))).or_insert(sample))
+            .collect();
+        if seen.len() == samples {
+            return singles();
+        }
+        let mut units: Vec<Vec<usize>> = Vec::new();
+        if Self::is_identified(readings, targets) {
+            let mut unit_of = HashMap::new();
+            for (sample, first) in first.into_iter().enumerate() {
+                let unit = *unit_of.entry(first).or_insert(units.len());
+                if unit == units.len() {
+                    units.push(Vec::new());
+                }
+                units[unit].push(sample);
+            }
+        } else {
+            let order: Vec<usize> = (0..samples).collect();
+            let runs = order.chunk_by(|&one, &next| first[one] == first[next]);
+            units.extend(runs.map(<[usize]>::to_vec));
+        }
+        if units.len() < Self::FEWEST { singles() } else { units }
+    }
+
+    /// Returns `true` if a channel has nearly as many distinct values as there are distinct samples.
+    fn is_identified(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> bool {
+        let pairs = readings.rows().into_iter().zip(targets.rows());
+        let distinct: HashSet<_> = pairs
+            .map(|(readings, targets)| (bits(readings), bits(targets)))
+            .collect();
+        let enough = Self::IDENTIFYING * distinct.len() as f64;
+        let values = |channel: ArrayView1<'_, f64>| bits(channel).into_iter().collect::<HashSet<_>>().len();
+        let mut channels = readings.columns().into_iter();
+        channels.any(|channel| values(channel) as f64 >= enough)
+    }
+}
+
+/// Bits of the values, which are the same for both zeros.
+fn bits(values: ArrayView1<'_, f64>) -> Vec<u64> {
+    values.iter().map(|value| (value + 0.0).to_bits()).collect()
+}
+
+/// Returns `training` with the noise that its readings lack: what a curved map makes of noise is learned from samples.
+pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &mut impl Rng) -> Cow<'a, Dataset> {
+    let mut training = Cow::Borrowed(training);
+    if !unseen.is_none() {
+        training.to_mut().disturb_by(unseen, rng);
+    }
+    training
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    /// Sizes of the units of samples with these readings and targets.
+    fn sizes(samples: usize, reading: impl Fn(usize) -> [f64; 2], target: impl Fn(usize) -> f64) -> Vec<f64> {
+        let readings = Array2::from_shape_fn((samples, 2), |(sample, channel)| reading(sample)[channel]);
+        let targets = Array2::from_shape_fn((samples, 1), |(sample, _)| target(sample));
+        let set = Dataset::new(readings.clone(), targets.clone(), None, (0..samples).collect()).unwrap();
+        Units::of(&set, readings, targets).weights
+    }
+
+    fn irrational(sample: usize) -> f64 {
+        (0.7 * sample as f64).sin()
+    }
+
+    #[test]
+    fn held_readings_and_copies_of_exact_ones_are_units_and_equal_coarse_ones_are_not() {
+        // Held for five frames, whether the target goes on changing or not.
+        for changes in [0.0, 0.1] {
+            let held = sizes(
+                100,
+                |s| [irrational(s / 5), 1.0],
+                |s| irrational(s / 5) + changes * s as f64,
+            );
+            assert_eq!(held, vec![5.0; 20]);
+        }
+        // The same 20 samples, 5 times over.
+        assert_eq!(
+            sizes(100, |s| [irrational(s % 20), 1.0], |s| (s % 20) as f64),
+            vec![5.0; 20]
+        );
+        // Two switches that alternate.
+        let coarse = |s: usize| [(s % 2) as f64, (s / 3 % 2) as f64];
+        assert!(sizes(100, coarse, |s| (s % 2) as f64).len() > 80);
+        // Samples of a table in order, of few kinds.
+        assert_eq!(sizes(60, |s| [(s / 30) as f64, 0.0], |s| (s % 7) as f64), vec![1.0; 60]);
+        // Nothing is equal.
+        assert_eq!(sizes(30, |s| [irrational(s), 1.0], |_| 2.0), vec![1.0; 30]);
+    }
+
+    #[test]
+    fn a_unit_has_the_readings_of_its_samples_and_their_mean_target() {
+        let readings = Array2::from_shape_fn((24, 1), |(s, _)| if s / 2 % 2 == 0 { 0.0 } else { 1.0 + s as f64 });
+        let targets = Array2::from_shape_fn((24, 1), |(s, _)| s as f64);
+        let set = Dataset::new(readings.clone(), targets.clone(), None, (0..24).collect()).unwrap();
+        let units = Units::of(&set, readings, targets);
+        assert_eq!(units.weights[..3], [2.0, 1.0, 1.0]);
+        assert_eq!(
+            units.y.column(0).iter().take(3).copied().collect::<Vec<_>>(),
+            [0.5, 2.0, 3.0]
+        );
+        assert_eq!(
+            units.x.column(0).iter().take(3).copied().collect::<Vec<_>>(),
+            [0.0, 3.0, 4.0]
+        );
+    }
+
+    #[test]
+    fn both_zeros_are_equal() {
+        assert_eq!(bits(array![0.0, -0.0].view()), [0, 0]);
+    }
+}
