@@ -116,7 +116,117 @@ pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &m
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::array;
+    use ndarray::{Slice, array, concatenate};
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use serde::Deserialize;
+
+    use crate::{
+        dataset::{Seed, Stream},
+        decoupling::{AffineMap, Decoder, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, decode_set},
+        network::{InputChoice, Quantity},
+        scene::normal::standard_normal,
+    };
+
+    /// A case of `tests/fixtures/repeated_samples.py`.
+    #[derive(Deserialize)]
+    struct Case {
+        name: String,
+        x: Vec<Vec<f64>>,
+        y: Vec<f64>,
+        r2_ridge: f64,
+        r2_kernel_ridge: f64,
+    }
+
+    fn set_of(readings: Array2<f64>, targets: Array2<f64>) -> Dataset {
+        let samples = readings.nrows();
+        Dataset::new(readings, targets, None, (0..samples).collect()).unwrap()
+    }
+
+    fn r2(decoder: &mut dyn Decoder, test: &Dataset) -> f64 {
+        let targets = test.targets();
+        let off = decode_set(decoder, test).unwrap() - targets;
+        let varied = &targets - targets.mean().unwrap();
+        1.0 - off.mapv(|error| error * error).sum() / varied.mapv(|value| value * value).sum()
+    }
+
+    #[test]
+    fn frequencies_of_coarse_readings_count_as_for_scikit_learn() {
+        let cases = include_str!("../../tests/fixtures/repeated_samples.json");
+        let cases: Vec<Case> = serde_json::from_str(cases).unwrap();
+        assert_eq!(cases.len(), 3);
+        for Case {
+            name,
+            x,
+            y,
+            r2_ridge,
+            r2_kernel_ridge,
+        } in cases
+        {
+            let readings = Array2::from_shape_fn((x.len(), x[0].len()), |(s, c)| x[s][c]);
+            let set = set_of(readings, Array2::from_shape_fn((y.len(), 1), |(s, _)| y[s]));
+            let fitted = 4 * y.len() / 5;
+            let part = |samples: std::ops::Range<usize>| set.select(&samples.collect::<Vec<_>>());
+            let (training, test) = (part(0..fitted), part(fitted..y.len()));
+            let (choice, none) = (InputChoice::MEASURED, NoiseSource::default());
+            let ridge = r2(&mut AffineMap::ridge(&training, choice, none).unwrap(), &test);
+            assert!((ridge - r2_ridge).abs() < 2e-3, "{name}: ridge {ridge}, {r2_ridge}");
+            let mut rng = Seed(0).rng(Stream::Expectation);
+            let basis = RadialBasisSettings::default();
+            let mut basis = RadialBasisNetwork::fit(&training, choice, none, basis, &mut rng).unwrap();
+            let mut fuzzy = TakagiSugeno::fit(&training, Quantity::Raw, none, &mut rng).unwrap();
+            for (decoder, ours) in [("basis", r2(&mut basis, &test)), ("fuzzy", r2(&mut fuzzy, &test))] {
+                assert!(
+                    (ours - r2_kernel_ridge).abs() < 0.02,
+                    "{name}: {decoder} {ours}, {r2_kernel_ridge}"
+                );
+            }
+        }
+    }
+
+    /// Copies of all samples add nothing, wherever they are: the map is that of the samples themselves.
+    #[test]
+    fn copies_of_exact_samples_do_not_leak_into_the_choice_of_the_penalty() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let readings = Array2::from_shape_simple_fn((25, 18), || standard_normal(&mut rng));
+        let targets = Array2::from_shape_fn((25, 1), |(s, _)| readings[[s, 0]] + standard_normal(&mut rng));
+        let map = |order: Vec<usize>| {
+            let set = set_of(readings.select(Axis(0), &order), targets.select(Axis(0), &order));
+            AffineMap::ridge(&set, InputChoice::MEASURED, NoiseSource::default()).unwrap()
+        };
+        let new = Array2::from_shape_simple_fn((40, 18), || standard_normal(&mut rng));
+        let test = set_of(new, Array2::zeros((40, 1)));
+        let once = decode_set(&mut map((0..25).collect()), &test).unwrap();
+        assert!(
+            once.iter().all(|answer| answer.abs() < 3.0),
+            "nothing is fitted by heart"
+        );
+        for order in [(0..250).map(|s| s / 10).collect(), (0..250).map(|s| s % 25).collect()] {
+            let often = decode_set(&mut map(order), &test).unwrap();
+            assert!(
+                (&often - &once).iter().all(|error| error.abs() < 1e-6),
+                "{often} {once}"
+            );
+        }
+    }
+
+    /// The second target is noise alone: what suits the first would fit it by heart.
+    #[test]
+    fn each_target_is_decoded_as_well_as_alone() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut draw = |samples| {
+            let readings = Array2::from_shape_simple_fn((samples, 20), || standard_normal(&mut rng));
+            let exact = readings.select(Axis(1), &[0]);
+            let noise = Array2::from_shape_simple_fn((samples, 1), || standard_normal(&mut rng));
+            set_of(readings, concatenate![Axis(1), exact, noise])
+        };
+        let (training, test) = (draw(40), draw(500));
+        let mut map = AffineMap::ridge(&training, InputChoice::MEASURED, NoiseSource::default()).unwrap();
+        let squares = (decode_set(&mut map, &test).unwrap() - test.targets()).mapv(|error| error * error);
+        let mse = squares.mean_axis(Axis(0)).unwrap();
+        let first = test.targets().slice_axis(Axis(1), Slice::from(..1)).var(0.0);
+        assert!(mse[0] < 1e-6 * first, "{mse}");
+        assert!(mse[1] < 1.3, "{mse}");
+    }
 
     /// Sizes of the units of samples with these readings and targets.
     fn sizes(samples: usize, reading: impl Fn(usize) -> [f64; 2], target: impl Fn(usize) -> f64) -> Vec<f64> {

@@ -16,8 +16,9 @@ pub enum Remark {
     WorseThanMean {
         /// Name of the coordinate or target.
         target: String,
-        /// Mean absolute error in proportion to that of the mean.
-        times: f64,
+        /// Mean absolute error in proportion to that of the mean; `None` where the mean is exact, as where a coordinate is
+        /// the same in all samples.
+        times: Option<f64>,
         /// Most likely cause.
         cause: Cause,
     },
@@ -59,13 +60,21 @@ impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::WorseThanMean { target, times, cause } => {
-                write!(f, "its error in {target} is ")?;
-                if *times < 1e4 {
-                    write!(f, "{times:.3}")?;
-                } else {
-                    write!(f, "{times:.1e}")?;
+                match times {
+                    None => write!(
+                        f,
+                        "it has an error in {target}, in which always answering the mean is exact"
+                    )?,
+                    Some(times @ ..1e4) => write!(
+                        f,
+                        "its error in {target} is {times:.3} times that of always answering the mean"
+                    )?,
+                    Some(times) => write!(
+                        f,
+                        "its error in {target} is {times:.1e} times that of always answering the mean"
+                    )?,
                 }
-                write!(f, " times that of always answering the mean: {cause}")
+                write!(f, ": {cause}")
             }
             Self::Missing(reason) => reason.fmt(f),
             Self::NotAllSolved(rows) => rows.fmt(f),
@@ -126,13 +135,21 @@ struct Pair {
     target: String,
     error: f64,
     of_mean: f64,
+    /// Largest error that is nothing but rounding.
+    rounding: f64,
 }
 
 impl Pair {
     /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is no number is
     /// [`Remark::Missing`]'s matter.
     fn is_worse(&self) -> bool {
-        self.error > 1.0005 * self.of_mean + 1e-9
+        self.error > 1.0005 * self.of_mean + self.rounding
+    }
+
+    /// Error in proportion to that of the mean; `None` where that is nothing but rounding.
+    fn times(&self) -> Option<f64> {
+        let times = (self.of_mean > self.rounding).then(|| self.error / self.of_mean);
+        times.filter(|times| times.is_finite())
     }
 }
 
@@ -145,17 +162,21 @@ impl Remark {
         settings: &RunSettings,
         (samples, readings): (usize, usize),
     ) -> Vec<Self> {
+        /// Errors in percent that are nothing but rounding.
+        const ROUNDING: f64 = 1e-9;
         let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
             Some(Pair {
                 target: target.to_owned(),
                 error: error?,
                 of_mean: of_mean?,
+                rounding: ROUNDING,
             })
         };
         let z = Pair {
             target: "z".to_owned(),
             error: errors.z_full_scale_percent,
             of_mean: mean.z_full_scale_percent,
+            rounding: ROUNDING,
         };
         let others = [
             percent("x", errors.x_percent, mean.x_percent),
@@ -172,10 +193,14 @@ impl Remark {
         settings: &RunSettings,
         (samples, readings): (usize, usize),
     ) -> Vec<Self> {
-        let pairs = errors.iter().zip(mean).enumerate().map(|(index, (errors, mean))| Pair {
+        // Of a target that is constant in the test samples nothing can be judged.
+        let pairs = errors.iter().zip(mean).enumerate();
+        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
+        let pairs = judged.map(|(index, (errors, mean))| Pair {
             target: format!("target {}", index + 1),
             error: errors.mae,
             of_mean: mean.mae,
+            rounding: 0.0,
         });
         Self::on(pairs, Cause::of(kind, settings, samples, readings))
     }
@@ -191,7 +216,7 @@ impl Remark {
 
     fn on(pairs: impl Iterator<Item = Pair>, cause: Cause) -> Vec<Self> {
         let worse = pairs.filter(Pair::is_worse).map(|pair| Self::WorseThanMean {
-            times: pair.error / pair.of_mean,
+            times: pair.times(),
             target: pair.target,
             cause,
         });
@@ -212,11 +237,12 @@ pub fn error_remarks(
     let networks = simulation.model_size().map_or(1, |size| size.networks);
     let method = settings.training.method;
     let settings = RunSettings::from(*settings);
+    let samples = simulation.samples / networks;
     let rows = [
-        ("linear map", DecoderKind::Ridge, &baselines.linear, simulation.samples),
-        ("network", DecoderKind::Network, network, simulation.samples / networks),
+        ("linear map", DecoderKind::Ridge, &baselines.linear),
+        ("network", DecoderKind::Network, network),
     ];
-    let of_row = |(name, kind, errors, samples)| {
+    let of_row = |(name, kind, errors)| {
         let mut remarks = Remark::on_nodes(kind, (errors, &baselines.mean), &settings, (samples, readings));
         for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
             remark.tell_end(reason, method);
@@ -288,11 +314,48 @@ mod tests {
             );
             assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
         }
+        let of_exact_mean = Remark::on_nodes(
+            DecoderKind::Ridge,
+            (&errors(0.1, Some(0.5)), &errors(0.2, Some(1e-14))),
+            &SimulatedSettings::default().into(),
+            (500, 30),
+        );
+        assert_eq!(of_exact_mean.len(), 1, "{of_exact_mean:?}");
+        let text = of_exact_mean[0].to_string();
+        assert!(
+            text.contains("error in x, in which always answering the mean is exact"),
+            "{text}"
+        );
+        assert!(!text.contains("inf") && !text.contains("times"), "{text}");
         let none_at_all = errors(f64::NAN, None);
         assert_eq!(
             remarks(DecoderKind::Ridge, none, 500, &none_at_all).len(),
             0,
             "no figure is compared"
+        );
+    }
+
+    #[test]
+    fn targets_of_any_unit_are_compared_and_constant_ones_are_not() {
+        let target = |mae: f64, r2: Option<f64>| TargetErrors {
+            rmse: mae,
+            mae,
+            r2,
+            worst: mae,
+            worst_sample: 0,
+            percent_of_range: None,
+        };
+        let settings = RunSettings::from(crate::evaluation::Measured {
+            rows: crate::scene::RowModel::Shared,
+        });
+        // Metres, ohm, and a constant.
+        let errors = [target(3e-12, Some(-1.0)), target(5.0, Some(0.5)), target(1e-17, None)];
+        let mean = [target(2e-12, Some(0.0)), target(7.0, Some(0.0)), target(0.0, None)];
+        let remarks = Remark::on_targets(DecoderKind::Ridge, (&errors, &mean), &settings, (500, 30));
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
+        assert!(
+            remarks[0].to_string().contains("in target 1 is 1.500 times"),
+            "{remarks:?}"
         );
     }
 }

@@ -52,7 +52,7 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
     warnings
 }
 
-/// Warns of targets on which the network is worse than ridge.
+/// Warns of targets on which the network is worse than ridge, or no better to three digits.
 pub fn describe_worse_than_ridge(file: &MeasuredNetworkFile) -> Vec<String> {
     let errors = file.errors.iter().zip(&file.ridge);
     let worse = file
@@ -66,12 +66,15 @@ pub fn describe_worse_than_ridge(file: &MeasuredNetworkFile) -> Vec<String> {
         _ => "record more samples, or use fewer hidden nodes or Bayesian regularisation",
     };
     let warning = |(target, (network, ridge)): (&Channel, (&TargetErrors, &TargetErrors))| {
-        format!(
-            "for {} the network is worse than ridge regression (RMSE {} against {}): take ridge, {cure}",
-            target.name,
-            format_number(network.rmse),
-            format_number(ridge.rmse)
-        )
+        let (name, of_network, of_ridge) = (&target.name, format_number(network.rmse), format_number(ridge.rmse));
+        if of_network == of_ridge {
+            format!("for {name} the network is no better than ridge regression (RMSE {of_ridge}): take ridge, {cure}")
+        } else {
+            format!(
+                "for {name} the network is worse than ridge regression (RMSE {of_network} against {of_ridge}): take ridge, \
+                 {cure}"
+            )
+        }
     };
     worse.map(warning).collect()
 }

@@ -91,7 +91,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
     assert!(
         report["warnings"]
             .to_string()
-            .contains("do not support more than a linear map")
+            .contains("found little more than a linear map")
     );
     assert_eq!(target["splits"]["by"], "time");
     assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));

@@ -95,6 +95,12 @@ fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_
     let mut file = MeasuredNetworkFile::from_run(&run, plan, (&inputs, &targets)).unwrap();
     file.errors[0].rmse = 0.5 * file.ridge[0].rmse;
     assert!(describe_worse_than_ridge(&file).is_empty());
+    file.errors[0].rmse = (1.0 + 1e-7) * file.ridge[0].rmse;
+    let hardly = &describe_worse_than_ridge(&file)[0];
+    assert!(
+        hardly.contains("is no better than ridge regression (RMSE") && !hardly.contains("against"),
+        "{hardly}"
+    );
     file.errors[0].rmse = 2.0 * file.ridge[0].rmse;
     for (method, is_advised) in [(Method::default(), true), (Method::recorded_regularization(), false)] {
         file.settings.training.method = method;

@@ -47,10 +47,47 @@ impl NonlinearGain {
         (!self.is_supported()).then(|| {
             let Interval { value, low, high } = self.ratio;
             let better = if high < 1.0 { "hardly better" } else { "no better" };
+            // Decimals that show on which side of 1 the interval ends.
+            let differs = |decimals: &usize| format!("{high:.decimals$}") != format!("{:.decimals$}", 1.0);
+            let decimals = (2..6).find(differs).unwrap_or(2);
+            // A training can miss what there is: restarts of Bayesian regularisation that all end as a linear map are no
+            // proof that another method finds no more.
             format!(
-                "the network is {better} than ridge for {name} (error {value:.2} times ridge's, {low:.2} to {high:.2}): \
-                 these data do not support more than a linear map; give more samples, or take ridge"
+                "the network is {better} than ridge for {name} (error {value:.decimals$} times ridge's, {low:.decimals$} \
+                 to {high:.decimals$}): this training found little more than a linear map; try another method or more \
+                 starts, give more samples, or take ridge"
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_remark_blames_the_training_and_shows_on_which_side_of_ridge_the_error_is() {
+        let remark = |value, low, high| {
+            NonlinearGain {
+                ratio: Interval { value, low, high },
+            }
+            .remark("y")
+        };
+        let worse = remark(1.004, 0.98, 1.02).unwrap();
+        assert!(
+            worse.contains("no better than ridge for y (error 1.00 times ridge's, 0.98 to 1.02)"),
+            "{worse}"
+        );
+        assert!(
+            worse.contains("this training found little more than a linear map; try another method"),
+            "{worse}"
+        );
+        assert!(!worse.contains("these data do not support"), "{worse}");
+        let hardly = remark(0.996, 0.994, 0.9991).unwrap();
+        assert!(
+            hardly.contains("hardly better") && hardly.contains("0.996 times ridge's, 0.994 to 0.999)"),
+            "{hardly}"
+        );
+        assert_eq!(remark(0.7, 0.6, 0.8), None);
     }
 }
