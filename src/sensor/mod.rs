@@ -12,6 +12,7 @@ mod identifiability;
 mod partial_sum;
 mod reciprocal_distances;
 mod reciprocal_root;
+mod relative_noise;
 mod resistance;
 mod short_number;
 
@@ -23,5 +24,6 @@ pub(crate) use counted::counted;
 pub use geometry::{Geometry, GeometryError};
 pub use glam::DVec3;
 pub use identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair};
+pub use relative_noise::RelativeNoise;
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, SensorError, SensorModel};
 pub(crate) use short_number::short;

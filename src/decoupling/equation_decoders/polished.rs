@@ -1,6 +1,6 @@
 use rand::Rng;
 
-use super::plain_first::PlainFirst;
+use super::{plain_first::PlainFirst, row_search::EXPLAINED};
 use crate::{
     decoupling::{
         DecodeError, Decoder, Newton, NewtonRules, Posterior, PosteriorReport, Solution, SolvedRows,
@@ -90,10 +90,11 @@ impl PolishedDecoder {
 }
 
 /// The standing of an answer to readings with this noise: those that noise explains are all that a posterior can ask for.
+/// The residual is free of the gain, and so is the noise beside it.
 fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
-    let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
+    let variance = |&ohm: &f64| noise.relative_to(ohm).own.powi(2);
     let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
-    if report.residual <= NOISES * variance.sqrt() {
+    if report.residual <= NOISES * variance.sqrt().max(EXPLAINED) {
         Solution::Unique
     } else {
         Solution::None
