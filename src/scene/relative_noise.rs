@@ -20,7 +20,8 @@ impl RelativeNoise {
         let source = noise.source(model)?;
         let median_ohm = readings_ohm.get(readings_ohm.len() / 2);
         Ok(median_ohm.map_or_else(Self::default, |&ohm| source.relative_to(ohm)))
-    }}
+    }
+}
 
 #[cfg(test)]
 mod tests {

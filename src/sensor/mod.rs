@@ -18,7 +18,10 @@ mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
-pub use calibration::{CalibratedParameter, Calibration, CalibrationError, PressedRow, SensorParameter, Standing};
+pub use calibration::{
+    CalibratedParameter, Calibration, CalibrationError, CalibrationWarning, PressLimits, PressedRow, SensorParameter,
+    Standing,
+};
 pub use conductance::RowConductance;
 pub(crate) use counted::counted;
 pub use geometry::{Geometry, GeometryError};

@@ -113,10 +113,7 @@ impl PlainFirst for NewtonDecoder {
             return posterior.answer(row_index, readings, targets);
         }
         let solution = report.map_or(Solution::None, |report| report.solution);
-        if solution == Solution::Unique && self.search.has_twin(targets) {
-            return Ok(Solution::Undetermined);
-        }
-        Ok(solution)
+        Ok(self.search.twins().unless_twin(solution, targets))
     }
 
     fn solved(&mut self) -> &mut SolvedRows {

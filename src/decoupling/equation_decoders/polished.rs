@@ -1,6 +1,10 @@
 use rand::Rng;
 
-use super::{plain_first::PlainFirst, row_search::EXPLAINED};
+use super::{
+    plain_first::PlainFirst,
+    row_search::EXPLAINED,
+    row_twins::{RowTwins, rest_of_searched},
+};
 use crate::{
     decoupling::{
         DecodeError, Decoder, Newton, NewtonRules, Posterior, PosteriorReport, Solution, SolvedRows,
@@ -20,6 +24,7 @@ pub struct PolishedDecoder {
     improvement: Improvement,
     rows: Vec<usize>,
     row_model: RowModel,
+    twins: RowTwins,
     steps: usize,
     solved: SolvedRows,
 }
@@ -63,6 +68,7 @@ impl PolishedDecoder {
             improvement,
             rows: rows.to_vec(),
             row_model: scene.rows.model(),
+            twins: RowTwins::of(model, scene, rows, &rest_of_searched(model, scene, rows)?),
             steps,
             solved: SolvedRows::default(),
         })
@@ -113,7 +119,12 @@ impl PlainFirst for PolishedDecoder {
         match &mut self.improvement {
             Improvement::Newton(newton) => {
                 let reports = newton.polish_plainly(&row_wires[..count], readings, targets);
-                reports.map(|report| Some(report?.solution))
+                let mut standings = reports.map(|report| Some(report?.solution));
+                let answers = targets.chunks_exact(self.first.outputs());
+                for (standing, coordinates_mm) in standings.iter_mut().zip(answers) {
+                    *standing = standing.map(|solution| self.twins.unless_twin(solution, coordinates_mm));
+                }
+                standings
             }
             Improvement::Posterior(posterior, noise) => {
                 let reports = posterior.polish_rows(&row_wires[..count], readings, targets, self.steps);
@@ -132,7 +143,10 @@ impl PlainFirst for PolishedDecoder {
     fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
         let row_wire = self.row_wire(row_index, targets);
         match &mut self.improvement {
-            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
+            Improvement::Newton(newton) => {
+                let solution = newton.polish(row_wire, readings, targets)?.solution;
+                Ok(self.twins.unless_twin(solution, targets))
+            }
             Improvement::Posterior(posterior, noise) => {
                 let report = posterior.polish(row_wire, readings, targets, self.steps)?;
                 Ok(standing_beside(noise, readings, report))

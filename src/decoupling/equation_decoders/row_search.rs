@@ -1,6 +1,7 @@
+use super::row_twins::{RowTwins, rest_of_searched};
 use crate::{
     decoupling::DecodeError,
-    scene::{RowModel, Scene},
+    scene::Scene,
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
@@ -12,8 +13,7 @@ pub(super) struct RowSearch {
     rows: Vec<usize>,
     /// Logarithms of the resistances of each of `rows` at rest; empty if rows are known.
     rest: Vec<Vec<f64>>,
-    /// x of those of `rows` that another one equals in all readings; empty if rows are known.
-    twins_x_mm: Vec<f64>,
+    twins: RowTwins,
     trial_mm: Vec<f64>,
 }
 
@@ -28,8 +28,6 @@ pub(super) struct Trial<R> {
 
 /// Relative misfit (root mean square) below which an answer explains its readings.
 pub(super) const EXPLAINED: f64 = 1e-10;
-/// Difference of the logarithms of resistances at rest below which row-wires mirror each other.
-const SAME_AT_REST: f64 = 1e-13;
 
 impl<R> Trial<R> {
     /// Returns `true` if this row-wire is to be taken instead of another: an explained one before one that is not, then the
@@ -44,25 +42,10 @@ impl<R> Trial<R> {
 
 impl RowSearch {
     pub(super) fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
-        let at_rest = vec![glam::DVec3::ZERO; model.scale.nodes_per_row()];
-        let rest = |&row: &usize| {
-            let readings = model.row_resistances(row, &at_rest)?;
-            Ok(readings.into_iter().map(f64::ln).collect())
-        };
-        let searched = match scene.rows.model() {
-            RowModel::Each => &[],
-            RowModel::Shared => rows,
-        };
-        let rest = searched
-            .iter()
-            .map(rest)
-            .collect::<Result<Vec<Vec<f64>>, SensorError>>()?;
-        let is_same = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME_AT_REST);
-        let has_twin = |index: &usize| rest.iter().filter(|other| is_same(&rest[*index], other)).count() > 1;
-        let twins = (0..rest.len()).filter(has_twin);
+        let rest = rest_of_searched(model, scene, rows)?;
         Ok(Self {
             scale: model.scale,
-            twins_x_mm: twins.map(|index| model.geometry.row_x_mm(rows[index])).collect(),
+            twins: RowTwins::of(model, scene, rows, &rest),
             rest,
             rows: rows.to_vec(),
             trial_mm: vec![0.0; model.scale.coordinates_per_row()],
@@ -89,10 +72,9 @@ impl RowSearch {
         !self.rest.is_empty()
     }
 
-    /// Returns `true` if another row-wire than the one of these coordinates may have the same readings: its mirror image,
-    /// or any at another height if all electrodes of a column-wire have the same x.
-    pub(super) fn has_twin(&self, coordinates_mm: &[f64]) -> bool {
-        self.rest.len() > 1 && self.scale.nodes_per_column() == 1 || self.twins_x_mm.contains(&coordinates_mm[0])
+    /// Row-wires that may have the same readings as others.
+    pub(super) fn twins(&self) -> &RowTwins {
+        &self.twins
     }
 
     /// Solves one row with `solve`, which solves for a given row-wire. Returns the report on the row-wire taken.

@@ -128,7 +128,10 @@ mod tests {
             (1.0, 1.000_01, -12.931_869_0),
         ] {
             let found = log_probability(low, high);
-            assert!((found - expected).abs() < 2e-3 * f64::abs(expected), "{low} {high}: {found}");
+            assert!(
+                (found - expected).abs() < 2e-3 * f64::abs(expected),
+                "{low} {high}: {found}"
+            );
         }
     }
 }

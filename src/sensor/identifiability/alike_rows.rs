@@ -60,11 +60,15 @@ mod tests {
     #[test]
     fn mirror_rows_are_found_and_named() {
         let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
-        let default = Identifiability::most_alike_rows(&model, RelativeNoise::default()).unwrap().unwrap();
+        let default = Identifiability::most_alike_rows(&model, RelativeNoise::default())
+            .unwrap()
+            .unwrap();
         assert!(default.difference > 1e-3, "{default:?}");
         // Column nodes at 7.5, 12.5, 17.5 are symmetric about x = 12.5, the middle of rows 8 to 17.
         model.geometry.column_node_x0_mm = 7.5;
-        let pair = Identifiability::most_alike_rows(&model, RelativeNoise::default()).unwrap().unwrap();
+        let pair = Identifiability::most_alike_rows(&model, RelativeNoise::default())
+            .unwrap()
+            .unwrap();
         assert!(pair.difference < 1e-14, "{pair:?}");
         assert_eq!(pair.first + pair.second, 9);
         let warnings = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z)
@@ -76,10 +80,7 @@ mod tests {
             "{words}"
         );
         assert_eq!(
-            Identifiability::most_alike_rows(
-                &SensorModel::new("1x6_3x18".parse().unwrap()),
-                RelativeNoise::default()
-            ),
+            Identifiability::most_alike_rows(&SensorModel::new("1x6_3x18".parse().unwrap()), RelativeNoise::default()),
             Ok(None)
         );
     }

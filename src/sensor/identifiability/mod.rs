@@ -180,10 +180,7 @@ mod tests {
     #[test]
     fn a_common_gain_leaves_what_the_covariance_of_the_readings_says() {
         let model = SensorModel::new("3x2_2x8".parse().unwrap());
-        let noise = RelativeNoise {
-            own: 1e-3,
-            common: 0.1,
-        };
+        let noise = RelativeNoise { own: 1e-3, common: 0.1 };
         let rest = [DVec3::ZERO; 2];
         let seen = Identifiability::of_row_with_gain(&model, 1, &rest, Axes::Z, noise).unwrap();
         let ln_ohm = |u: [f64; 2]| -> Vec<f64> {
@@ -198,9 +195,7 @@ mod tests {
         // Sherman and Morrison: Σ⁻¹ = I/own² − common²/(own² (own² + 8 common²)) 1 1ᵀ.
         let share = 0.01 / (1e-6 + 8.0 * 0.01);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let entry = |a: &[f64], b: &[f64]| {
-            1e6 * (dot(a, b) - share * a.iter().sum::<f64>() * b.iter().sum::<f64>())
-        };
+        let entry = |a: &[f64], b: &[f64]| 1e6 * (dot(a, b) - share * a.iter().sum::<f64>() * b.iter().sum::<f64>());
         let [a, b] = &slopes;
         let (trace, determinant) = (
             entry(a, a) + entry(b, b),
