@@ -51,7 +51,7 @@ pub enum CalibrationError {
     /// A displacement is upwards, or further down than nodes may be pressed.
     #[error(
         "sample {}, node {}: it is pressed down by {} mm, where 0 to {} mm is possible; correct it, or leave this sample out",
-        .sample + 1, .node + 1, short(*.depth_mm), short(*.largest_mm)
+        .sample + 1, .node + 1, rounded(*.depth_mm), short(*.largest_mm)
     )]
     Depth {
         /// Index of the sample, from 0.
@@ -67,7 +67,7 @@ pub enum CalibrationError {
     #[error(
         "sample {}, node {}: it is shifted sideways by {} mm, where up to {} mm is possible; correct it, or leave this sample \
          out",
-        .sample + 1, .node + 1, short(*.shift_mm), short(*.largest_mm)
+        .sample + 1, .node + 1, rounded(*.shift_mm), short(*.largest_mm)
     )]
     Shift {
         /// Index of the sample, from 0.
@@ -83,7 +83,7 @@ pub enum CalibrationError {
     #[error(
         "sample {}, column {}: the reading {} ohm is out of all proportion: the sensor model and the other readings suggest \
          {} ohm; correct it, or leave this sample out",
-        .sample + 1, .column + 1, short(*.ohm), short(*.expected_ohm)
+        .sample + 1, .column + 1, short(*.ohm), rounded(*.expected_ohm)
     )]
     Absurd {
         /// Index of the sample, from 0.
@@ -120,6 +120,12 @@ pub enum CalibrationError {
          order of the wires, and that displacements are in millimetres"
     )]
     NotConverged,
+}
+
+/// [`short`] of four significant digits.
+fn rounded(value: f64) -> String {
+    let digits = format!("{value:.3e}");
+    digits.parse().map_or(digits, short)
 }
 
 impl CalibrationError {

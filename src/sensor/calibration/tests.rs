@@ -217,7 +217,7 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
 }
 
 /// With one electrode more on each column-wire than there are, the fit is as good as with the true scale: only the values
-/// show it. With rows in the wrong order, the residual does.
+/// show it. With column-wires in the wrong order, the residual does.
 #[test]
 fn another_sensor_is_warned_of() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -231,8 +231,7 @@ fn another_sensor_is_warned_of() {
     assert_eq!(Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap().warnings, []);
     let mut swapped = samples;
     for sample in &mut swapped {
-        sample.resistances_ohm.swap(1, 6);
-        sample.resistances_ohm.swap(2, 3);
+        sample.resistances_ohm.swap(0, 3);
     }
     let warnings = Calibration::fit(&of_scale("4x3_2x8"), &swapped).unwrap().warnings;
     let is_misfit = |warning: &CalibrationWarning| matches!(warning, CalibrationWarning::Misfit { .. });
