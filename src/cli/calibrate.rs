@@ -11,7 +11,7 @@ use super::{
 use crate::{
     evaluation::pressed_rows,
     export::{SensorFile, check_writable, format_number},
-    sensor::{ArrayScale, Calibration, SensorModel, SensorParameter, Standing},
+    sensor::{ArrayScale, Calibration, PressLimits, SensorModel, SensorParameter, Standing},
 };
 
 /// Fit geometry and resistivity of a sensor to frames of known presses
@@ -47,6 +47,7 @@ struct Report {
     /// Root mean square of the relative errors of the resistances.
     nominal_residual: f64,
     residual: f64,
+    warnings: Vec<String>,
     sensor: SensorModel,
 }
 
@@ -78,7 +79,8 @@ impl Calibrate {
             Some(path) => SensorFile::load(path)?,
             None => SensorModel::new(self.array),
         };
-        let frames = self.frames.read(&nominal, self.json)?;
+        let limits = PressLimits::of_sensor(&nominal);
+        let frames = self.frames.read(&nominal, limits, self.json)?;
         let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal)?)?;
         if let Some(path) = &self.out {
             SensorFile::save(&calibration.model, path)?;
@@ -103,6 +105,9 @@ impl Calibrate {
                 format_number(calibration.nominal_residual),
                 format_number(calibration.residual)
             )?;
+            for warning in &calibration.warnings {
+                writeln!(out, "Warning: {warning}")?;
+            }
             match &self.out {
                 Some(path) => writeln!(
                     out,
@@ -133,6 +138,7 @@ impl Report {
             parameters: calibration.parameters.iter().map(parameter).collect(),
             nominal_residual: calibration.nominal_residual,
             residual: calibration.residual,
+            warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
             sensor: calibration.model,
         }
     }

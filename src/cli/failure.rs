@@ -42,6 +42,12 @@ pub(super) enum Failure {
     Resume { path: PathBuf, source: RunError },
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    #[error("'{}': line {line}: {source} (--where)", .path.display())]
+    Press {
+        path: PathBuf,
+        line: u64,
+        source: CalibrationError,
+    },
     #[error("{}", .0.with_cure(in_arguments))]
     Import(#[from] ImportError),
     #[error("'{}': the samples of '{}' are not those of the checkpoint; restore the file, or start a new training", .path.display(), .data.display())]

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Division, SplitBy, Stream},
-    evaluation::{Errors, fine_tune},
+    evaluation::{Errors, fine_tune, press_limits},
     export::{NetworkFile, check_writable, format_number},
     network::Networks,
     training::StoppingRules,
@@ -62,7 +62,8 @@ impl FineTune {
         }
         let mut file = NetworkFile::load(&self.network)?;
         let settings = file.settings;
-        let frames = self.frames.read(&settings.source.sensor, self.json)?;
+        let limits = press_limits(&settings.source);
+        let frames = self.frames.read(&settings.source.sensor, limits, self.json)?;
         let read = settings.source.scene.rows.read(settings.source.sensor.scale.rows());
         let read = read.map_err(crate::dataset::SimulationError::from)?;
         let frames = frames

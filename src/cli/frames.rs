@@ -8,7 +8,11 @@ use super::{
     failure::Failure,
     import_arguments::{ImportArguments, with_bar, working_folder},
 };
-use crate::{dataset::Dataset, sensor::SensorModel};
+use crate::{
+    dataset::Dataset,
+    evaluation::pressed_rows,
+    sensor::{PressLimits, SensorModel},
+};
 
 // Readings of a real sensor with what pressed it.
 #[derive(Args)]
@@ -25,8 +29,9 @@ pub(super) struct FrameArguments {
 }
 
 impl FrameArguments {
-    /// Reads the frames: a sample is a row-wire, its targets are the coordinates of its nodes as `sensor` places them.
-    pub(super) fn read(&self, sensor: &SensorModel, is_json: bool) -> Result<Dataset, Failure> {
+    /// Reads the frames of presses within `limits`: a sample is a row-wire, its targets are the coordinates of its nodes as
+    /// `sensor` places them.
+    pub(super) fn read(&self, sensor: &SensorModel, limits: PressLimits, is_json: bool) -> Result<Dataset, Failure> {
         let has_depths = !self.depths.is_empty();
         let plan = if has_depths {
             self.import.plan_of(&self.inputs, &self.depths)?
@@ -39,7 +44,7 @@ impl FrameArguments {
         };
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
         self.import.save_recipe(&plan)?;
-        let (set, scale) = (recording.set, sensor.scale);
+        let (set, lines, scale) = (recording.set, recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())
         } else {
@@ -63,20 +68,32 @@ impl FrameArguments {
                 scale.rows()
             )));
         }
-        if !has_depths {
-            return Ok(set);
-        }
-        let coordinates = Array2::from_shape_fn((set.samples(), scale.coordinates_per_row()), |(sample, output)| {
-            let (node, axis) = (output / 3, output % 3);
-            let pressed = DVec3::new(0.0, 0.0, set.targets()[[sample, node]]);
-            sensor.displaced_mm(row_wires[sample], node, pressed)[axis]
-        });
-        let frames = Dataset::new(
-            set.readings().to_owned(),
-            coordinates,
-            Some(&row_wires),
-            set.groups().to_vec(),
-        );
-        Ok(frames.expect("the parts are those of a set"))
+        let frames = if has_depths {
+            coordinates_of_depths(set, &row_wires, sensor)
+        } else {
+            set
+        };
+        let checked = limits.check(sensor, &pressed_rows(&frames, sensor)?);
+        checked.map_err(|source| match source.sample() {
+            Some(sample) => Failure::Press {
+                path: plan.import.data.clone(),
+                line: lines[sample],
+                source,
+            },
+            None => source.into(),
+        })?;
+        Ok(frames)
     }
+}
+
+/// Returns `set`, whose targets are how far each node is pressed, with the coordinates of the nodes instead.
+fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel) -> Dataset {
+    let outputs = sensor.scale.coordinates_per_row();
+    let coordinates = Array2::from_shape_fn((set.samples(), outputs), |(sample, output)| {
+        let (node, axis) = (output / 3, output % 3);
+        let pressed = DVec3::new(0.0, 0.0, set.targets()[[sample, node]]);
+        sensor.displaced_mm(row_wires[sample], node, pressed)[axis]
+    });
+    let (readings, groups) = (set.readings().to_owned(), set.groups().to_vec());
+    Dataset::new(readings, coordinates, Some(row_wires), groups).expect("the parts are those of a set")
 }

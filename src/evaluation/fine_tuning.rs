@@ -1,9 +1,19 @@
-use super::{RunError, sets::check_networks};
+use super::{RunError, Simulation, sets::check_networks};
 use crate::{
     dataset::{Dataset, PerRow, Split},
     network::{DecouplingNetwork, Networks},
+    sensor::PressLimits,
     training::{Examples, Problem, Trainer, TrainingSettings},
 };
+
+/// Displacements for which a network of this simulated scene is made: samples of others are no presses, or ask for answers
+/// that it was never trained to give.
+pub fn press_limits(simulation: &Simulation) -> PressLimits {
+    PressLimits {
+        largest_depth_mm: simulation.stroke_mm(),
+        largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
+    }
+}
 
 /// Continues the training of `networks` on other samples, such as the frames of the real sensor after a training on its
 /// calibrated model; returns `None` if cancelled. Scalings stay as they are. The weights of the lowest validation error

@@ -52,7 +52,7 @@ pub use baselines::Baselines;
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet, TargetReport};
 pub use errors::{Errors, NodeAddress};
-pub use fine_tuning::fine_tune;
+pub use fine_tuning::{fine_tune, press_limits};
 pub use frame_time::{decoded_unit, network_frame_time};
 pub use known_presses::{pressed_rows, rebased};
 pub use missing_figures::MissingFigures;

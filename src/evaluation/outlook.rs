@@ -9,8 +9,10 @@ use crate::{
 pub struct Outlook {
     /// Analysis of the worst conditioned row-wire of those read, its nodes half way down.
     pub worst_row: Identifiability,
-    /// Standard deviation of a reading of that row relative to it, from all sources of the scene.
-    pub noise: f64,
+    /// Noise of a reading of that row relative to it, from all sources of the scene.
+    pub noise: RelativeNoise,
+    /// Standard deviation in mm to which readings with this noise know the pattern seen worst; 0 without noise.
+    pub worst_spread_mm: f64,
     /// Obstacles to decoupling, and what to change.
     pub warnings: Vec<IdentifiabilityWarning>,
 }
@@ -34,15 +36,17 @@ impl Outlook {
             }
         }
         let worst_row = worst.expect("an array has row-wires");
+        let noise = RelativeNoise::of(scene.noise, sensor, &[worst_row.row], 0.5 * stroke_mm);
+        let noise = noise.map_err(IdentifiabilityError::from)?;
         let alike = if scene.rows == Rows::All {
-            Identifiability::most_alike_rows(sensor).map_err(IdentifiabilityError::from)?
+            Identifiability::most_alike_rows(sensor, noise).map_err(IdentifiabilityError::from)?
         } else {
             None
         };
-        let noise = RelativeNoise::of(scene.noise, sensor, &[worst_row.row], 0.5 * stroke_mm);
-        let noise = noise.map_err(IdentifiabilityError::from)?.total();
+        let seen = Identifiability::of_row_with_gain(sensor, worst_row.row, &half_way, worst_row.axes, noise)?;
         Ok(Self {
-            warnings: worst_row.warnings(noise, stroke_mm / 12.0_f64.sqrt(), alike),
+            warnings: seen.warnings(noise.own, stroke_mm / 12.0_f64.sqrt(), alike),
+            worst_spread_mm: seen.worst_spread_mm(noise.own),
             worst_row,
             noise,
         })
@@ -80,6 +84,25 @@ mod tests {
             .any(|warning| matches!(warning, IdentifiabilityWarning::Hopeless { .. }))
     }
 
+    /// The Bayesian reference of the same scene is far below the error of the mean, and rows differ by 20 times the noise.
+    #[test]
+    fn drift_is_not_taken_for_noise_of_each_reading() {
+        let simulation = Simulation {
+            scene: Scene {
+                noise: Noise {
+                    drift: 0.1,
+                    ..Noise::relative(1e-3)
+                },
+                ..Scene::default()
+            },
+            sensor: crate::sensor::SensorModel::new("10x6_3x18".parse().unwrap()),
+            ..Simulation::default()
+        };
+        let outlook = Outlook::of(&simulation).unwrap();
+        assert_eq!(outlook.warnings, []);
+        assert_eq!((outlook.noise.own, outlook.noise.common), (1e-3, 0.1));
+    }
+
     #[test]
     fn every_kind_of_noise_is_warned_of() {
         let of = |relative, additive_ohm, converter_bits, drift| Noise {
@@ -94,6 +117,8 @@ mod tests {
         // Resistances are below 100 ohm; 1 bit rounds to steps as large as the largest.
         assert!(is_hopeless(of(0.0, 1e3, None, 0.0)));
         assert!(is_hopeless(of(0.0, 0.0, Some(1), 0.0)));
-        assert!(is_hopeless(of(0.0, 0.0, None, 1.0)));
+        // A gain that is common to all readings hides one pattern, and leaves the others.
+        assert!(!is_hopeless(of(0.0, 0.0, None, 1.0)));
+        assert!(is_hopeless(of(1.0, 0.0, None, 1.0)));
     }
 }

@@ -2,7 +2,7 @@ use super::format_duration;
 use crate::{
     evaluation::{Workload, WorkloadTime},
     sensor::counted,
-    training::MachineMemory,
+    training::{MachineMemory, MemorySource},
 };
 
 /// Tells how much memory and time a run will take on this machine. The first time its speed is measured, which takes
@@ -10,10 +10,9 @@ use crate::{
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
     let memory = MachineMemory::of_this_machine();
-    let machine = if memory.is_known {
-        format!(" of {}", gigabytes(memory.bytes))
-    } else {
-        String::new()
+    let machine = match memory.source {
+        MemorySource::System | MemorySource::User => format!(" of {}", gigabytes(memory.bytes)),
+        MemorySource::Assumed => String::new(),
     };
     let WorkloadTime {
         drawing,

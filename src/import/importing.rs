@@ -48,6 +48,7 @@ impl Recipe {
         let times = meanings
             .time
             .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
+        let lines = kept.iter().map(|&row| files[0].1.line(row)).collect();
         let groups = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
@@ -75,6 +76,7 @@ impl Recipe {
             inputs,
             targets,
             positions,
+            lines,
             times,
             has_groups: self.group.is_some(),
             rows: total,

@@ -17,6 +17,8 @@ pub struct Recording {
     pub targets: Vec<Channel>,
     /// Positions of targets on the skin, for those that have one.
     pub positions: Vec<TargetPosition>,
+    /// Line of each sample in the first file, from 1.
+    pub lines: Vec<u64>,
     /// Time of each sample, if there is a column of times.
     pub times: Option<Vec<f64>>,
     /// `true` if the samples are grouped by a column.

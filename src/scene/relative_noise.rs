@@ -1,16 +1,8 @@
 use glam::DVec3;
 
 use super::Noise;
+pub use crate::sensor::RelativeNoise;
 use crate::sensor::{SensorError, SensorModel};
-
-/// Noise of a reading relative to the reading, from all sources of a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RelativeNoise {
-    /// Standard deviation of each reading's own error.
-    pub own: f64,
-    /// Standard deviation of the error common to all readings of a snapshot.
-    pub common: f64,
-}
 
 impl RelativeNoise {
     /// The relative noise of the median reading of `rows` (counted from 0), all of whose nodes are pressed down by
@@ -28,11 +20,6 @@ impl RelativeNoise {
         let source = noise.source(model)?;
         let median_ohm = readings_ohm.get(readings_ohm.len() / 2);
         Ok(median_ohm.map_or_else(Self::default, |&ohm| source.relative_to(ohm)))
-    }
-
-    /// Standard deviation of a reading's whole error.
-    pub fn total(self) -> f64 {
-        libm::hypot(self.own, self.common)
     }
 }
 

@@ -12,16 +12,21 @@ mod identifiability;
 mod partial_sum;
 mod reciprocal_distances;
 mod reciprocal_root;
+mod relative_noise;
 mod resistance;
 mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
-pub use calibration::{CalibratedParameter, Calibration, CalibrationError, PressedRow, SensorParameter, Standing};
+pub use calibration::{
+    CalibratedParameter, Calibration, CalibrationError, CalibrationWarning, PressLimits, PressedRow, SensorParameter,
+    Standing,
+};
 pub use conductance::RowConductance;
 pub(crate) use counted::counted;
 pub use geometry::{Geometry, GeometryError};
 pub use glam::DVec3;
 pub use identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair};
+pub use relative_noise::RelativeNoise;
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, SensorError, SensorModel};
 pub(crate) use short_number::short;

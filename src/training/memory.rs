@@ -1,47 +1,81 @@
-use std::{fmt, fs, sync::OnceLock};
+use std::{env, fmt, fs, sync::OnceLock};
 
-/// Memory that trainings may take: all that the machine has, or what a container leaves of it. Where the system does not
-/// tell, [`Self::ASSUMED_BYTES`].
+/// Memory that trainings may take: all that the machine has, or what a container leaves of it, or what
+/// [`Self::VARIABLE`] says. Where nothing says it, [`Self::ASSUMED_BYTES`].
+///
+/// Only Linux reports its memory in a file. Elsewhere it takes `unsafe` calls, or a crate of thousands of lines for one
+/// number; the variable serves there, and also where a machine has more memory than a program ought to take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MachineMemory {
     /// Size in bytes.
     pub bytes: u64,
-    /// False if the system does not tell.
-    pub is_known: bool,
+    /// Source of the size.
+    pub source: MemorySource,
+}
+
+/// Source of the size of the memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemorySource {
+    /// The system.
+    System,
+    /// The user, by [`MachineMemory::VARIABLE`].
+    User,
+    /// Neither: it is assumed.
+    Assumed,
 }
 
 impl MachineMemory {
-    /// Memory that is assumed where the system does not tell, as that of an ordinary machine.
+    /// Memory that is assumed where the system does not report it, as that of an ordinary machine.
     pub const ASSUMED_BYTES: u64 = 8_000_000_000;
+    /// Environment variable with the memory that trainings may take, in GB (10⁹ bytes).
+    pub const VARIABLE: &str = "DECOUPLER_MEMORY_GB";
 
     /// Returns the memory of this machine, which is read the first time.
     pub fn of_this_machine() -> Self {
         static MEMORY: OnceLock<MachineMemory> = OnceLock::new();
         *MEMORY.get_or_init(|| {
+            let given = env::var(Self::VARIABLE).ok();
             let meminfo = fs::read_to_string("/proc/meminfo").ok();
             let limit = fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-            Self::from_texts(meminfo.as_deref(), limit.as_deref())
+            Self::from_texts(given.as_deref(), meminfo.as_deref(), limit.as_deref())
         })
     }
 
-    /// From the texts of `/proc/meminfo` and of the container's limit.
-    fn from_texts(meminfo: Option<&str>, limit: Option<&str>) -> Self {
+    /// From the texts of the variable, of `/proc/meminfo` and of the container's limit. A variable that is not a number above
+    /// 0 is left alone: the message of a refusal names it again.
+    fn from_texts(given: Option<&str>, meminfo: Option<&str>, limit: Option<&str>) -> Self {
+        let gigabytes = given.and_then(|text| text.trim().parse().ok());
+        if let Some(gigabytes) = gigabytes.filter(|gigabytes: &f64| *gigabytes > 0.0) {
+            return Self {
+                // Saturates, also at infinity.
+                bytes: (gigabytes * 1e9) as u64,
+                source: MemorySource::User,
+            };
+        }
         let limit = limit.and_then(|text| text.trim().parse().ok());
         let least = [meminfo.and_then(total_bytes), limit].into_iter().flatten().min();
-        Self {
-            bytes: least.unwrap_or(Self::ASSUMED_BYTES),
-            is_known: least.is_some(),
-        }
+        let of_system = least.map(|bytes| Self {
+            bytes,
+            source: MemorySource::System,
+        });
+        of_system.unwrap_or(Self {
+            bytes: Self::ASSUMED_BYTES,
+            source: MemorySource::Assumed,
+        })
     }
 }
 
 impl fmt::Display for MachineMemory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let gigabytes = self.bytes as f64 * 1e-9;
-        if self.is_known {
-            write!(f, "the machine has {gigabytes:.1} GB")
-        } else {
-            write!(f, "{gigabytes:.1} GB are assumed, since the system does not tell")
+        let (gigabytes, variable) = (self.bytes as f64 * 1e-9, Self::VARIABLE);
+        match self.source {
+            MemorySource::System => write!(f, "the machine has {gigabytes:.1} GB"),
+            MemorySource::User => write!(f, "{variable} allows {gigabytes:.1} GB"),
+            MemorySource::Assumed => write!(
+                f,
+                "{gigabytes:.1} GB are assumed, since the system does not report its memory (set the environment variable \
+                 {variable} to the GB that the machine has)"
+            ),
         }
     }
 }
@@ -60,8 +94,11 @@ mod tests {
 
     #[test]
     fn the_memory_is_what_the_machine_and_its_container_leave() {
-        let memory = |meminfo, limit| MachineMemory::from_texts(meminfo, limit);
-        let known = |bytes| MachineMemory { bytes, is_known: true };
+        let memory = |meminfo, limit| MachineMemory::from_texts(None, meminfo, limit);
+        let known = |bytes| MachineMemory {
+            bytes,
+            source: MemorySource::System,
+        };
         assert_eq!(memory(Some(MEMINFO), None), known(24_683_956 * 1024));
         assert_eq!(memory(Some(MEMINFO), Some("max\n")), known(24_683_956 * 1024));
         assert_eq!(memory(Some(MEMINFO), Some("1000000\n")), known(1_000_000));
@@ -69,10 +106,25 @@ mod tests {
     }
 
     #[test]
-    fn where_the_system_does_not_tell_the_message_says_what_is_assumed() {
-        let memory = MachineMemory::from_texts(Some("MemFree: 5 kB\n"), None);
-        assert_eq!((memory.bytes, memory.is_known), (MachineMemory::ASSUMED_BYTES, false));
+    fn where_the_system_does_not_report_it_the_message_says_what_is_assumed_and_how_to_change_it() {
+        let memory = MachineMemory::from_texts(None, Some("MemFree: 5 kB\n"), None);
+        let assumed = (MachineMemory::ASSUMED_BYTES, MemorySource::Assumed);
+        assert_eq!((memory.bytes, memory.source), assumed);
         let text = memory.to_string();
-        assert!(text.contains("8.0 GB are assumed"), "{text}");
+        assert!(
+            text.contains("8.0 GB are assumed") && text.contains("DECOUPLER_MEMORY_GB"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_user_has_the_last_word_on_the_memory() {
+        let memory = |given| MachineMemory::from_texts(Some(given), Some(MEMINFO), Some("1000000"));
+        assert_eq!(memory("64").bytes, 64_000_000_000);
+        assert_eq!(memory(" 0.5\n").to_string(), "DECOUPLER_MEMORY_GB allows 0.5 GB");
+        assert_eq!(memory("inf").bytes, u64::MAX);
+        for refused in ["", "much", "0", "-3", "NaN"] {
+            assert_eq!(memory(refused).bytes, 1_000_000, "{refused}");
+        }
     }
 }

@@ -47,7 +47,7 @@ pub(crate) use examples::{BLOCK, DrawnBlocks};
 pub use flaw::TrainingFlaw;
 pub use gradient_descent::GradientDescentSettings;
 pub use history::EpochRecord;
-pub use memory::MachineMemory;
+pub use memory::{MachineMemory, MemorySource};
 pub use method::Method;
 use method::MethodState;
 pub use momentum::MomentumSettings;

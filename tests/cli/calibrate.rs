@@ -144,3 +144,71 @@ fn frames_that_do_not_fit_the_array_are_refused() {
         "{output:?}"
     );
 }
+
+/// Line 6 of the file has a value that no press and no reading has; both commands check by the same rules.
+#[test]
+fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path());
+    let path = folder.path();
+    let trained = decoupler(
+        &format!(
+            "train --array {ARRAY} --samples 40 --validation-samples 0 --test-samples 8 --epochs 1 --out net.json"
+        ),
+        path,
+    );
+    assert!(trained.status.success(), "{}", String::from_utf8_lossy(&trained.stderr));
+    let sound = fs::read_to_string(path.join("frames.csv")).unwrap();
+    // Columns are frame, row, r_1 to r_12 and d_1 to d_4.
+    for (column, value, cause) in [
+        (3, "-5", "column 2: the reading -5 is not a resistance"),
+        (2, "0", "column 1: the reading 0 is not a resistance"),
+        (13, "1e300", "column 12: the reading 1e300 ohm is out of all proportion"),
+        (14, "-3", "node 1: it is pressed down by -3 mm"),
+        (17, "50", "node 4"),
+        (
+            15,
+            "1.7",
+            "node 2: it is pressed down by 1.7 mm, where 0 to 1 mm is possible",
+        ),
+    ] {
+        let spoilt = sound.lines().enumerate().map(|(line, text)| {
+            let mut cells: Vec<&str> = text.split(',').collect();
+            if line == 5 {
+                cells[column] = value;
+            }
+            cells.join(",") + "\n"
+        });
+        fs::write(path.join("frames.csv"), spoilt.collect::<String>()).unwrap();
+        let calibrated = format!("calibrate --array {ARRAY} {FRAMES}");
+        let tuned = format!("fine-tune --network net.json {FRAMES} --epochs 1 --out tuned.json");
+        for command in [&calibrated, &tuned] {
+            // Without a scene, nodes may go down as far as there is room.
+            if value == "1.7" && command == &calibrated {
+                continue;
+            }
+            let output = decoupler(command, path);
+            let message = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(1), "{command}, {value}: {message}");
+            assert!(
+                message.contains(cause) && message.contains("frames.csv': line 6:") && message.contains("--where"),
+                "{command}: {message}"
+            );
+        }
+        assert!(!path.join("tuned.json").exists());
+    }
+}
+
+#[test]
+fn a_wrong_array_scale_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path());
+    let output = decoupler(&format!("calibrate --array 4x4_4x12 {FRAMES}"), folder.path());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("standard deviations from its nominal value") && text.contains("check the array scale"),
+        "{text}"
+    );
+    let report = json(&format!("calibrate --array {ARRAY} {FRAMES} --json"), folder.path());
+    assert_eq!(report["warnings"], serde_json::json!([]));
+}

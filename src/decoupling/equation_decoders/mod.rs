@@ -5,6 +5,7 @@ mod plain_first;
 mod polished;
 mod posterior;
 mod row_search;
+mod row_twins;
 #[cfg(test)]
 mod tests;
 

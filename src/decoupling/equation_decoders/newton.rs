@@ -1,7 +1,7 @@
 use super::{
     PosteriorDecoder,
     plain_first::PlainFirst,
-    row_search::{EXPLAINED, RowSearch},
+    row_search::{RowSearch, Trial},
 };
 use crate::{
     decoupling::side_by_side::LANES,
@@ -14,6 +14,9 @@ use crate::{
 
 /// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the one that fits the readings best
 /// is taken.
+///
+/// It takes readings to be exact: all of them have gain 1. Readings with drift or other noise are for
+/// [`PosteriorDecoder`], whose unknowns include the gain of the snapshot; here they count as not solved.
 #[derive(Clone, Debug)]
 pub struct NewtonDecoder {
     newton: Newton,
@@ -74,11 +77,11 @@ impl NewtonDecoder {
         self.search
             .solve(row_index, readings, targets, |row, readings, coordinates| {
                 let report = newton.solve(row, readings, coordinates)?;
-                let misfit = match report.solution {
-                    Solution::None => report.residual.max(EXPLAINED),
-                    Solution::Unique | Solution::Undetermined => report.residual.min(0.5 * EXPLAINED),
-                };
-                Ok((misfit, report))
+                Ok(Trial {
+                    score: report.residual,
+                    is_explained: report.solution != Solution::None,
+                    report,
+                })
             })
     }
 }
@@ -110,10 +113,7 @@ impl PlainFirst for NewtonDecoder {
             return posterior.answer(row_index, readings, targets);
         }
         let solution = report.map_or(Solution::None, |report| report.solution);
-        if solution == Solution::Unique && self.search.has_twin(targets) {
-            return Ok(Solution::Undetermined);
-        }
-        Ok(solution)
+        Ok(self.search.twins().unless_twin(solution, targets))
     }
 
     fn solved(&mut self) -> &mut SolvedRows {

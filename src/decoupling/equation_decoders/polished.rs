@@ -1,6 +1,10 @@
 use rand::Rng;
 
-use super::plain_first::PlainFirst;
+use super::{
+    plain_first::PlainFirst,
+    row_search::EXPLAINED,
+    row_twins::{RowTwins, rest_of_searched},
+};
 use crate::{
     decoupling::{
         DecodeError, Decoder, Newton, NewtonRules, Posterior, PosteriorReport, Solution, SolvedRows,
@@ -20,6 +24,7 @@ pub struct PolishedDecoder {
     improvement: Improvement,
     rows: Vec<usize>,
     row_model: RowModel,
+    twins: RowTwins,
     steps: usize,
     solved: SolvedRows,
 }
@@ -63,6 +68,7 @@ impl PolishedDecoder {
             improvement,
             rows: rows.to_vec(),
             row_model: scene.rows.model(),
+            twins: RowTwins::of(model, scene, rows, &rest_of_searched(model, scene, rows)?),
             steps,
             solved: SolvedRows::default(),
         })
@@ -90,10 +96,11 @@ impl PolishedDecoder {
 }
 
 /// The standing of an answer to readings with this noise: those that noise explains are all that a posterior can ask for.
+/// The residual is free of the gain, and so is the noise beside it.
 fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
-    let variance = |&ohm: &f64| noise.relative_to(ohm).total().powi(2);
+    let variance = |&ohm: &f64| noise.relative_to(ohm).own.powi(2);
     let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
-    if report.residual <= NOISES * variance.sqrt() {
+    if report.residual <= NOISES * variance.sqrt().max(EXPLAINED) {
         Solution::Unique
     } else {
         Solution::None
@@ -112,7 +119,12 @@ impl PlainFirst for PolishedDecoder {
         match &mut self.improvement {
             Improvement::Newton(newton) => {
                 let reports = newton.polish_plainly(&row_wires[..count], readings, targets);
-                reports.map(|report| Some(report?.solution))
+                let mut standings = reports.map(|report| Some(report?.solution));
+                let answers = targets.chunks_exact(self.first.outputs());
+                for (standing, coordinates_mm) in standings.iter_mut().zip(answers) {
+                    *standing = standing.map(|solution| self.twins.unless_twin(solution, coordinates_mm));
+                }
+                standings
             }
             Improvement::Posterior(posterior, noise) => {
                 let reports = posterior.polish_rows(&row_wires[..count], readings, targets, self.steps);
@@ -131,7 +143,10 @@ impl PlainFirst for PolishedDecoder {
     fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
         let row_wire = self.row_wire(row_index, targets);
         match &mut self.improvement {
-            Improvement::Newton(newton) => Ok(newton.polish(row_wire, readings, targets)?.solution),
+            Improvement::Newton(newton) => {
+                let solution = newton.polish(row_wire, readings, targets)?.solution;
+                Ok(self.twins.unless_twin(solution, targets))
+            }
             Improvement::Posterior(posterior, noise) => {
                 let report = posterior.polish(row_wire, readings, targets, self.steps)?;
                 Ok(standing_beside(noise, readings, report))

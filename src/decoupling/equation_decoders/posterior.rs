@@ -1,12 +1,12 @@
-use super::row_search::{EXPLAINED, RowSearch};
+use super::row_search::{EXPLAINED, RowSearch, Trial};
 use crate::{
     decoupling::{DecodeError, Decoder, Posterior, PosteriorReport, Solution, SolvedRows},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
 
-/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the one that
-/// fits the readings best is taken.
+/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the most probable
+/// one is taken: the row of the largest evidence under the noise of the scene.
 #[derive(Clone, Debug)]
 pub struct PosteriorDecoder {
     posterior: Posterior,
@@ -37,12 +37,22 @@ impl PosteriorDecoder {
         readings: &[f64],
         targets: &mut [f64],
     ) -> Result<Vec<Solution>, DecodeError> {
-        let posterior = &mut self.posterior;
+        let (posterior, is_search) = (&mut self.posterior, self.search.is_needed());
         let taken = self
             .search
             .solve_rows(row_indices, readings, targets, |rows, readings, coordinates| {
                 let reports = posterior.solve_rows(rows, readings, coordinates)?;
-                Ok(reports.into_iter().map(|report| (report.residual, report)).collect())
+                let scores = if is_search {
+                    posterior.surprises(rows, readings, coordinates, &reports)
+                } else {
+                    vec![0.0; rows.len()]
+                };
+                let trial = |(report, score): (PosteriorReport, f64)| Trial {
+                    score,
+                    is_explained: report.residual < EXPLAINED,
+                    report,
+                };
+                Ok(reports.into_iter().zip(scores).map(trial).collect())
             })?;
         Ok(taken.into_iter().map(|report| self.standing(report)).collect())
     }

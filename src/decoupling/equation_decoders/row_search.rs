@@ -1,6 +1,7 @@
+use super::row_twins::{RowTwins, rest_of_searched};
 use crate::{
     decoupling::DecodeError,
-    scene::{RowModel, Scene},
+    scene::Scene,
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
@@ -12,37 +13,39 @@ pub(super) struct RowSearch {
     rows: Vec<usize>,
     /// Logarithms of the resistances of each of `rows` at rest; empty if rows are known.
     rest: Vec<Vec<f64>>,
-    /// x of those of `rows` that another one equals in all readings; empty if rows are known.
-    twins_x_mm: Vec<f64>,
+    twins: RowTwins,
     trial_mm: Vec<f64>,
 }
 
-/// Relative misfit (root mean square) below which a row-wire is accepted without trying the others.
+/// Outcome of solving a row for a given row-wire.
+pub(super) struct Trial<R> {
+    /// Measure by which row-wires are compared: the lowest is taken.
+    pub(super) score: f64,
+    /// True if the row-wire is accepted without trying the others.
+    pub(super) is_explained: bool,
+    pub(super) report: R,
+}
+
+/// Relative misfit (root mean square) below which an answer explains its readings.
 pub(super) const EXPLAINED: f64 = 1e-10;
-/// Difference of the logarithms of resistances at rest below which row-wires mirror each other.
-const SAME_AT_REST: f64 = 1e-13;
+
+impl<R> Trial<R> {
+    /// Returns `true` if this row-wire is to be taken instead of another: an explained one before one that is not, then the
+    /// one with the lower score. A score of NaN is above all others.
+    fn is_taken_over(&self, other: Option<&Self>) -> bool {
+        other.is_none_or(|other| {
+            (!self.is_explained, self.score) < (!other.is_explained, other.score)
+                || other.score.is_nan() && !self.score.is_nan()
+        })
+    }
+}
 
 impl RowSearch {
     pub(super) fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
-        let at_rest = vec![glam::DVec3::ZERO; model.scale.nodes_per_row()];
-        let rest = |&row: &usize| {
-            let readings = model.row_resistances(row, &at_rest)?;
-            Ok(readings.into_iter().map(f64::ln).collect())
-        };
-        let searched = match scene.rows.model() {
-            RowModel::Each => &[],
-            RowModel::Shared => rows,
-        };
-        let rest = searched
-            .iter()
-            .map(rest)
-            .collect::<Result<Vec<Vec<f64>>, SensorError>>()?;
-        let is_same = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME_AT_REST);
-        let has_twin = |index: &usize| rest.iter().filter(|other| is_same(&rest[*index], other)).count() > 1;
-        let twins = (0..rest.len()).filter(has_twin);
+        let rest = rest_of_searched(model, scene, rows)?;
         Ok(Self {
             scale: model.scale,
-            twins_x_mm: twins.map(|index| model.geometry.row_x_mm(rows[index])).collect(),
+            twins: RowTwins::of(model, scene, rows, &rest),
             rest,
             rows: rows.to_vec(),
             trial_mm: vec![0.0; model.scale.coordinates_per_row()],
@@ -69,65 +72,62 @@ impl RowSearch {
         !self.rest.is_empty()
     }
 
-    /// Returns `true` if another row-wire than the one of these coordinates may have the same readings: its mirror image,
-    /// or any at another height if all electrodes of a column-wire have the same x.
-    pub(super) fn has_twin(&self, coordinates_mm: &[f64]) -> bool {
-        self.rest.len() > 1 && self.scale.nodes_per_column() == 1 || self.twins_x_mm.contains(&coordinates_mm[0])
+    /// Row-wires that may have the same readings as others.
+    pub(super) fn twins(&self) -> &RowTwins {
+        &self.twins
     }
 
-    /// Solves one row with `solve`, which solves for a given row-wire and returns the root mean square relative misfit
-    /// with a report. Returns the report on the row-wire taken.
+    /// Solves one row with `solve`, which solves for a given row-wire. Returns the report on the row-wire taken.
     ///
     /// If rows are not known, row-wires are tried in the order of similarity of their readings at rest, and the one
-    /// that fits the readings best is taken; rows that mirror each other may then be confused.
+    /// with the lowest score is taken; rows that mirror each other may then be confused.
     pub(super) fn solve<R>(
         &mut self,
         row_index: usize,
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<(f64, R), DecodeError>,
+        mut solve: impl FnMut(usize, &[f64], &mut [f64]) -> Result<Trial<R>, DecodeError>,
     ) -> Result<Option<R>, DecodeError> {
         DecodeError::check(readings_ohm)?;
         if self.rest.is_empty() {
-            let (_, report) = solve(self.rows[row_index], readings_ohm, coordinates_mm)?;
-            return Ok(Some(report));
+            return Ok(Some(solve(self.rows[row_index], readings_ohm, coordinates_mm)?.report));
         }
-        let mut least = f64::INFINITY;
-        let mut of_taken = None;
+        let mut taken: Option<Trial<R>> = None;
         for row_wire in self.order(readings_ohm) {
-            let (residual, report) = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
-            if residual < least {
-                (least, of_taken) = (residual, Some(report));
+            let trial = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
+            let is_explained = trial.is_explained;
+            if trial.is_taken_over(taken.as_ref()) {
+                taken = Some(trial);
                 coordinates_mm.copy_from_slice(&self.trial_mm);
             }
-            if least < EXPLAINED {
+            if is_explained {
                 break;
             }
         }
-        Ok(of_taken)
+        Ok(taken.map(|trial| trial.report))
     }
 
     /// As [`Self::solve`], several rows side by side, those of a frame or others: `solve` solves for a given row-wire each.
     /// Returns the report on the row-wire taken for each row.
-    pub(super) fn solve_rows<R: Copy>(
+    pub(super) fn solve_rows<R>(
         &self,
         row_indices: &[usize],
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
-        mut solve: impl FnMut(&[usize], &[f64], &mut [f64]) -> Result<Vec<(f64, R)>, DecodeError>,
+        mut solve: impl FnMut(&[usize], &[f64], &mut [f64]) -> Result<Vec<Trial<R>>, DecodeError>,
     ) -> Result<Vec<Option<R>>, DecodeError> {
         if self.rest.is_empty() {
             let row_wires: Vec<usize> = row_indices.iter().map(|&index| self.rows[index]).collect();
-            let reports = solve(&row_wires, readings_ohm, coordinates_mm)?;
-            return Ok(reports.into_iter().map(|(_, report)| Some(report)).collect());
+            let trials = solve(&row_wires, readings_ohm, coordinates_mm)?;
+            return Ok(trials.into_iter().map(|trial| Some(trial.report)).collect());
         }
         let (channels, outputs) = (self.channels(), self.outputs());
         let readings_of = |place: usize| &readings_ohm[place * channels..][..channels];
         let order = |place: usize| self.order(readings_of(place)).into_iter();
         let mut orders: Vec<_> = (0..row_indices.len()).map(order).collect();
-        let mut taken: Vec<(f64, Option<R>)> = vec![(f64::INFINITY, None); row_indices.len()];
+        let mut taken: Vec<Option<Trial<R>>> = row_indices.iter().map(|_| None).collect();
         loop {
-            let is_open = |place: &usize| taken[*place].0 >= EXPLAINED;
+            let is_open = |place: &usize| taken[*place].as_ref().is_none_or(|trial| !trial.is_explained);
             let open: Vec<usize> = (0..taken.len()).filter(is_open).collect();
             let row_wires: Vec<usize> = open.iter().filter_map(|&place| orders[place].next()).collect();
             if row_wires.is_empty() {
@@ -137,14 +137,14 @@ impl RowSearch {
             let mut trials_mm = vec![0.0; open.len() * outputs];
             let found = solve(&row_wires, &readings_ohm, &mut trials_mm)?;
             let trials = trials_mm.chunks_exact(outputs).zip(found);
-            for (&place, (trial_mm, (residual, report))) in open.iter().zip(trials) {
-                if residual < taken[place].0 {
-                    taken[place] = (residual, Some(report));
+            for (&place, (trial_mm, trial)) in open.iter().zip(trials) {
+                if trial.is_taken_over(taken[place].as_ref()) {
+                    taken[place] = Some(trial);
                     coordinates_mm[place * outputs..][..outputs].copy_from_slice(trial_mm);
                 }
             }
         }
-        Ok(taken.into_iter().map(|(_, report)| report).collect())
+        Ok(taken.into_iter().map(|trial| Some(trial?.report)).collect())
     }
 
     /// The row-wires in the order of similarity of these readings with theirs at rest.

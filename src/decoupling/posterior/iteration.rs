@@ -203,13 +203,16 @@ impl Posterior {
         self.rounds[place] = approach.rounds;
         let readings_ohm = &readings_ohm[approach.index * channels..][..channels];
         self.problem.read(approach.row, readings_ohm);
-        let residual = self.problem.evaluate_residuals(&answer);
+        let drift = approach.last.map_or(0.0, |last| last.means.drift);
+        self.problem.evaluate_residuals(&answer);
+        let residual = rms(self.likelihood.relative_misfits(&self.problem, drift));
         let coordinates_mm = &mut coordinates_mm[approach.index * outputs..][..outputs];
         self.problem.coordinates_of(&answer, coordinates_mm);
         PosteriorReport {
             steps: approach.steps,
             rounds: approach.rounds,
             residual,
+            drift,
             spread_mm: approach.variance.sqrt(),
             determined: approach.determined,
             converged: approach.converged,

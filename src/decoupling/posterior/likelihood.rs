@@ -95,6 +95,27 @@ impl Likelihood {
         (0..problem.equations()).map(misfit)
     }
 
+    /// m/(γR) − 1 of every reading m, with the resistances R of the evaluated `problem`.
+    pub(super) fn relative_misfits(&self, problem: &RowProblem, drift: f64) -> impl Iterator<Item = f64> {
+        let gain = self.gain(drift);
+        (0..problem.equations())
+            .map(move |reading| problem.reading_ohm(reading) / (gain * problem.resistance_ohm(reading)) - 1.0)
+    }
+
+    /// 2 Σ ln(σ(P) Φ(P/σ(P))) over readings, with the resistances of the evaluated `problem`: what a likelihood has beside its
+    /// exponent, but for constants. σ(P) is left out for readings that a converter rounded, whose likelihood is a probability.
+    pub(super) fn log_normalisers(&self, problem: &RowProblem, drift: f64) -> f64 {
+        let gain = self.gain(drift);
+        let of_reading = |reading| {
+            let predicted_ohm = gain * problem.resistance_ohm(reading);
+            let deviation_ohm = self.deviation_ohm(predicted_ohm);
+            let is_rounded = self.noise.rounded_from_ohm(problem.reading_ohm(reading)).is_some();
+            let width = if is_rounded { 0.0 } else { deviation_ohm.ln() };
+            2.0 * (width + normal_cdf(predicted_ohm / deviation_ohm).ln())
+        };
+        (0..problem.equations()).map(of_reading).sum()
+    }
+
     fn gain(&self, drift: f64) -> f64 {
         (1.0 + self.noise.drift() * drift).max(SMALLEST_GAIN)
     }

@@ -1,5 +1,6 @@
 //! The posterior of a row-wire's deformation given its readings, the noise and the prior of a scene.
 
+mod evidence;
 mod expectation_propagation;
 mod factor;
 mod gaussian;

@@ -5,8 +5,10 @@ pub struct PosteriorReport {
     pub steps: usize,
     /// Rounds of expectation propagation over all unknowns, in all linearisations.
     pub rounds: usize,
-    /// rms over readings of the relative misfit m/R − 1 at the answer.
+    /// rms over readings of the relative misfit m/(γR) − 1 at the answer, with the gain γ of [`Self::drift`].
     pub residual: f64,
+    /// Mean of the gain error of the snapshot, in standard deviations of the scene's drift; 0 without drift.
+    pub drift: f64,
     /// rms over unknowns of the posterior standard deviation.
     pub spread_mm: f64,
     /// True if no unknown has a posterior standard deviation above

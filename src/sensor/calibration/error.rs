@@ -48,6 +48,53 @@ pub enum CalibrationError {
         /// Node on the row-wire, from 0.
         node: usize,
     },
+    /// A displacement is upwards, or further down than nodes may be pressed.
+    #[error(
+        "sample {}, node {}: it is pressed down by {} mm, where 0 to {} mm is possible; correct it, or leave this sample out",
+        .sample + 1, .node + 1, rounded(*.depth_mm), short(*.largest_mm)
+    )]
+    Depth {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+        /// Displacement downwards.
+        depth_mm: f64,
+        /// Largest possible one.
+        largest_mm: f64,
+    },
+    /// A displacement sideways is larger than those of nodes may be.
+    #[error(
+        "sample {}, node {}: it is shifted sideways by {} mm, where up to {} mm is possible; correct it, or leave this sample \
+         out",
+        .sample + 1, .node + 1, rounded(*.shift_mm), short(*.largest_mm)
+    )]
+    Shift {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+        /// Displacement sideways.
+        shift_mm: f64,
+        /// Largest possible one.
+        largest_mm: f64,
+    },
+    /// A reading is out of all proportion to the others.
+    #[error(
+        "sample {}, column {}: the reading {} ohm is out of all proportion: the sensor model and the other readings suggest \
+         {} ohm; correct it, or leave this sample out",
+        .sample + 1, .column + 1, short(*.ohm), rounded(*.expected_ohm)
+    )]
+    Absurd {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Column-wire, from 0.
+        column: usize,
+        /// The reading.
+        ohm: f64,
+        /// Reading that the sensor model and the other readings suggest.
+        expected_ohm: f64,
+    },
     /// All samples are of one row-wire, from which the pitch of the row-wires and the place of the columns cannot be told
     /// apart.
     #[error(
@@ -73,4 +120,25 @@ pub enum CalibrationError {
          order of the wires, and that displacements are in millimetres"
     )]
     NotConverged,
+}
+
+/// [`short`] of four significant digits.
+fn rounded(value: f64) -> String {
+    let digits = format!("{value:.3e}");
+    digits.parse().map_or(digits, short)
+}
+
+impl CalibrationError {
+    /// Index of the sample at fault, from 0; `None` if it is no single one.
+    pub fn sample(&self) -> Option<usize> {
+        match *self {
+            Self::Shape { sample, .. }
+            | Self::Reading { sample, .. }
+            | Self::Displacement { sample, .. }
+            | Self::Depth { sample, .. }
+            | Self::Shift { sample, .. }
+            | Self::Absurd { sample, .. } => Some(sample),
+            Self::Sensor(_) | Self::OneRow { .. } | Self::TooFew { .. } | Self::NotConverged => None,
+        }
+    }
 }

@@ -55,52 +55,120 @@ pub(super) fn residuals(
     }
 }
 
-/// Fits the parameters `free` (indices in [`SensorParameter::ALL`]) from `nominal`, by the Levenberg-Marquardt method
-/// (Marquardt 1963) on the logarithms of the resistances, so that relative errors count alike. Returns the model and the
-/// number of iterations.
+/// Outcome of a fit.
+pub(super) struct Fitted {
+    pub(super) model: SensorModel,
+    /// The equations linearised there, without the prior.
+    pub(super) here: Linearised,
+    pub(super) iterations: usize,
+}
+
+/// Fits the parameters `free` (indices in [`SensorParameter::ALL`]) from `start`, by the Levenberg-Marquardt method
+/// (Marquardt 1963) on the logarithms of the resistances, so that relative errors count alike:
+/// minimises `Σ r² + prior_weight · Σ θ²`, with θ the change of a parameter from `nominal` in proportion to its reference.
+///
+/// The fit has converged when the Gauss-Newton step would lower this by less than a share of it that is nothing beside the
+/// uncertainty of the parameters (the relative offset of Bates and Watts 1981), whatever the length of the step: patterns
+/// that the readings hardly see do not delay it. Exact readings converge when their rounding is reached.
 pub(super) fn fit(
-    nominal: &SensorModel,
+    (nominal, start): (&SensorModel, &SensorModel),
     free: &[usize],
     references: &Slopes,
     samples: &[PressedRow],
-) -> Result<(SensorModel, usize), CalibrationError> {
+    prior_weight: f64,
+) -> Result<Fitted, CalibrationError> {
     /// Iterations after which a fit that has not ended will not.
     const MOST: usize = 200;
-    /// Relative change of every parameter below which the fit has ended.
-    const SMALLEST_STEP: f64 = 1e-11;
+    /// Length of the step that is left, in standard deviations of the parameters.
+    const OFFSET: f64 = 1e-4;
+    /// Share of Σ r² below which its change is its rounding.
+    const ROUNDING_OF_SUM: f64 = 1e-14;
+    /// Rounding of a residual: that of a reading, a resistance and their logarithms.
+    const ROUNDING: f64 = 16.0 * f64::EPSILON;
     /// Damping, in proportion to the largest eigenvalue of JᵀJ, beyond which no step is left.
     const LARGEST_DAMPING: f64 = 1e6;
-    let (mut model, mut damping) = (*nominal, 1e-6);
+    let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
+    let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
+    let share = (OFFSET * OFFSET / redundancy).max(ROUNDING_OF_SUM);
+    let changes = |model: &SensorModel| -> Vec<f64> {
+        let change = |&index: &usize| {
+            let parameter = SensorParameter::ALL[index];
+            (parameter.of(model) - parameter.of(nominal)) / references[index]
+        };
+        free.iter().map(change).collect()
+    };
+    let penalty = |changes: &[f64]| prior_weight * changes.iter().map(|change| change * change).sum::<f64>();
+    let (mut model, mut damping) = (*start, 1e-6);
     let mut here = Linearised::at(&model, references, samples);
+    let mut moved = changes(&model);
     for iteration in 1..=MOST {
-        let decomposition = Decomposition::of(&here.gram, free)?;
-        let gradient: Vec<f64> = free.iter().map(|&index| here.gradient[index]).collect();
+        let mut gram = here.gram;
+        free.iter().for_each(|&index| gram[index][index] += prior_weight);
+        let decomposition = Decomposition::of(&gram, free)?;
+        let gradient = free.iter().zip(&moved);
+        let gradient: Vec<f64> = gradient
+            .map(|(&index, moved)| here.gradient[index] - prior_weight * moved)
+            .collect();
+        let squares = here.squares + penalty(&moved);
+        let newton = decomposition.solve(&gradient, 0.0);
+        let gain: f64 = newton.iter().zip(&gradient).map(|(step, slope)| step * slope).sum();
+        if gain <= share * squares + readings as f64 * ROUNDING * ROUNDING {
+            return Ok(Fitted {
+                model,
+                here,
+                iterations: iteration,
+            });
+        }
         loop {
             let step = decomposition.solve(&gradient, damping * decomposition.largest());
             let mut candidate = model;
             for (&index, change) in free.iter().zip(&step) {
                 *SensorParameter::ALL[index].field(&mut candidate) += change * references[index];
             }
-            let is_small = step.iter().all(|change| change.abs() < SMALLEST_STEP);
             let is_possible = candidate.check().is_ok() && is_above_columns(&candidate, samples);
-            let next = is_possible.then(|| Linearised::at(&candidate, references, samples));
+            let next = is_possible.then(|| (Linearised::at(&candidate, references, samples), changes(&candidate)));
             // False for NaN.
-            if let Some(next) = next.filter(|next| next.squares <= here.squares) {
-                (model, here, damping) = (candidate, next, (damping * 0.1).max(1e-15));
-                if is_small {
-                    return Ok((model, iteration));
-                }
+            if let Some(next) = next.filter(|(next, moved)| next.squares + penalty(moved) < squares) {
+                model = candidate;
+                (here, moved) = next;
+                damping = (damping * 0.1).max(1e-15);
                 break;
-            }
-            // At the minimum, rounding decides which of two models is better.
-            if is_small {
-                return Ok((model, iteration));
             }
             damping *= 10.0;
             if damping > LARGEST_DAMPING {
                 return Err(CalibrationError::NotConverged);
             }
         }
+    }
+    Err(CalibrationError::NotConverged)
+}
+
+/// Fits the parameters `free` with the prior that they are nominal to `tolerance` (one standard deviation, in proportion to
+/// their references), weighed against the noise that the residuals themselves show. Any readings, however few, have such a
+/// fit.
+pub(super) fn fit_with_prior(
+    nominal: &SensorModel,
+    free: &[usize],
+    references: &Slopes,
+    samples: &[PressedRow],
+    tolerance: f64,
+) -> Result<Fitted, CalibrationError> {
+    /// Rounds in which the noise settles, and the relative change at which it has.
+    const ROUNDS: usize = 20;
+    const SETTLED: f64 = 1e-2;
+    let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
+    let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
+    let variance_of = |here: &Linearised| (here.squares / redundancy).max(f64::EPSILON * f64::EPSILON);
+    let mut variance = variance_of(&Linearised::at(nominal, references, samples));
+    let mut start = *nominal;
+    for round in 1.. {
+        let weight = variance / (tolerance * tolerance);
+        let fitted = fit((nominal, &start), free, references, samples, weight)?;
+        let last = std::mem::replace(&mut variance, variance_of(&fitted.here));
+        if round == ROUNDS || (variance / last - 1.0).abs() <= SETTLED {
+            return Ok(fitted);
+        }
+        start = fitted.model;
     }
     Err(CalibrationError::NotConverged)
 }

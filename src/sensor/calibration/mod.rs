@@ -2,19 +2,24 @@
 //!
 //! [`Calibration::fit`] minimises the squared relative errors of the readings by the Levenberg-Marquardt method with
 //! analytic derivatives. What the readings cannot tell stays at its nominal value, and is said to.
+//! [`PressLimits::check`] refuses samples that no press can give, before a calibration or a training on them.
 
 mod covariance;
 mod equations;
 mod error;
 mod levenberg_marquardt;
 mod parameter;
+mod presses;
 mod report;
 #[cfg(test)]
 mod tests;
+mod warning;
 
 pub use error::CalibrationError;
 pub use parameter::SensorParameter;
+pub use presses::PressLimits;
 pub use report::{CalibratedParameter, Calibration, Standing};
+pub use warning::CalibrationWarning;
 
 use super::DVec3;
 

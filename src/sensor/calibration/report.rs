@@ -1,11 +1,12 @@
 use std::fmt;
 
 use super::{
-    super::{SensorError, SensorModel, short},
-    CalibrationError, PressedRow, SensorParameter,
+    super::{SensorModel, short},
+    CalibrationError, PressLimits, PressedRow, SensorParameter,
     covariance::{Decomposition, variances},
     equations::{COUNT, Slopes},
-    levenberg_marquardt::{Linearised, fit},
+    levenberg_marquardt::{Fitted, Linearised, fit, fit_with_prior},
+    warning::CalibrationWarning,
 };
 
 /// A sensor model fitted to readings of known deformations.
@@ -26,6 +27,8 @@ pub struct Calibration {
     /// Singular values of the Jacobian of ln R by relative changes of the parameters, largest first, divided by the
     /// residual: a pattern is known to one part in so many. 0 for a pattern that the readings do not see.
     pub patterns: Vec<f64>,
+    /// Signs that the readings are not those of such a sensor, with cause and cure.
+    pub warnings: Vec<CalibrationWarning>,
 }
 
 /// A parameter of a calibrated sensor.
@@ -54,9 +57,12 @@ pub enum Standing {
 impl Calibration {
     /// Nominal values are taken to be right to ± this, in proportion to [`SensorParameter::reference`]: readings must tell
     /// a parameter better than that to change it.
-    const NOMINAL_TOLERANCE: f64 = 0.1;
+    pub(super) const NOMINAL_TOLERANCE: f64 = 0.1;
 
     /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
+    ///
+    /// What the readings tell is decided at a fit with the prior that nominal values are right to ±10 % (two standard
+    /// deviations), which any readings have; the parameters that they tell are then fitted without a prior.
     ///
     /// Parameters that the readings do not tell to ±10 % are held at their nominal values, one after another, the least
     /// known first. The intervals of the others allow for nominal values wrong by ±10 %, for a misfit of single crossings
@@ -66,7 +72,7 @@ impl Calibration {
     /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
     /// resistance, or the fit does not converge.
     pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
-        check(nominal, samples)?;
+        PressLimits::of_sensor(nominal).check(nominal, samples)?;
         // The place of the first row-wire is not fitted: with it alone nothing is mistaken for anything else.
         if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
             && samples.iter().all(|sample| sample.row == row)
@@ -84,9 +90,19 @@ impl Calibration {
         let start = Linearised::at(nominal, &references, samples);
         // A parameter that moves no reading, such as the row pitch where only the first row is read.
         let mut free: Vec<usize> = (0..COUNT).filter(|&index| start.gram[index][index] > 0.0).collect();
+        let mut with_prior = true;
+        let mut from = *nominal;
         loop {
-            let (model, iterations) = fit(nominal, &free, &references, samples)?;
-            let here = Linearised::at(&model, &references, samples);
+            let Fitted {
+                model,
+                here,
+                iterations,
+            } = if with_prior {
+                let tolerance = 0.5 * Self::NOMINAL_TOLERANCE;
+                fit_with_prior(nominal, &free, &references, samples, tolerance)?
+            } else {
+                fit((nominal, &from), &free, &references, samples, 0.0)?
+            };
             let decomposition = Decomposition::of(&here.gram, &free)?;
             let noise_variance = here.squares / (readings - free.len()) as f64;
             let fit_variances = variances(&model, &free, &references, samples, (&decomposition, noise_variance));
@@ -101,11 +117,17 @@ impl Calibration {
                 && !is_told(variance)
             {
                 free.remove(index);
+                with_prior = true;
+                continue;
+            }
+            if std::mem::replace(&mut with_prior, false) {
+                from = model;
                 continue;
             }
             let of_held = held_variances(&here, &free, &decomposition);
             let half_width = |place: usize| factor * (fit_variances[place] + of_held[place]).sqrt();
-            let parameters = SensorParameter::ALL.into_iter().enumerate().map(|(index, parameter)| {
+            let parameters = SensorParameter::ALL.into_iter().enumerate();
+            let parameters = parameters.map(|(index, parameter)| {
                 let place = free.iter().position(|&free| free == index);
                 CalibratedParameter {
                     parameter,
@@ -116,12 +138,14 @@ impl Calibration {
                     }),
                 }
             });
+            let parameters: Vec<CalibratedParameter> = parameters.collect();
             let whole = Decomposition::of(&here.gram, &Vec::from_iter(0..COUNT))?;
             let rms = |squares: f64| (squares / readings as f64).sqrt();
             let noise = noise_variance.sqrt().max(f64::EPSILON);
             return Ok(Self {
+                warnings: CalibrationWarning::of(&model, &references, samples, &parameters, free.len()),
                 model,
-                parameters: parameters.collect(),
+                parameters,
                 readings,
                 iterations,
                 nominal_residual: rms(start.squares),
@@ -163,41 +187,6 @@ fn two_sided_quantile(probability: f64) -> f64 {
         }
     }
     high
-}
-
-fn check(nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
-    nominal
-        .check()
-        .map_err(|source: SensorError| CalibrationError::Sensor(source))?;
-    let scale = nominal.scale;
-    for (sample, pressed) in samples.iter().enumerate() {
-        let counts = [
-            ("displacements", pressed.displacements_mm.len(), scale.nodes_per_row()),
-            ("readings", pressed.resistances_ohm.len(), scale.columns()),
-        ];
-        let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
-        let row = ("as the number of its row-wire", pressed.row + 1, scale.rows());
-        let wrong = wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row));
-        if let Some((what, found, expected)) = wrong {
-            return Err(CalibrationError::Shape {
-                sample,
-                what,
-                found,
-                expected,
-                scale: scale.to_string(),
-            });
-        }
-        let height = nominal.geometry.height_mm;
-        let mut nodes = pressed.displacements_mm.iter();
-        if let Some(node) = nodes.position(|displacement| !(displacement.is_finite() && displacement.z < height)) {
-            return Err(CalibrationError::Displacement { sample, node });
-        }
-        let mut readings = pressed.resistances_ohm.iter().enumerate();
-        if let Some((column, &ohm)) = readings.find(|(_, ohm)| !(**ohm > 0.0 && ohm.is_finite())) {
-            return Err(CalibrationError::Reading { sample, column, ohm });
-        }
-    }
-    Ok(())
 }
 
 impl fmt::Display for CalibratedParameter {

@@ -4,12 +4,20 @@ use super::*;
 use crate::sensor::SensorModel;
 
 fn nominal() -> SensorModel {
-    SensorModel::new("10x6_3x18".parse().unwrap())
+    of_scale("10x6_3x18")
+}
+
+fn of_scale(scale: &str) -> SensorModel {
+    SensorModel::new(scale.parse().unwrap())
 }
 
 /// A sensor whose height, pitches and column position are off by 5 %, each up or down.
 fn real(rng: &mut impl Rng) -> SensorModel {
-    let mut real = nominal();
+    off(nominal(), rng)
+}
+
+fn off(nominal: SensorModel, rng: &mut impl Rng) -> SensorModel {
+    let mut real = nominal;
     let geometry = &mut real.geometry;
     for length in [
         &mut geometry.height_mm,
@@ -167,6 +175,97 @@ fn intervals_allow_for_wires_that_are_off() {
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));
     assert!(wide > 2.0 * narrow, "{wide} and {narrow} of the residual");
+}
+
+/// Sets that leave patterns of the parameters open: few readings, one row-wire, and no press, where all lengths and the
+/// resistivity are known up to one factor. The first residual is that of the true sensor.
+#[test]
+fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
+    let mut within = 0;
+    let mut all = 0;
+    for (scale, rows, count, noise, at_rest, seeds) in [
+        ("3x2_2x6", 3, 1, 1e-4, false, 20),
+        ("1x5_3x15", 1, 10, 1e-3, false, 20),
+        ("4x3_2x8", 4, 30, 1e-3, true, 6),
+        ("2x5_2x15", 2, 2, 2e-3, false, 10),
+        ("1x10_4x30", 1, 20, 3e-4, true, 4),
+    ] {
+        for seed in 0..seeds {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let nominal = of_scale(scale);
+            let real = off(nominal, &mut rng);
+            let mut samples = frames(&real, &Vec::from_iter(0..rows), count, noise, &mut rng);
+            if at_rest {
+                for sample in &mut samples {
+                    sample.displacements_mm.fill(DVec3::ZERO);
+                    let ohm = real.row_resistances(sample.row, &sample.displacements_mm).unwrap();
+                    sample.resistances_ohm = ohm
+                        .iter()
+                        .map(|ohm| ohm * (1.0 + noise * rng.random_range(-1.7..1.7)))
+                        .collect();
+                }
+            }
+            let calibration =
+                Calibration::fit(&nominal, &samples).unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
+            assert!(calibration.residual < 1.6 * noise, "{scale}: {}", calibration.residual);
+            assert_eq!(calibration.warnings, [], "{scale}, seed {seed}");
+            within += usize::from(at_rest || holds(&calibration, &real));
+            all += 1;
+        }
+    }
+    assert!(10 * within >= 9 * all, "{within} of {all}");
+}
+
+/// With one electrode more on each column-wire than there are, the fit is as good as with the true scale: only the values
+/// show it. With column-wires in the wrong order, the residual does.
+#[test]
+fn another_sensor_is_warned_of() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let samples = frames(&of_scale("4x3_2x8"), &[0, 1, 2, 3], 30, 1e-3, &mut rng);
+    let calibration = Calibration::fit(&of_scale("4x3_3x8"), &samples).unwrap();
+    let words = calibration.warnings[0].to_string();
+    assert!(
+        words.contains("resistance per millimetre: 15") && words.contains("check the array scale"),
+        "{words}"
+    );
+    assert_eq!(Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap().warnings, []);
+    let mut swapped = samples;
+    for sample in &mut swapped {
+        sample.resistances_ohm.swap(0, 3);
+    }
+    let warnings = Calibration::fit(&of_scale("4x3_2x8"), &swapped).unwrap().warnings;
+    let is_misfit = |warning: &CalibrationWarning| matches!(warning, CalibrationWarning::Misfit { .. });
+    assert!(warnings.iter().any(is_misfit), "{warnings:?}");
+}
+
+#[test]
+fn presses_outside_the_limits_are_named() {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let good = frames(&nominal(), &[0, 1, 2], 4, 1e-3, &mut rng);
+    let limits = PressLimits {
+        largest_depth_mm: 1.0,
+        largest_shift_mm: 0.2,
+    };
+    assert_eq!(limits.check(&nominal(), &good), Ok(()));
+    let message = |spoil: &dyn Fn(&mut PressedRow)| {
+        let mut samples = good.clone();
+        spoil(&mut samples[4]);
+        let error = limits.check(&nominal(), &samples).unwrap_err();
+        assert_eq!(error.sample(), Some(4), "{error}");
+        error.to_string()
+    };
+    assert!(message(&|sample| sample.resistances_ohm[1] = 0.0).contains("column 2"));
+    assert!(message(&|sample| sample.resistances_ohm[0] = 1e300).contains("1e300 ohm is out of all proportion"));
+    assert!(message(&|sample| sample.resistances_ohm[0] = 1e-12).contains("1e-12 ohm is out of all proportion"));
+    assert!(message(&|sample| sample.displacements_mm[2].z = -3.0).contains("node 3: it is pressed down by -3 mm"));
+    assert!(message(&|sample| sample.displacements_mm[2].z = 1.5).contains("0 to 1 mm is possible"));
+    assert!(message(&|sample| sample.displacements_mm[0].y = -0.5).contains("sideways by 0.5 mm"));
+    // Another rubber is no error.
+    let mut samples = good.clone();
+    for sample in &mut samples {
+        sample.resistances_ohm.iter_mut().for_each(|ohm| *ohm *= 1e9);
+    }
+    assert_eq!(limits.check(&nominal(), &samples), Ok(()));
 }
 
 #[test]

@@ -11,7 +11,7 @@ pub use warning::IdentifiabilityWarning;
 use faer::Mat;
 use glam::DVec3;
 
-use super::{Axes, RowConductance, SensorModel};
+use super::{Axes, RelativeNoise, RowConductance, SensorModel};
 
 /// Deformation patterns that the readings of one row-wire see, from the singular values of the Jacobian of ln R.
 ///
@@ -44,6 +44,22 @@ impl Identifiability {
         displacements_mm: &[DVec3],
         axes: Axes,
     ) -> Result<Self, IdentifiabilityError> {
+        Self::of_row_with_gain(model, row, displacements_mm, axes, RelativeNoise::default())
+    }
+
+    /// As [`Self::of_row`], for readings with this noise: where they have a common error, such as the gain of a snapshot,
+    /// what all of them have in common counts only as far as that error leaves it. Readings with an error of their own
+    /// alone (`noise.own`) and these singular values then determine as much as the readings with both.
+    ///
+    /// # Errors
+    /// As [`Self::of_row`].
+    pub fn of_row_with_gain(
+        model: &SensorModel,
+        row: usize,
+        displacements_mm: &[DVec3],
+        axes: Axes,
+        noise: RelativeNoise,
+    ) -> Result<Self, IdentifiabilityError> {
         let (rows, equations) = (model.scale.rows(), model.scale.columns());
         if row >= rows {
             return Err(IdentifiabilityError::Row { row, rows });
@@ -53,13 +69,20 @@ impl Identifiability {
         conductance.evaluate(model, row, displacements_mm);
         let unknowns = displacements_mm.len() * axes.count();
         // ln R = ln g − ln s, so the signs turn; rows of zeros complete the basis where readings are too few.
-        let jacobian = Mat::from_fn(equations.max(unknowns), unknowns, |k, unknown| {
+        let mut jacobian = Mat::from_fn(equations.max(unknowns), unknowns, |k, unknown| {
             if k < equations {
                 -conductance.derivatives(unknown)[k] / conductance.sums()[k]
             } else {
                 0.0
             }
         });
+        let weight = noise.weight_of_mean(equations);
+        if weight < 1.0 {
+            for unknown in 0..unknowns {
+                let mean = (0..equations).map(|k| jacobian[(k, unknown)]).sum::<f64>() / equations as f64;
+                (0..equations).for_each(|k| jacobian[(k, unknown)] -= (1.0 - weight) * mean);
+            }
+        }
         let svd = jacobian
             .thin_svd()
             .map_err(|_| IdentifiabilityError::NotConverged(row))?;
@@ -103,7 +126,7 @@ impl Identifiability {
         }
     }
 
-    /// Standard deviation in millimetres to which readings with `noise` (relative) know the worst-seen pattern; infinite
+    /// Standard deviation in millimetres to which readings with an own error of `noise` (relative) know the worst-seen pattern; infinite
     /// where they do not see it at all.
     pub fn worst_spread_mm(&self, noise: f64) -> f64 {
         match self.singular_values_per_mm.last() {
@@ -151,6 +174,47 @@ mod tests {
         assert!((seen.worst_pattern[0].z - 1.0).abs() < 1e-15);
         assert!((seen.sensitivity_per_mm[0].z - 5.0 / 169.0).abs() < 1e-15);
         assert!((seen.worst_spread_mm(1e-3) - 1e-3 * 169.0 / 5.0).abs() < 1e-15);
+    }
+
+    /// The dense formula: (Jᵀ Σ⁻¹ J)⁻¹ with Σ = own² I + common² 1 1ᵀ, J by differences of the resistances.
+    #[test]
+    fn a_common_gain_leaves_what_the_covariance_of_the_readings_says() {
+        let model = SensorModel::new("3x2_2x8".parse().unwrap());
+        let noise = RelativeNoise { own: 1e-3, common: 0.1 };
+        let rest = [DVec3::ZERO; 2];
+        let seen = Identifiability::of_row_with_gain(&model, 1, &rest, Axes::Z, noise).unwrap();
+        let ln_ohm = |u: [f64; 2]| -> Vec<f64> {
+            let ohm = model.row_resistances(1, &u.map(|z| DVec3::Z * z)).unwrap();
+            ohm.into_iter().map(f64::ln).collect()
+        };
+        let slopes = [[1e-5, 0.0], [0.0, 1e-5]].map(|step| {
+            let (above, below) = (ln_ohm(step), ln_ohm(step.map(|z| -z)));
+            let slopes = above.iter().zip(&below).map(|(a, b)| (a - b) / 2e-5);
+            slopes.collect::<Vec<f64>>()
+        });
+        // Sherman and Morrison: Σ⁻¹ = I/own² − common²/(own² (own² + 8 common²)) 1 1ᵀ.
+        let share = 0.01 / (1e-6 + 8.0 * 0.01);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let entry = |a: &[f64], b: &[f64]| 1e6 * (dot(a, b) - share * a.iter().sum::<f64>() * b.iter().sum::<f64>());
+        let [a, b] = &slopes;
+        let (trace, determinant) = (
+            entry(a, a) + entry(b, b),
+            entry(a, a) * entry(b, b) - entry(a, b).powi(2),
+        );
+        let [large, small] = seen.singular_values_per_mm[..] else {
+            panic!("two unknowns")
+        };
+        let found = [large, small].map(|value| (value / noise.own).powi(2));
+        assert!(((found[0] + found[1]) / trace - 1.0).abs() < 1e-6);
+        assert!((found[0] * found[1] / determinant - 1.0).abs() < 1e-6);
+        // One reading of one unknown: nothing is left but the gain's own spread.
+        let single = SensorModel::new("1x1_1x1".parse().unwrap());
+        let seen = |noise| Identifiability::of_row_with_gain(&single, 0, &[DVec3::ZERO], Axes::Z, noise).unwrap();
+        let exact = RelativeNoise { own: 0.0, ..noise };
+        let spread = seen(noise).worst_spread_mm(noise.own);
+        let alone = at_rest(&single, 0, Axes::Z).worst_spread_mm(noise.total());
+        assert!((spread / alone - 1.0).abs() < 1e-9, "{spread} {alone}");
+        assert!(seen(exact).singular_values_per_mm[0] < 1e-14);
     }
 
     #[test]

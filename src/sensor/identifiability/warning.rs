@@ -76,7 +76,8 @@ impl Identifiability {
     /// The share of the prior spread that remains from which noise is called hopeless: readings then tell less than
     /// a tenth of the variance.
     pub const HOPELESS_SHARE: f64 = 0.95;
-    /// Warnings to the user, most severe first. `noise` is the relative error of a reading, `prior_mm` the standard
+    /// Warnings to the user, most severe first. `noise` is the relative error of a reading of its own (for a common error see
+    /// [`Self::of_row_with_gain`] and [`Self::most_alike_rows`]), `prior_mm` the standard
     /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
     pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
         let condition = self.condition();

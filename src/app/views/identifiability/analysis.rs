@@ -43,7 +43,7 @@ pub struct Analysis {
     /// The place in [`Self::rows`] of the row with the smallest singular value.
     pub worst: usize,
     /// Relative error of a reading (one standard deviation), from all sources of the scene.
-    pub noise: f64,
+    pub noise: RelativeNoise,
     /// Spread of each unknown before reading (one standard deviation): that of an even distribution over the stroke.
     pub prior_mm: f64,
     /// The most similar rows, if a decoder must tell them apart.
@@ -105,11 +105,17 @@ impl Analysis {
         let smallest = |seen: &Identifiability| seen.singular_values_per_mm.last().copied().unwrap_or(0.0);
         let worst = (0..rows.len()).min_by(|&a, &b| smallest(&rows[a]).total_cmp(&smallest(&rows[b])));
         let worst = worst.unwrap_or(0);
+        let noise = RelativeNoise::of(scene.noise, sensor, &[rows[worst].row], depth_mm)?;
+        if noise.common > 0.0 {
+            for seen in &mut rows {
+                *seen = Identifiability::of_row_with_gain(sensor, seen.row, &displacements_mm, axes, noise)?;
+            }
+            align(&mut rows);
+        }
         let alike = match scene.rows.model() {
-            RowModel::Shared => Some(Identifiability::most_alike_rows(sensor)?),
+            RowModel::Shared => Some(Identifiability::most_alike_rows(sensor, noise)?),
             RowModel::Each => None,
         };
-        let noise = RelativeNoise::of(scene.noise, sensor, &[rows[worst].row], depth_mm)?.total();
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         let surface = match last {
             Some(last) if lattice(&last.question.sensor) == lattice(sensor) && last.rows.len() == rows.len() => {
@@ -133,7 +139,7 @@ impl Analysis {
             noise,
             prior_mm,
             alike,
-            warnings: rows[worst].warnings(noise, prior_mm, alike),
+            warnings: rows[worst].warnings(noise.own, prior_mm, alike),
             patterns: frames(|seen, node| seen.worst_pattern[node], largest.recip()),
             sensitivities: frames(|seen, node| seen.sensitivity_per_mm[node], 1.0),
             surface,
@@ -148,7 +154,7 @@ impl Analysis {
 
     /// The singular value at which noise hides as much as the prior leaves open: patterns below it are not seen.
     pub fn hidden_below_per_mm(&self) -> f64 {
-        self.noise / self.prior_mm
+        self.noise.own / self.prior_mm
     }
 
     /// Number of deformation patterns of the worst row above the noise.
@@ -230,7 +236,7 @@ mod tests {
             .map(|node| node.z.abs())
             .fold(0.0, f64::max);
         assert!((largest - 1.0).abs() < 1e-12);
-        assert_eq!(found.noise, 0.0);
+        assert_eq!(found.noise.total(), 0.0);
         assert_eq!(found.patterns_seen(), 10);
     }
 
@@ -254,12 +260,12 @@ mod tests {
             drift: 4e-3,
             ..Noise::default()
         };
-        assert!((analysis(&question).noise - 5e-3).abs() < 1e-15);
+        assert!((analysis(&question).noise.total() - 5e-3).abs() < 1e-15);
         question.scene.noise = Noise {
             converter_bits: Some(8),
             ..Noise::default()
         };
-        assert!(analysis(&question).noise > 1e-4);
+        assert!(analysis(&question).noise.total() > 1e-4);
     }
 
     #[test]

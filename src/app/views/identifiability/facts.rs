@@ -31,7 +31,7 @@ pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
 /// Returns the summary shown where there are no warnings.
 fn summary(analysis: &Analysis) -> String {
     let (seen, patterns) = (analysis.patterns_seen(), analysis.worst_row().unknowns());
-    if analysis.noise == 0.0 {
+    if analysis.noise.total() == 0.0 {
         "Without noise, the readings determine every deformation.".to_owned()
     } else if seen == patterns {
         "Every deformation pattern is above the noise.".to_owned()
@@ -86,7 +86,7 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
             alike,
         ),
     ];
-    if analysis.noise > 0.0 {
+    if analysis.noise.total() > 0.0 {
         facts.extend(noise_facts(analysis));
     }
     facts
@@ -94,19 +94,19 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
 
 fn noise_facts(analysis: &Analysis) -> [(&'static str, &'static str, String); 4] {
     let worst = analysis.worst_row();
-    let spread_mm = worst.worst_spread_mm(analysis.noise);
+    let spread_mm = worst.worst_spread_mm(analysis.noise.own);
     let spread = if spread_mm.is_finite() {
         format!("{} mm", format_number(spread_mm))
     } else {
         "infinite".to_owned()
     };
-    let share = 100.0 * worst.remaining_share(analysis.noise, analysis.prior_mm);
+    let share = 100.0 * worst.remaining_share(analysis.noise.own, analysis.prior_mm);
     let prior = format_number(analysis.prior_mm);
     [
         (
             "Noise of a reading",
             "Relative standard deviation of one reading, from all noise sources of the scene.",
-            format_number(analysis.noise),
+            format_number(analysis.noise.total()),
         ),
         (
             "Deformation patterns above the noise",

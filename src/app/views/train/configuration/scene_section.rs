@@ -265,13 +265,12 @@ pub fn outlook_notes_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<
 
 /// Returns the effect of sideways shifts on the readings, in words.
 fn sideways_in_words(outlook: &Outlook) -> String {
-    let (worst, noise) = (&outlook.worst_row, outlook.noise);
-    if noise > 0.0 {
-        let spread = format_number(worst.worst_spread_mm(noise));
+    if outlook.noise.total() > 0.0 {
+        let spread = format_number(outlook.worst_spread_mm);
         format!("With this noise, the worst-seen movement is known only to ±{spread} mm.")
     } else {
         // One millimetre of the movement seen worst against the reading it changes.
-        let change = format_number(100.0 * worst.worst_spread_mm(1.0).recip());
+        let change = format_number(100.0 * outlook.worst_row.worst_spread_mm(1.0).recip());
         format!(
             "Sideways shifts are hard to see: 1 mm of the worst-seen movement changes the readings by {change} %. \
              Noise above that hides it."
