@@ -14,7 +14,7 @@ use crate::{
     export::{
         DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
     },
-    import::{Cure, ImportError},
+    import::{Cure, ImportError, InputError},
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::{CalibrationError, SensorError},
@@ -87,6 +87,14 @@ pub(super) enum Failure {
     Lost { input: Source, source: io::Error },
     #[error("{0}: {1}")]
     Line(Source, LineError),
+    #[error("{input}: line {line}: {source}")]
+    OtherColumns {
+        input: Source,
+        line: u64,
+        source: InputError,
+    },
+    #[error("{input}: no line could be decoded: {reason}")]
+    NothingDecoded { input: Source, reason: String },
     #[error(transparent)]
     Sensor(SensorError),
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     dataset::SimulationError,
     export::{MeasuredNetworkFile, NetworkFile},
-    live::{Keeping, Line, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
+    live::{Keeping, Line, LineParser, Lines, NextLine, ParsedLine, Source},
 };
 
 // Decoding of frames as they come.
@@ -75,10 +75,21 @@ impl Follow {
             ));
         }
         let mut answers = MeasuredAnswers::new(file, self.format.unwrap_or_default());
-        self.follow(self.source(input)?, 1, |Line { number, text, read_at }, report| {
+        let source = self.source(input)?;
+        let begins_anywhere = source.begins_anywhere();
+        self.follow(source, 1, |Line { number, text, read_at }, report| {
             match text.map(|text| answers.write(number, text)) {
                 Some(Ok(Answered::Yes)) => report.good(read_at.elapsed()),
-                Some(Ok(Answered::Heading)) => {}
+                Some(Ok(Answered::NoReadings)) => {}
+                Some(Ok(Answered::OtherColumns(source))) if !(begins_anywhere && number == 1) => {
+                    let input = report.source().clone();
+                    return Err(Failure::OtherColumns {
+                        input,
+                        line: number,
+                        source,
+                    });
+                }
+                Some(Ok(Answered::OtherColumns(reason))) => report.bad(&format_args!("line {number}: {reason}")),
                 Some(Ok(Answered::Bad(reason))) => report.bad(&format_args!("line {number}: {reason}")),
                 Some(Err(error)) => return Err(Failure::Output(error)),
                 None => report_too_long(number, report),
@@ -120,7 +131,7 @@ impl Follow {
                     let input = report.source().clone();
                     break Err(Failure::Lost { input, source: error });
                 }
-                NextLine::End(None) => break Ok(()),
+                NextLine::End(None) => break report.end(),
             };
             match take(line, &mut report) {
                 Ok(Kept::AsBefore) => {}
@@ -163,12 +174,15 @@ impl Follow {
             let parsed = match parser.parse(number, text) {
                 Ok(ParsedLine::NoReadings) => return Ok(Kept::AsBefore),
                 Ok(parsed) => parsed,
-                Err(error @ LineError::NoRow(_)) => return Err(Failure::Line(input.clone(), error)),
+                Err(error) if error.is_final() && !(input.begins_anywhere() && number == 1) => {
+                    return Err(Failure::Line(input.clone(), error));
+                }
                 Err(error) => {
                     report.bad(&error);
                     return Ok(Kept::AsBefore);
                 }
             };
+            let is_whole = faults.take(number, parsed);
             match answers.write(number, parsed, faults.left_out()) {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
@@ -181,7 +195,7 @@ impl Follow {
             }
             let is_snapshot = matches!(parsed, ParsedLine::Snapshot(_));
             let is_due = checked.is_none_or(|checked| checked.elapsed() >= BETWEEN_CHECKS);
-            if faults.take(number, parsed) && (keeping == Keeping::All || is_due) {
+            if is_whole && (keeping == Keeping::All || is_due) {
                 faults.check(number);
                 checked = Some(Instant::now());
             }

@@ -58,12 +58,12 @@ impl<'a> Answers<'a> {
         self.rows
     }
 
-    /// Decodes a line, by `left_out` if there is one, and writes and flushes the answer. Returns `false` if there is none.
+    /// Decodes a line, by `left_out` and the latest readings of every row read if they are given, and writes and flushes the answer. Returns `false` if there is none.
     pub(super) fn write(
         &mut self,
         line: u64,
         parsed: ParsedLine<'_>,
-        left_out: Option<&mut LeftOutDecoder>,
+        left_out: Option<(&mut LeftOutDecoder, &[f64])>,
     ) -> io::Result<bool> {
         let outputs = 3 * self.nodes_per_row;
         let (first_row, readings_ohm) = match parsed {
@@ -80,18 +80,24 @@ impl<'a> Answers<'a> {
         // A wire can be left out of a row that is known only.
         let fault = left_out
             .as_ref()
-            .and_then(|left_out| left_out.fault())
+            .and_then(|(left_out, _)| left_out.fault())
             .filter(|_| first_row.is_some());
         let first_row = first_row.unwrap_or(0);
-        let decoder: &mut dyn Decoder = match left_out {
-            Some(left_out) if fault.is_some() => left_out,
-            _ => &mut self.compiled,
-        };
         let lines = || readings_ohm.chunks_exact(channels);
-        for (row, (readings_ohm, answer_mm)) in lines().zip(answer_mm.chunks_exact_mut(outputs)).enumerate() {
-            if decoder.decode_row(first_row + row, readings_ohm, answer_mm) != Ok(()) {
-                return Ok(false);
+        let is_answered = match left_out {
+            Some((left_out, frame_ohm)) if fault.is_some() => match parsed {
+                ParsedLine::Snapshot(_) => left_out.decode(readings_ohm, answer_mm),
+                _ => left_out.decode_row_of(frame_ohm, first_row, answer_mm),
+            },
+            _ => {
+                let mut rows = lines().zip(answer_mm.chunks_exact_mut(outputs)).enumerate();
+                rows.try_for_each(|(row, (readings_ohm, answer_mm))| {
+                    self.compiled.decode_row(first_row + row, readings_ohm, answer_mm)
+                })
             }
+        };
+        if is_answered.is_err() {
+            return Ok(false);
         }
         if answer_mm.iter().any(|coordinate| !coordinate.is_finite()) {
             return Ok(false);

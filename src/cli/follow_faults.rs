@@ -62,9 +62,10 @@ impl Faults {
         })
     }
 
-    /// The decoder that leaves out the wires of a named fault, if there is one.
-    pub(super) fn left_out(&mut self) -> Option<&mut LeftOutDecoder> {
-        self.watch.as_mut().map(|watch| &mut watch.left_out)
+    /// The decoder that leaves out the wires of a named fault, if there is one, with the latest readings of every row read.
+    pub(super) fn left_out(&mut self) -> Option<(&mut LeftOutDecoder, &[f64])> {
+        let watch = self.watch.as_mut()?;
+        Some((&mut watch.left_out, &watch.frame_ohm))
     }
 
     /// Takes the readings of a line; returns `true` if all rows have come since the last check.

@@ -4,6 +4,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::failure::Failure;
 use crate::live::{Latencies, Source};
 
 /// Counts of what came, and messages on standard error.
@@ -13,6 +14,8 @@ pub(super) struct Report {
     last: Instant,
     latencies: Latencies,
     bad: u64,
+    /// Reason of the first bad line.
+    first_bad: Option<String>,
     /// Bad lines that were not told.
     untold: u64,
     last_told: Instant,
@@ -31,6 +34,7 @@ impl Report {
             last: now,
             latencies: Latencies::default(),
             bad: 0,
+            first_bad: None,
             untold: 0,
             last_told: now,
         }
@@ -48,6 +52,7 @@ impl Report {
     /// Counts a bad line and tells of it, unless many were told.
     pub(super) fn bad(&mut self, reason: &dyn Display) {
         self.bad += 1;
+        self.first_bad.get_or_insert_with(|| reason.to_string());
         if self.bad > TOLD && self.last_told.elapsed() < BETWEEN_TOLD {
             self.untold += 1;
             return;
@@ -81,6 +86,21 @@ impl Report {
             self.last = Instant::now();
         }
         is_due
+    }
+
+    /// Result at the end of the source.
+    ///
+    /// # Errors
+    /// If not one line was decoded.
+    pub(super) fn end(&self) -> Result<(), Failure> {
+        if self.latencies.count() > 0 {
+            return Ok(());
+        }
+        let reason = self.first_bad.clone();
+        Err(Failure::NothingDecoded {
+            input: self.source.clone(),
+            reason: reason.unwrap_or_else(|| "it has no line of readings".to_owned()),
+        })
     }
 
     /// Tells the counts and latencies so far.

@@ -7,16 +7,19 @@ use std::{
 
 use super::{failure::Failure, follow_answers::Form, import_arguments::with_bar};
 use crate::{
-    dataset::CsvFields,
+    dataset::{CsvFields, number},
     decoupling::{CompiledNetworks, Decoder},
     export::{AtomicFile, MeasuredNetworkFile, WriteError},
+    import::{InputColumns, InputError},
     network::DecouplingNetwork,
 };
 
 /// Decodes the file `input` into the file `output`.
 pub(super) fn decode_file(file: &MeasuredNetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
     let recipe = &file.plan.import;
-    let table = with_bar(true, |watch| recipe.read_inputs(input, &file.inputs, watch))?;
+    let table = with_bar(true, |watch| {
+        recipe.read_inputs(input, &file.inputs, file.network.only().is_none(), watch)
+    })?;
     let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows(file));
     let refused = |source| WriteError::io(output, source);
     let mut written = AtomicFile::create(output)?;
@@ -104,11 +107,15 @@ pub(super) struct MeasuredAnswers<'a> {
     file: &'a MeasuredNetworkFile,
     compiled: CompiledNetworks<f64>,
     fields: CsvFields,
+    /// Columns of the lines, by their header or else by the first line that was decoded.
+    columns: Option<InputColumns>,
+    /// Cells of the line as numbers, NaN where they are none.
     readings: Vec<f64>,
+    /// Readings in the order of the network's inputs.
+    inputs: Vec<f64>,
     answer: Vec<f64>,
     form: Form,
     has_heading: bool,
-    is_first: bool,
     output: BufWriter<StdoutLock<'static>>,
 }
 
@@ -116,10 +123,12 @@ pub(super) struct MeasuredAnswers<'a> {
 pub(super) enum Answered {
     /// It was decoded.
     Yes,
-    /// It has the names of the columns.
-    Heading,
+    /// It has the names of the columns, or nothing.
+    NoReadings,
     /// It cannot be decoded.
     Bad(String),
+    /// It is a header without the inputs of the network.
+    OtherColumns(InputError),
 }
 
 impl<'a> MeasuredAnswers<'a> {
@@ -128,49 +137,85 @@ impl<'a> MeasuredAnswers<'a> {
             file,
             compiled: CompiledNetworks::new(&file.network, rows(file)),
             fields: CsvFields::default(),
+            columns: None,
             readings: Vec::new(),
+            inputs: Vec::new(),
             answer: vec![0.0; file.targets.len()],
             form,
             has_heading: form == Form::Jsonl,
-            is_first: true,
             output: BufWriter::with_capacity(1 << 16, stdout().lock()),
         }
     }
 
-    /// Decodes a line: the inputs in their order, after the number of the row-wire where each has a network.
+    /// Decodes a line: the inputs under their names or, without a header, in their order, after the number of the row-wire
+    /// where each has a network.
     pub(super) fn write(&mut self, line: u64, text: &[u8]) -> io::Result<Answered> {
+        let byte_order_mark: &[u8] = if line == 1 { b"\xef\xbb\xbf" } else { b"" };
+        let text = text.strip_prefix(byte_order_mark).unwrap_or(text).trim_ascii();
+        if text.is_empty() {
+            return Ok(Answered::NoReadings);
+        }
         self.fields.split(text);
-        let is_first = std::mem::replace(&mut self.is_first, false);
+        let recipe = &self.file.plan.import;
+        let (inputs, row_wire) = (&self.file.inputs, recipe.row_wire.as_deref());
         self.readings.clear();
-        for (index, field) in self.fields.iter().enumerate() {
-            let number = std::str::from_utf8(field).ok().and_then(|text| text.parse().ok());
-            match number.filter(|number: &f64| number.is_finite()) {
-                Some(number) => self.readings.push(number),
-                None if is_first => return Ok(Answered::Heading),
-                None => return Ok(Answered::Bad(format!("cell {} is not a finite number", index + 1))),
+        self.readings
+            .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
+        // Only a line that is not made of numbers, or the first, may be a header: the others need no strings.
+        if self.columns.is_none() || self.readings.iter().any(|value| value.is_nan()) {
+            let cells: Vec<String> = self
+                .fields
+                .iter()
+                .map(|field| String::from_utf8_lossy(field).into_owned())
+                .collect();
+            if InputColumns::is_header(&cells, inputs, line == 1) {
+                return Ok(match InputColumns::of_header(&cells, inputs, row_wire) {
+                    Ok(columns) => {
+                        self.columns = Some(columns);
+                        Answered::NoReadings
+                    }
+                    Err(error) => Answered::OtherColumns(error),
+                });
             }
         }
         let has_rows = self.file.network.only().is_none();
-        let expected = self.file.inputs.len() + usize::from(has_rows);
-        if self.readings.len() != expected {
-            return Ok(Answered::Bad(format!(
-                "{} cells where {expected} are needed",
-                self.readings.len()
-            )));
-        }
-        let row_index = match (&self.file.row_wires, has_rows) {
-            (Some(read), true) => match read.iter().position(|row| (*row + 1) as f64 == self.readings[0]) {
-                Some(index) => index,
-                None => {
-                    return Ok(Answered::Bad(format!(
-                        "there is no network for row {}",
-                        self.readings[0]
-                    )));
-                }
+        let columns = match &self.columns {
+            Some(columns) => columns,
+            None => match InputColumns::unnamed(self.readings.len(), inputs, row_wire, has_rows) {
+                Ok(columns) => self.columns.insert(columns),
+                Err(error) => return Ok(Answered::Bad(error.to_string())),
             },
+        };
+        if self.readings.len() != columns.width {
+            let (found, expected) = (self.readings.len(), columns.width);
+            return Ok(Answered::Bad(format!("{found} cells where {expected} are needed")));
+        }
+        let used = columns
+            .inputs
+            .iter()
+            .chain(columns.row_wire.iter().filter(|_| has_rows));
+        if let Some(column) = used.copied().find(|&column| !self.readings[column].is_finite()) {
+            return Ok(Answered::Bad(format!("cell {} is not a finite number", column + 1)));
+        }
+        let row_index = match (&self.file.row_wires, columns.row_wire) {
+            (Some(read), Some(column)) if has_rows => {
+                let row = self.readings[column];
+                match read.iter().position(|read| (*read + 1) as f64 == row) {
+                    Some(index) => index,
+                    None => return Ok(Answered::Bad(format!("there is no network for row {row}"))),
+                }
+            }
+            _ if has_rows => {
+                let name = row_wire.unwrap_or("row").to_owned();
+                let near = "it has the number of the row-wire, and there is a network for each".to_owned();
+                return Ok(Answered::OtherColumns(InputError::Missing { name, near }));
+            }
             _ => 0,
         };
-        let readings = &self.readings[usize::from(has_rows)..];
+        self.inputs.clear();
+        self.inputs
+            .extend(columns.inputs.iter().map(|&column| self.readings[column]));
+        let readings = &self.inputs[..];
         let is_answered = self.compiled.decode_row(row_index, readings, &mut self.answer) == Ok(());
         if !is_answered || self.answer.iter().any(|value| !value.is_finite()) {
             return Ok(Answered::Bad(

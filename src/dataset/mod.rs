@@ -26,7 +26,7 @@ pub use division::{Division, DivisionError, Parts};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError};
 pub use per_row::PerRow;
-pub(crate) use resistance_columns::ResistanceColumns;
+pub(crate) use resistance_columns::{ResistanceColumns, number};
 pub(crate) use resistance_reader::LONGEST_ROW;
 pub use resistance_reader::{ReadError, Reading, ResistanceReader};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};

@@ -21,7 +21,7 @@ pub struct Errors {
     pub z_mm: f64,
     /// [`Self::z_mm`] in percent of the stroke, the distance a node can travel.
     pub z_full_scale_percent: f64,
-    /// Largest |decoupled z − z|, in millimetres.
+    /// Largest |decoupled z − z|, in millimetres; NaN if an answer is NaN.
     pub worst_mm: f64,
     /// Node with the largest error.
     pub worst_node: NodeAddress,
@@ -48,7 +48,7 @@ impl Errors {
         assert_eq!(truth.targets().dim(), decoupled_mm.dim());
         let mut relative = [0.0; 3];
         let mut total_z_mm = 0.0;
-        let mut worst_mm = 0.0;
+        let mut worst_mm = 0.0_f64;
         let mut worst_node = NodeAddress::default();
         let pairs = decoupled_mm.indexed_iter().zip(truth.targets());
         for (((sample, channel), decoupled), true_value) in pairs {
@@ -57,7 +57,7 @@ impl Errors {
             relative[axis] += error_mm / true_value.abs();
             if axis == 2 {
                 total_z_mm += error_mm;
-                if error_mm > worst_mm {
+                if error_mm > worst_mm || (error_mm.is_nan() && !worst_mm.is_nan()) {
                     worst_mm = error_mm;
                     worst_node = NodeAddress {
                         snapshot: truth.groups()[sample],
@@ -131,6 +131,17 @@ mod tests {
                 node: 2
             }
         );
+    }
+
+    #[test]
+    fn an_answer_of_nan_is_the_worst() {
+        let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
+        let mut decoupled = truth.targets().mapv(|value| value + 0.1);
+        decoupled[[13, 8]] = f64::NAN;
+        decoupled[[15, 2]] += 1.0;
+        let errors = Errors::measure(&truth, &decoupled, 1.0);
+        assert!(errors.worst_mm.is_nan() && errors.z_mm.is_nan());
+        assert_eq!((errors.worst_node.snapshot, errors.worst_node.row), (1, 3));
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub struct TargetErrors {
     /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these very targets,
     /// negative for worse. `None` if the target is constant, where it is undefined.
     pub r2: Option<f64>,
-    /// Largest absolute error.
+    /// Largest absolute error; NaN if an answer is NaN.
     pub worst: f64,
     /// Index of the sample with the largest error, among those measured.
     pub worst_sample: usize,
@@ -48,12 +48,12 @@ impl TargetErrors {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
                 (low.min(value), high.max(value))
             });
-        let (mut squares, mut sum, mut worst, mut worst_sample, mut variation) = (0.0, 0.0, 0.0, 0, 0.0);
+        let (mut squares, mut sum, mut worst, mut worst_sample, mut variation) = (0.0, 0.0, 0.0_f64, 0, 0.0);
         for (sample, (target, answer)) in targets.iter().zip(answers).enumerate() {
             let error = (answer - target).abs();
             squares += error * error;
             sum += error;
-            if error > worst {
+            if error > worst || (error.is_nan() && !worst.is_nan()) {
                 (worst, worst_sample) = (error, sample);
             }
             variation += (target - mean) * (target - mean);
@@ -94,6 +94,15 @@ mod tests {
             (constant.r2, constant.percent_of_range, constant.mae),
             (None, None, 0.375)
         );
+    }
+
+    #[test]
+    fn an_answer_of_nan_is_the_worst() {
+        let targets = array![[1.0], [2.0], [6.0]];
+        let answers = array![[0.0], [f64::NAN], [9.0]];
+        let errors = TargetErrors::measure(targets.view(), answers.view())[0];
+        assert!(errors.worst.is_nan() && errors.rmse.is_nan());
+        assert_eq!((errors.worst_sample, errors.r2), (1, None));
     }
 
     #[test]

@@ -117,23 +117,7 @@ impl<'a> Body<'a> {
         };
         let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
         let width = width - usize::from(empty_end && width > 1);
-        let mut columns: Vec<Column> = Vec::new();
-        for index in 0..width {
-            let header = headers.get(index).map_or("", String::as_str);
-            let (name, unit) = name_and_unit(header);
-            let wanted = if name.is_empty() {
-                format!("c{}", index + 1)
-            } else {
-                name.to_owned()
-            };
-            columns.push(Column {
-                name: wanted,
-                unit: unit.map(str::to_owned),
-                ..Column::default()
-            });
-        }
-        name_apart(&mut columns);
-        self.builders = columns
+        self.builders = named(headers, width)
             .into_iter()
             .map(|column| Builder::new(column, self.reading))
             .collect();
@@ -241,6 +225,27 @@ impl<'a> Builder<'a> {
             ..self.column
         }
     }
+}
+
+/// Returns `width` columns without cells, with names and units from the cells of the header, if there is one.
+pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
+    let mut columns: Vec<Column> = Vec::new();
+    for index in 0..width {
+        let header = headers.get(index).map_or("", String::as_str);
+        let (name, unit) = name_and_unit(header);
+        let wanted = if name.is_empty() {
+            format!("c{}", index + 1)
+        } else {
+            name.to_owned()
+        };
+        columns.push(Column {
+            name: wanted,
+            unit: unit.map(str::to_owned),
+            ..Column::default()
+        });
+    }
+    name_apart(&mut columns);
+    columns
 }
 
 /// Gives columns of the same name a number each.

@@ -2,7 +2,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
-use super::{Cure, PositionsError};
+use super::{Cure, InputError, PositionsError};
 use crate::dataset::{DatasetError, DivisionError, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
@@ -74,6 +74,14 @@ pub enum ImportError {
         text: String,
         /// Number of further cells of this column that are no numbers, in words.
         others: String,
+    },
+    /// The columns of a file are not the inputs of a network.
+    #[error("'{}': {source}", .path.display())]
+    Inputs {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its columns.
+        source: InputError,
     },
     /// A reading that a network needs is missing.
     #[error("'{}': line {line}: {name} is missing; a network needs all of its inputs, so leave the line out", .path.display())]

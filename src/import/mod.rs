@@ -44,7 +44,7 @@ pub use condition::Condition;
 pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
-pub use inputs::InputTable;
+pub use inputs::{InputColumns, InputError, InputTable};
 pub use inspected::InspectedFile;
 pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
 pub use meaning::Meaning;

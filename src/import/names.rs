@@ -1,4 +1,4 @@
-use super::{ImportError, Table};
+use super::{Column, ImportError, Table};
 
 /// A column of one of the files of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,9 +20,15 @@ const FEW: usize = 24;
 impl Names {
     /// Names the columns of the files; `stems` are those of the joined ones.
     pub(super) fn of(files: &[&Table], stems: &[String]) -> Self {
+        let columns: Vec<&[Column]> = files.iter().map(|table| table.columns.as_slice()).collect();
+        Self::of_columns(&columns, stems)
+    }
+
+    /// Names the columns of each file; `stems` are those of the joined files.
+    pub(super) fn of_columns(files: &[&[Column]], stems: &[String]) -> Self {
         let mut names = Vec::new();
-        for (file, table) in files.iter().enumerate() {
-            for (index, column) in table.columns.iter().enumerate() {
+        for (file, columns) in files.iter().enumerate() {
+            for (index, column) in columns.iter().enumerate() {
                 let name = match file.checked_sub(1) {
                     None => column.name.clone(),
                     Some(joined) => format!("{}.{}", stems[joined], column.name),

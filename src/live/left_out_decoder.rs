@@ -8,12 +8,13 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Decodes with the wires of a named fault left out, if there is one: the most probable deformation given the other readings, the noise and
-/// the prior of the scene, by the Gauss-Newton method.
+/// Decodes with the wires of a named fault left out, if there is one: the most probable deformation given the other
+/// readings, the noise and the prior of the scene, by the Gauss-Newton method.
 ///
 /// A broken row-wire is decoded from the nodes before its break, and two that touch from the mean of both. A row-wire of
-/// which nothing is known takes the mean of its neighbours' latest answers, or of the prior where nodes are independent.
-/// Decoding allocates nothing.
+/// which nothing is known takes the mean of its neighbours' answers in the same frame. Where nodes are independent, or the
+/// row is decoded alone, it takes the mean of the prior. An answer depends on the readings given and on nothing before
+/// them. Decoding allocates nothing.
 #[derive(Clone, Debug)]
 pub struct LeftOutDecoder {
     model: SensorModel,
@@ -22,10 +23,12 @@ pub struct LeftOutDecoder {
     priors: Vec<GaussianPrior>,
     one: RowFit,
     two: RowFit,
-    /// True if rows tell about their neighbours.
+    /// True if the deformations of neighbouring rows are correlated.
     has_neighbours: bool,
-    /// Latest z displacements: rows × M2, in millimetres.
-    depths_mm: Vec<f64>,
+    /// Geometric means of the readings of two rows that touch: M4.
+    shared_ohm: Vec<f64>,
+    /// Answers of a whole frame: rows × 3·M2, in millimetres.
+    frame_mm: Vec<f64>,
 }
 
 impl LeftOutDecoder {
@@ -42,7 +45,8 @@ impl LeftOutDecoder {
             one: RowFit::new(model, scene, 1)?,
             two: RowFit::new(model, scene, 2)?,
             has_neighbours: scene.loading != Loading::RandomNodes,
-            depths_mm: vec![0.0; rows.len() * model.scale.nodes_per_row()],
+            shared_ohm: vec![0.0; model.scale.columns()],
+            frame_mm: vec![0.0; rows.len() * model.scale.coordinates_per_row()],
         })
     }
 
@@ -56,34 +60,54 @@ impl LeftOutDecoder {
         self.fault
     }
 
-    fn remember(&mut self, row_index: usize, targets: &[f64]) {
-        let nodes = self.model.scale.nodes_per_row();
-        let height_mm = self.model.geometry.height_mm;
-        let depths_mm = self.depths_mm[row_index * nodes..].iter_mut();
-        depths_mm
-            .zip(targets.chunks_exact(3))
-            .for_each(|(depth, node)| *depth = height_mm - node[2]);
+    /// Returns `true` if nothing is known of a row-wire but what its neighbours say.
+    fn is_dead(&self, row: usize) -> bool {
+        self.fault.is_some_and(|fault| {
+            fault.wire == FaultyWire::Row(row) && !matches!(fault.cause, FaultCause::Broken { .. })
+        })
     }
 
-    /// The mean of the neighbours' latest answers.
-    fn interpolate(&self, row_index: usize, targets: &mut [f64]) {
-        let nodes = self.model.scale.nodes_per_row();
-        let row = self.rows[row_index];
-        for (node, target) in targets.chunks_exact_mut(3).enumerate() {
-            let mut neighbours = (0.0, 0.0);
-            for (index, &other) in self.rows.iter().enumerate() {
-                if other.abs_diff(row) == 1 {
-                    neighbours.0 += self.depths_mm[index * nodes + node];
-                    neighbours.1 += 1.0;
-                }
+    /// Sets the answer of a row to the mean depth of its neighbours in the same frame, whose answers are in
+    /// `coordinates_mm` (rows × 3·M2). Returns `false` if it has none.
+    fn interpolate(&self, row_index: usize, coordinates_mm: &mut [f64]) -> bool {
+        let (nodes, row) = (self.model.scale.nodes_per_row(), self.rows[row_index]);
+        let is_neighbour = |&index: &usize| self.rows[index].abs_diff(row) == 1;
+        let height_mm = self.model.geometry.height_mm;
+        for node in 0..nodes {
+            let (mut sum_mm, mut count) = (0.0, 0);
+            for index in (0..self.rows.len()).filter(is_neighbour) {
+                sum_mm += height_mm - coordinates_mm[3 * (index * nodes + node) + 2];
+                count += 1;
             }
-            let depth_mm = if neighbours.1 > 0.0 {
-                neighbours.0 / neighbours.1
-            } else {
-                0.0
-            };
-            target.copy_from_slice(&self.model.displaced_mm(row, node, DVec3::Z * depth_mm).to_array());
+            if count == 0 {
+                return false;
+            }
+            let depth_mm = sum_mm / f64::from(count);
+            let displaced_mm = self.model.displaced_mm(row, node, DVec3::Z * depth_mm);
+            coordinates_mm[3 * (row_index * nodes + node)..][..3].copy_from_slice(&displaced_mm.to_array());
         }
+        true
+    }
+
+    /// Decodes one row of a frame with all rows read (rows × M4, in ohm) into 3·M2 `targets`.
+    ///
+    /// # Errors
+    /// A reading that is no resistance.
+    ///
+    /// # Panics
+    /// If the frame has another length.
+    pub fn decode_row_of(&mut self, frame: &[f64], row_index: usize, targets: &mut [f64]) -> Result<(), DecodeError> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        assert_eq!(frame.len(), self.rows.len() * channels);
+        let row = self.rows[row_index];
+        if !self.fault.is_some_and(|fault| fault.wire.is_row(row)) {
+            return self.decode_row(row_index, &frame[row_index * channels..][..channels], targets);
+        }
+        let mut coordinates_mm = std::mem::take(&mut self.frame_mm);
+        let decoded = self.decode(frame, &mut coordinates_mm);
+        targets.copy_from_slice(&coordinates_mm[row_index * outputs..][..outputs]);
+        self.frame_mm = coordinates_mm;
+        decoded
     }
 }
 
@@ -113,9 +137,6 @@ impl Decoder for LeftOutDecoder {
                 self.one.solve(View { nodes, ..whole });
                 self.one.coordinates(row, 0, targets);
             }
-            (Some(FaultyWire::Row(faulty)), _) if faulty == row && self.has_neighbours => {
-                self.interpolate(row_index, targets);
-            }
             (Some(FaultyWire::Row(faulty)), _) if faulty == row => {
                 self.one.set_to(prior);
                 self.one.coordinates(row, 0, targets);
@@ -135,7 +156,47 @@ impl Decoder for LeftOutDecoder {
                 self.one.coordinates(row, 0, targets);
             }
         }
-        self.remember(row_index, targets);
+        Ok(())
+    }
+
+    /// Decodes a frame. Unlike other decoders, it does more for rows at fault than [`Self::decode_row`], which does not know
+    /// the rows next to them.
+    fn decode(&mut self, frame: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        assert_eq!(
+            (frame.len() / channels, targets.len() / outputs),
+            (self.rows.len(), self.rows.len())
+        );
+        let shorted = match self.fault.map(|fault| fault.wire) {
+            Some(FaultyWire::Rows(first)) => self.rows.iter().position(|&row| row == first),
+            _ => None,
+        };
+        let mut shared_ohm = std::mem::take(&mut self.shared_ohm);
+        let mut decoded = Ok(());
+        let rows = frame.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
+        for (row_index, (readings, targets)) in rows.enumerate() {
+            // Both of two rows that touch have the same resistances; their mean has less noise.
+            let readings = match shorted {
+                Some(first) if (first..=first + 1).contains(&row_index) => {
+                    let (one, other) = (&frame[first * channels..][..channels], &frame[(first + 1) * channels..]);
+                    for (shared, (one, other)) in shared_ohm.iter_mut().zip(one.iter().zip(other)) {
+                        *shared = one.sqrt() * other.sqrt();
+                    }
+                    &shared_ohm[..]
+                }
+                _ => readings,
+            };
+            let of_row = self.decode_row(row_index, readings, targets);
+            decoded = decoded.and(of_row.map_err(|error| DecodeError { row_index, ..error }));
+        }
+        self.shared_ohm = shared_ohm;
+        decoded?;
+        if let Some(dead) = (0..self.rows.len()).find(|&index| self.is_dead(self.rows[index]))
+            && self.has_neighbours
+        {
+            // Without neighbours the mean of the prior stays.
+            let _ = self.interpolate(dead, targets);
+        }
         Ok(())
     }
 }

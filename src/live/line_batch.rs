@@ -14,25 +14,33 @@ pub(super) struct Entry {
     pub(super) number: u64,
     /// Place in the bytes; `None` for a line that is too long.
     pub(super) place: Option<(usize, usize)>,
+    /// True if it looks like names of columns.
+    pub(super) has_names: bool,
     pub(super) read_at: Instant,
 }
 
 impl Batch {
-    /// Drops all but the newest `kept` lines if the oldest has waited too long; returns how many.
+    /// Drops all but the newest `kept` lines if the oldest has waited too long; returns how many. The latest names of
+    /// columns stay: without them the lines that follow would be taken for others.
     pub(super) fn drop_old(&mut self, now: Instant, kept: usize) -> u64 {
         let is_old = |entry: &Entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE;
         if !self.lines.front().is_some_and(is_old) || self.lines.len() <= kept {
             return 0;
         }
-        let dropped = self.lines.len() - kept;
-        self.lines.drain(..dropped);
-        // Their bytes go when the buffer is next emptied, but never grow beyond what waits.
-        if let Some(start) = self.lines.iter().find_map(|entry| entry.place).map(|(start, _)| start) {
-            self.bytes.drain(..start);
-            for (from, to) in self.lines.iter_mut().filter_map(|entry| entry.place.as_mut()) {
-                (*from, *to) = (*from - start, *to - start);
-            }
+        let mut dropped = self.lines.len() - kept;
+        let mut drained: Vec<Entry> = self.lines.drain(..dropped).collect();
+        if let Some(names) = drained.iter().rposition(|entry| entry.has_names) {
+            self.lines.push_front(drained.swap_remove(names));
+            dropped -= 1;
         }
+        // The bytes of the others go at once, so that the buffer never grows beyond what waits.
+        let mut bytes = Vec::with_capacity(self.bytes.len());
+        for (from, to) in self.lines.iter_mut().filter_map(|entry| entry.place.as_mut()) {
+            let start = bytes.len();
+            bytes.extend_from_slice(&self.bytes[*from..*to]);
+            (*from, *to) = (start, bytes.len());
+        }
+        self.bytes = bytes;
         dropped as u64
     }
 }
@@ -91,11 +99,13 @@ impl Splitter {
         };
         let is_skipped = self.number == 1 && self.skips_first && !begins_as_names(self.partial.trim_ascii());
         if !is_skipped {
+            let has_names = begins_as_names(self.partial.trim_ascii()) && self.partial.contains(&b',');
             let start = batch.bytes.len();
             batch.bytes.extend_from_slice(&self.partial);
             batch.lines.push_back(Entry {
                 number: self.number,
                 place: (!self.is_too_long).then_some((start, batch.bytes.len())),
+                has_names: has_names && !self.is_too_long,
                 read_at,
             });
         }
@@ -109,6 +119,20 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+
+    #[test]
+    fn names_of_columns_are_not_dropped() {
+        let start = Instant::now();
+        let mut batch = Batch::default();
+        let mut splitter = Splitter::default();
+        splitter.split(b"r_2,r_1\n1,2\n3,4\n5,6\n", start, &mut batch);
+        assert_eq!(batch.drop_old(start + Duration::from_millis(101), 1), 2);
+        let texts = batch.lines.iter().map(|entry| {
+            let (from, to) = entry.place.unwrap();
+            String::from_utf8_lossy(&batch.bytes[from..to]).into_owned()
+        });
+        assert!(texts.eq(["r_2,r_1", "5,6"]));
+    }
 
     #[test]
     fn the_latest_lines_win_once_the_oldest_is_too_old() {

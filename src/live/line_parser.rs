@@ -1,7 +1,7 @@
 use thiserror::Error;
 
 use crate::{
-    dataset::{CsvFields, ReadError, ResistanceColumns},
+    dataset::{CsvFields, ReadError, ResistanceColumns, number as parsed_number},
     scene::{RowModel, Rows, SceneError},
     sensor::ArrayScale,
 };
@@ -49,13 +49,21 @@ pub enum ParsedLine<'a> {
     Snapshot(&'a [f64]),
 }
 
-/// Error in a line. The next line can be read.
+/// Error in a line. The next line can be read unless the error [is final](LineError::is_final).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LineError {
     /// A field is missing or wrong.
     #[error(transparent)]
     Fields(#[from] ReadError),
+    /// The names of columns lack a resistance, or have one twice.
+    #[error("line {line}: {source}")]
+    Names {
+        /// Line number.
+        line: u64,
+        /// What is wrong with the names.
+        source: ReadError,
+    },
     /// The network does not read this row-wire.
     #[error("line {line}: it is of row {row}, but the network reads row {rows} only")]
     OtherRow {
@@ -72,6 +80,13 @@ pub enum LineError {
          before the resistances, or whole snapshots in one line"
     )]
     NoRow(u64),
+}
+
+impl LineError {
+    /// Returns `true` if the lines to come are not known to be readings of which wires, so that none should be decoded.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Names { .. } | Self::NoRow(_))
+    }
 }
 
 impl LineParser {
@@ -113,9 +128,10 @@ impl LineParser {
             return Err(ReadError::LineBreak(number).into());
         }
         self.fields.split(text);
-        if ResistanceColumns::has_name(&self.fields, self.scale.columns()) {
+        if self.has_names() {
+            let columns = ResistanceColumns::named(&self.fields, self.scale.columns());
             self.layout = Some(Layout {
-                columns: ResistanceColumns::named(&self.fields, self.scale.columns())?,
+                columns: columns.map_err(|source| LineError::Names { line: number, source })?,
                 has_names: true,
                 is_snapshot: false,
             });
@@ -144,6 +160,14 @@ impl LineParser {
                 readings_ohm: &self.readings_ohm,
             }),
         }
+    }
+
+    /// Returns `true` for a line with a name of a resistance, or with as many other texts as there are resistances.
+    fn has_names(&self) -> bool {
+        let channels = self.scale.columns();
+        let is_text = |field: &[u8]| !field.is_empty() && parsed_number(field).is_none();
+        ResistanceColumns::has_name(&self.fields, channels)
+            || (self.fields.len() >= channels.max(2) && self.fields.iter().all(is_text))
     }
 
     /// A line that is no frame takes the turn of one, for there is nothing better to assume.
@@ -252,6 +276,18 @@ mod tests {
         // Five bad lines took five turns.
         assert_eq!(parser.parse(7, b"4,5,6").unwrap(), row(Some(0), &[4.0, 5.0, 6.0]));
         assert_eq!(parser.parse(8, b"  ").unwrap(), ParsedLine::NoReadings);
+    }
+
+    #[test]
+    fn names_that_lack_a_resistance_are_refused() {
+        for (names, words) in [
+            ("time,r_1,r_2", "line 1: there is no column r_3"),
+            ("R1,R2,R3", "line 1: there is no column r_1"),
+            ("r_1,r_2,r_3,r_2", "line 1: there are two columns r_2"),
+        ] {
+            let error = parser(Rows::Known, true).parse(1, names.as_bytes()).unwrap_err();
+            assert!(error.is_final() && error.to_string().starts_with(words), "{error}");
+        }
     }
 
     #[test]

@@ -151,7 +151,9 @@ impl Lines {
         }
         self.drop_old(Instant::now());
         match self.batch.lines.pop_front() {
-            Some(Entry { number, place, read_at }) => NextLine::Line(Line {
+            Some(Entry {
+                number, place, read_at, ..
+            }) => NextLine::Line(Line {
                 number,
                 text: place.map(|(start, end)| &self.batch.bytes[start..end]),
                 read_at,

@@ -2,6 +2,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::median_polish::{Polished, median};
+use crate::scene::NoiseSource;
 
 /// Takes the unloaded state from recent frames, without erasing a contact that is held.
 ///
@@ -10,8 +11,10 @@ use super::median_polish::{Polished, median};
 /// into a common part, one of each column and one of each row by median polish (Tukey, "Exploratory Data Analysis", 1977),
 /// which a contact on less than half of the rows does not move. A row is in contact if the mean of what remains, with its
 /// own part, is below zero by more than [`ReZero::DEVIATIONS`] of its standard deviations, as the other rows or the noise
-/// tell them, or if its readings changed while the frames came. Channels of such rows take the common part and their column's
-/// only; all others take their whole ratio.
+/// tell them, or if its readings changed while the frames came by more than their noise and its steps explain, less the
+/// gain error that a snapshot has in common. Channels of such rows take the common part and their column's only; all others
+/// take their whole ratio. Where the noise is not known, it is estimated from the differences of successive frames, to which
+/// slow movement contributes little.
 ///
 /// A contact that spares less than half of the rows cannot be told from a drift, and is refused where readings move.
 #[derive(Clone, Debug)]
@@ -20,8 +23,8 @@ pub struct ReZero {
     columns: usize,
     /// Resistances at rest: rows × columns.
     rest_ohm: Vec<f64>,
-    /// Relative noise of a reading (standard deviation).
-    noise: f64,
+    /// Noise of the readings; none if it is not known.
+    noise: NoiseSource,
     /// Latest frames, oldest overwritten first: frames × rows × columns.
     frames_ohm: Vec<f64>,
     next: usize,
@@ -88,12 +91,12 @@ impl ReZero {
     /// Frames that are needed.
     pub const FRAMES: usize = 25;
 
-    /// Prepares for frames of `rest_ohm.len() / columns` rows, with their resistances at rest and the relative noise of a
-    /// reading.
+    /// Prepares for frames of `rest_ohm.len() / columns` rows, with their resistances at rest and the noise of the readings;
+    /// without noise, it is estimated from the frames.
     ///
     /// # Panics
     /// If the resistances are not whole rows, or not above 0.
-    pub fn new(rest_ohm: Vec<f64>, columns: usize, noise: f64) -> Self {
+    pub fn new(rest_ohm: Vec<f64>, columns: usize, noise: NoiseSource) -> Self {
         assert!(columns > 0 && rest_ohm.len().is_multiple_of(columns) && !rest_ohm.is_empty());
         assert!(rest_ohm.iter().all(|&ohm| ohm > 0.0));
         Self {
@@ -127,7 +130,11 @@ impl ReZero {
             let (found, needed) = (self.count, Self::FRAMES);
             return Err(ReZeroError::Frames { found, needed });
         }
-        let (ratios, moves) = self.ratios();
+        let Ratios {
+            logs: ratios,
+            moves,
+            noise,
+        } = self.ratios();
         let Polished {
             common,
             of_rows,
@@ -140,7 +147,7 @@ impl ReZero {
             of_rows[row] + of_row.iter().sum::<f64>() / self.columns as f64
         };
         let spread = median(rest.iter().map(|e| e.abs()).collect()) / NORMAL_MAD;
-        let of_mean = spread.max(self.noise / (Self::FRAMES as f64).sqrt()) / (self.columns as f64).sqrt();
+        let of_mean = spread.max(noise / (Self::FRAMES as f64).sqrt()) / (self.columns as f64).sqrt();
         let means: Vec<f64> = (0..self.rows).map(mean).collect();
         let apart = median(means.iter().map(|mean| mean.abs()).collect()) / NORMAL_MAD;
         let limit = -Self::DEVIATIONS * of_mean.max(apart);
@@ -176,26 +183,93 @@ impl ReZero {
         })
     }
 
-    /// Logarithm of the ratio of each channel's median to its resistance at rest, and whether each row's readings changed
-    /// beyond their noise: the medians of the first and the second half of the frames differ in one of its channels.
-    fn ratios(&self) -> (Vec<f64>, Vec<bool>) {
+    fn ratios(&self) -> Ratios {
         let length = self.rest_ohm.len();
-        let mut moves = vec![false; self.rows];
-        let mut ratios = Vec::with_capacity(length);
-        let half = Self::FRAMES / 2;
-        // The standard deviation of a median of n normal values is 1.2533/√n of theirs.
-        let of_difference = self.noise * 1.2533 * (2.0 / half as f64).sqrt();
-        for index in 0..length {
-            let in_order = (self.next..self.next + Self::FRAMES).map(|frame| frame % Self::FRAMES);
-            let logs = in_order.map(|frame| (self.frames_ohm[frame * length + index] / self.rest_ohm[index]).ln());
-            let logs: Vec<f64> = logs.collect();
-            let change = median(logs[..half].to_vec()) - median(logs[Self::FRAMES - half..].to_vec());
-            // A channel of a whole array may be so far apart by chance more easily than one alone.
-            moves[index / self.columns] |= change.abs() > 1.5 * Self::DEVIATIONS * of_difference;
-            ratios.push(median(logs));
+        let in_order = || (self.next..self.next + Self::FRAMES).map(|frame| frame % Self::FRAMES);
+        let of_channel = |index: usize| -> Vec<f64> {
+            let logs = in_order().map(|frame| (self.frames_ohm[frame * length + index] / self.rest_ohm[index]).ln());
+            logs.collect()
+        };
+        let mut channels: Vec<Vec<f64>> = (0..length).map(of_channel).collect();
+        let common = self.common(&channels);
+        for logs in &mut channels {
+            logs.iter_mut().zip(&common).for_each(|(log, common)| *log -= common);
         }
-        (ratios, moves)
+        let deviations = self.deviations(&channels);
+        let mut moves = vec![false; self.rows];
+        for (index, (logs, deviation)) in channels.iter().zip(&deviations).enumerate() {
+            let (from, to) = self.noise.rounded_from_ohm(self.rest_ohm[index]).unwrap_or_default();
+            let step = (to - from) / self.rest_ohm[index];
+            moves[index / self.columns] |= change(logs) > largest_change(*deviation) + step;
+        }
+        let common = median(common);
+        let squares = deviations.iter().map(|deviation| deviation * deviation);
+        Ratios {
+            logs: channels.into_iter().map(|logs| median(logs) + common).collect(),
+            moves,
+            noise: (squares.sum::<f64>() / length as f64).sqrt(),
+        }
     }
+
+    /// Logarithm of the gain error that each frame has in common; 0 where it is no noise but all rows have moved.
+    fn common(&self, channels: &[Vec<f64>]) -> Vec<f64> {
+        let middles: Vec<f64> = channels.iter().map(|logs| median(logs.clone())).collect();
+        let of_frame = |frame: usize| median(channels.iter().zip(&middles).map(|(logs, m)| logs[frame] - m).collect());
+        let common: Vec<f64> = (0..Self::FRAMES).map(of_frame).collect();
+        let drift = if self.noise.is_none() {
+            jitter(&common)
+        } else {
+            self.noise.drift()
+        };
+        if change(&common) <= largest_change(drift) {
+            common
+        } else {
+            vec![0.0; Self::FRAMES]
+        }
+    }
+
+    /// Noise of each channel relative to its reading, without the gain error in common (standard deviation).
+    fn deviations(&self, channels: &[Vec<f64>]) -> Vec<f64> {
+        if !self.noise.is_none() {
+            let own = self.rest_ohm.iter().map(|&ohm| self.noise.relative_to(ohm).own);
+            return own.collect();
+        }
+        let found: Vec<f64> = channels.iter().map(|logs| jitter(logs)).collect();
+        let middle = median(found.clone());
+        // Few frames estimate it roughly, and a contact that trembles is not to hide in it.
+        let limited = |deviation: f64| deviation.clamp(middle, 3.0 * middle);
+        found.into_iter().map(limited).collect()
+    }
+}
+
+/// Ratios of readings to those at rest.
+struct Ratios {
+    /// Logarithm of the ratio of each channel's median to its resistance at rest.
+    logs: Vec<f64>,
+    /// True for rows whose readings changed beyond their noise while the frames came.
+    moves: Vec<bool>,
+    /// Relative noise of a reading (standard deviation), of all channels.
+    noise: f64,
+}
+
+/// Frames at the beginning, and at the end, whose medians are compared.
+const HALF: usize = ReZero::FRAMES / 2;
+
+/// Difference of the medians of the first and the last values.
+fn change(values: &[f64]) -> f64 {
+    (median(values[..HALF].to_vec()) - median(values[values.len() - HALF..].to_vec())).abs()
+}
+
+/// Largest [`change`] of values with this standard deviation. That of a median of n normal values is 1.2533/√n of theirs,
+/// and a channel of a whole array may be so far apart by chance more easily than one alone.
+fn largest_change(deviation: f64) -> f64 {
+    1.5 * ReZero::DEVIATIONS * 1.2533 * (2.0 / HALF as f64).sqrt() * deviation
+}
+
+/// Standard deviation of values about a slow movement, from the differences of successive ones.
+fn jitter(values: &[f64]) -> f64 {
+    let differences = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    median(differences.collect()) / (NORMAL_MAD * 2.0_f64.sqrt())
 }
 
 impl ZeroGains {
@@ -254,9 +328,21 @@ mod tests {
     }
 
     fn re_zero(deformation: impl Fn(usize) -> Deformation, gains: &[f64], rng: &mut impl Rng) -> ReZero {
+        let noise = Noise::relative(NOISE);
+        re_zero_in(noise, noise, deformation, gains, rng)
+    }
+
+    /// Frames with `noise`, of which `assumed` is known.
+    fn re_zero_in(
+        noise: Noise,
+        assumed: Noise,
+        deformation: impl Fn(usize) -> Deformation,
+        gains: &[f64],
+        rng: &mut impl Rng,
+    ) -> ReZero {
         let model = model();
-        let source = Noise::relative(NOISE).source(&model).unwrap();
-        let mut re_zero = ReZero::new(at_rest(&model), 30, NOISE);
+        let source = noise.source(&model).unwrap();
+        let mut re_zero = ReZero::new(at_rest(&model), 30, assumed.source(&model).unwrap());
         for frame in 0..ReZero::FRAMES {
             let mut ohm = readings(&model, &deformation(frame));
             ohm.iter_mut()
@@ -337,8 +423,69 @@ mod tests {
         let moving = |frame: usize| ball.press(&model, DVec2::new(12.0, 12.0), 0.04 * frame as f64);
         let error = re_zero(moving, &[1.0; 30], &mut rng).gains().unwrap_err();
         assert!(error.to_string().contains("rows are in contact"), "{error}");
-        let new = ReZero::new(at_rest(&model), 30, NOISE);
+        let new = ReZero::new(at_rest(&model), 30, NoiseSource::default());
         assert_eq!(new.gains().unwrap_err(), ReZeroError::Frames { found: 0, needed: 25 });
+    }
+
+    /// Noise of every kind, known and not known.
+    fn noises() -> Vec<(Noise, Noise)> {
+        let additive = Noise {
+            additive_ohm: 0.2,
+            ..Noise::default()
+        };
+        let drift = Noise {
+            drift: 0.02,
+            ..Noise::relative(NOISE)
+        };
+        let converter = Noise {
+            converter_bits: Some(10),
+            ..Noise::relative(1e-4)
+        };
+        let known = [additive, drift, converter, Noise::relative(0.02)];
+        let unknown = [additive, drift, Noise::relative(NOISE), Noise::default()];
+        let known = known.map(|noise| (noise, noise));
+        known
+            .into_iter()
+            .chain(unknown.map(|noise| (noise, Noise::default())))
+            .collect()
+    }
+
+    #[test]
+    fn jitter_at_rest_is_no_contact_whatever_the_noise() {
+        let model = model();
+        for (noise, assumed) in noises() {
+            for seed in 0..10 {
+                let mut rng = Seed(seed).rng(Stream::Live);
+                let at_rest = |_| Deformation::from_fn(model.scale, |_, _| DVec3::ZERO);
+                let found = re_zero_in(noise, assumed, at_rest, &[1.0; 30], &mut rng).gains();
+                let found = found.unwrap_or_else(|error| panic!("{noise:?} {assumed:?} {seed}: {error}"));
+                assert_eq!(found.in_contact, [false; 10], "{noise:?} {assumed:?} {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_moves_is_refused_whatever_the_noise() {
+        let model = model();
+        let ball = Indenter::default();
+        let moving = |frame: usize| ball.press(&model, DVec2::new(12.0, 12.0), 0.04 * frame as f64);
+        // Readings move by a percent.
+        for (noise, assumed) in noises() {
+            let noise = Noise {
+                additive_ohm: 0.1 * noise.additive_ohm,
+                relative: 0.1 * noise.relative,
+                drift: 0.1 * noise.drift,
+                converter_bits: noise.converter_bits.map(|_| 14),
+                ..noise
+            };
+            let assumed = if assumed.is_none() { assumed } else { noise };
+            let mut rng = Seed(3).rng(Stream::Live);
+            let found = re_zero_in(noise, assumed, moving, &[1.0; 30], &mut rng).gains();
+            assert!(
+                matches!(found, Err(ReZeroError::Contact { .. })),
+                "{noise:?} {assumed:?}"
+            );
+        }
     }
 
     #[test]

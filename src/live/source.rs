@@ -104,14 +104,12 @@ impl FromStr for Source {
         if !Path::new(text).exists()
             && let Some((path, baud)) = text.rsplit_once(':')
             && let Ok(baud @ 1..) = baud.parse()
+            && (is_port(path) || path.starts_with("/dev/") || Path::new(path).exists())
         {
             let path = path.to_owned();
             return Ok(Self::Serial { path, baud });
         }
-        let is_serial = ["/dev/tty", "/dev/pts/", "/dev/cu.", "COM"]
-            .iter()
-            .any(|start| text.starts_with(start));
-        if is_serial && !Path::new(text).is_file() {
+        if is_port(text) && !Path::new(text).is_file() {
             return Err(SourceError::NoBaud(text.to_owned()));
         }
         Ok(Self::File(PathBuf::from(text)))
@@ -173,6 +171,18 @@ impl Source {
     }
 }
 
+/// Returns `true` for a name that systems give to serial ports: `COM` and digits on Windows, a path in `/dev` elsewhere.
+fn is_port(name: &str) -> bool {
+    let bare = name.strip_prefix(r"\\.\").unwrap_or(name);
+    let is_numbered = bare
+        .split_at_checked(3)
+        .is_some_and(|(com, number)| com.eq_ignore_ascii_case("COM") && number.parse::<u16>().is_ok());
+    is_numbered
+        || ["/dev/tty", "/dev/pts/", "/dev/cu.", "/dev/rfcomm", "/dev/serial/"]
+            .iter()
+            .any(|start| name.starts_with(start))
+}
+
 /// Longest wait for a byte.
 const TIMEOUT: Duration = Duration::from_millis(200);
 
@@ -214,6 +224,11 @@ mod tests {
         for (text, expected) in [
             ("-", Source::StandardInput),
             ("frames.csv", Source::File("frames.csv".into())),
+            // Files that are not there, whatever their names begin with.
+            ("COMPARISON.csv", Source::File("COMPARISON.csv".into())),
+            ("COM", Source::File("COM".into())),
+            ("COM1.csv", Source::File("COM1.csv".into())),
+            ("press at 12:30", Source::File("press at 12:30".into())),
             ("tcp:localhost:5000", Source::Tcp("localhost:5000".to_owned())),
             ("tcp:[::1]:5000", Source::Tcp("[::1]:5000".to_owned())),
             ("/dev/ttyUSB0:115200", serial("/dev/ttyUSB0", 115_200)),
@@ -223,6 +238,7 @@ mod tests {
         }
         for (text, words) in [
             ("/dev/ttyUSB0", "give /dev/ttyUSB0:115200"),
+            ("COM3", "give COM3:115200"),
             ("tcp:5000", "tcp:HOST:PORT"),
             ("tcp:host:99999", "tcp:HOST:PORT"),
         ] {

@@ -343,6 +343,40 @@ fn a_socket_is_read_until_it_closes_and_says_which_row() {
 }
 
 #[test]
+fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error() {
+    let folder = trained("--rows known");
+    let readings = read(&folder, "readings.csv");
+    let names = readings.lines().next().unwrap();
+    for (text, words) in [
+        (readings.replacen("r_3", "volt", 1), "line 1: there is no column r_3"),
+        (
+            "R1,R2,R3,R4,R5,R6\n1,2,3,4,5,6\n".to_owned(),
+            "line 1: there is no column r_1",
+        ),
+        (String::new(), "no line could be decoded: it has no line of readings"),
+        (format!("{names}\n"), "no line could be decoded"),
+        (
+            "hello\n1,2\n".to_owned(),
+            "no line could be decoded: line 1: 1 columns where 7",
+        ),
+    ] {
+        fs::write(folder.path().join("bad.csv"), &text).unwrap();
+        let output = decoupler(
+            "decode --network n.json --follow --noise 1e-3 --input bad.csv",
+            folder.path(),
+        );
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(
+            (output.status.code(), &output.stdout[..]),
+            (Some(1), &b""[..]),
+            "{message}"
+        );
+        let errors: Vec<&str> = message.lines().filter(|line| line.starts_with("error")).collect();
+        assert!(errors.len() == 1 && errors[0].contains(words), "{message}");
+    }
+}
+
+#[test]
 fn sources_that_do_not_open_are_explained_in_one_line() {
     let folder = trained("");
     for (input, status, words) in [
@@ -351,6 +385,8 @@ fn sources_that_do_not_open_are_explained_in_one_line() {
         ("tcp:localhost", 2, "give tcp:HOST:PORT"),
         ("tcp:127.0.0.1:1", 1, "cannot connect to 'tcp:127.0.0.1:1'"),
         ("no-such-file.csv", 1, "cannot open 'no-such-file.csv'"),
+        ("COMPARISON.csv", 1, "cannot open 'COMPARISON.csv'"),
+        ("missing.csv:1", 1, "cannot open 'missing.csv:1'"),
     ] {
         let output = decoupler(
             &format!("decode --network n.json --follow --noise 1e-3 --input {input}"),

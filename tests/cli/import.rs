@@ -163,7 +163,7 @@ fn a_network_of_own_data_decodes_files_and_lines_under_its_names() {
         .stdin
         .take()
         .unwrap()
-        .write_all(format!("a,b,c\n{readings}1,2\n").as_bytes())
+        .write_all(format!("c2,c3,c4\n{readings}1,2\n").as_bytes())
         .unwrap();
     let output = follow.wait_with_output().unwrap();
     let followed = String::from_utf8(output.stdout).unwrap();
@@ -176,6 +176,95 @@ fn a_network_of_own_data_decodes_files_and_lines_under_its_names() {
         2,
     );
     assert!(message.contains("--follow"), "{message}");
+}
+
+/// A network of the inputs x1 and x2, `n.json`; y = x1 - 2 x2.
+fn with_two_inputs() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let value = |k: u32, by: u32| f64::from(k * by % 101) / 50.0 - 1.0;
+    let rows = (0..200).map(|k| {
+        let (x1, x2) = (value(k, 37), value(k, 53));
+        format!("{x1},{x2},{}\n", x1 - 2.0 * x2)
+    });
+    let text = format!("x1 (V),x2,y\n{}", rows.collect::<String>());
+    fs::write(folder.path().join("train.csv"), text).unwrap();
+    let train = "train --data train.csv --inputs x1,x2 --targets y --hidden 4 --epochs 30 --out n.json --json";
+    json(train, folder.path());
+    folder
+}
+
+#[test]
+fn columns_are_matched_by_name_in_files_and_streams() {
+    let folder = with_two_inputs();
+    let write = |text: &str| fs::write(folder.path().join("in.csv"), text).unwrap();
+    let follow = || decoupler("decode --network n.json --follow --input in.csv", folder.path());
+    let decode = || decoupler("decode --network n.json --input in.csv --output out.csv", folder.path());
+    let answers = |text: &str| {
+        let lines = text.lines().skip(1);
+        lines
+            .map(|line| line.split(',').next().unwrap().parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let expected = [0.7, -1.1, 0.1];
+    for text in [
+        "x1,x2\n0.5,-0.1\n-0.3,0.4\n0.9,0.4\n",
+        "x2,x1\n-0.1,0.5\n0.4,-0.3\n0.4,0.9\n",
+        "time,note,x2,x1 (V)\n0,a,-0.1,0.5\n1,b,0.4,-0.3\n2,c,0.4,0.9\n",
+        "\u{feff}\"x2\",x1\r\n-0.1,0.5\r\n0.4,-0.3\r\n0.4,0.9\r\n",
+        "0.5,-0.1\n-0.3,0.4\n0.9,0.4\n",
+    ] {
+        write(text);
+        let output = follow();
+        assert!(
+            output.status.success(),
+            "{text}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let followed = answers(&String::from_utf8(output.stdout).unwrap());
+        let output = decode();
+        assert!(
+            output.status.success(),
+            "{text}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let decoded = answers(&fs::read_to_string(folder.path().join("out.csv")).unwrap());
+        for found in [followed, decoded] {
+            assert_eq!(found.len(), 3, "{text}");
+            let pairs = found.iter().zip(expected);
+            assert!(
+                pairs.into_iter().all(|(one, other)| (one - other).abs() < 0.05),
+                "{text}: {found:?}"
+            );
+        }
+    }
+    for (text, words) in [
+        ("x1,z\n0.5,-0.1\n", "there is no column 'x2'"),
+        ("a,b\n0.5,-0.1\n", "there is no column 'x1'"),
+        (
+            "x2,x1 (mV)\n-0.1,0.5\n",
+            "column 'x1' is in mV, and the network was trained on V",
+        ),
+        ("1,2,3\n4,5,6\n", "3 cells where 2 are needed"),
+    ] {
+        write(text);
+        for output in [follow(), decode()] {
+            let message = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(1), "{message}");
+            let errors: Vec<&str> = message.lines().filter(|line| line.starts_with("error")).collect();
+            assert!(errors.len() == 1 && errors[0].contains(words), "{message}");
+            assert!(output.stdout.is_empty());
+        }
+    }
+    // Names may come again, in another order.
+    write("x1,x2\n0.5,-0.1\nx2,x1\n0.4,-0.3\n0.4,0.9\n");
+    let followed = answers(&String::from_utf8(follow().stdout).unwrap());
+    assert!(
+        followed
+            .iter()
+            .zip(expected)
+            .all(|(one, other)| (one - other).abs() < 0.05),
+        "{followed:?}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use decoupler::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
-    live::{FaultCause, FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
+    live::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
     scene::{Deformation, Fault, FaultySensor, Indenter, Loading, Noise, Scene},
     sensor::SensorModel,
 };
@@ -234,6 +234,152 @@ fn sound_frames_raise_no_alarm_and_two_faults_are_not_taken_for_one() {
         events.extend(monitor.check(&frame_ohm));
     }
     assert_eq!(events, [FaultEvent::Unexplained]);
+}
+
+/// Independent frames of `scene`, row by row, with `fault` if there is one.
+fn frames(
+    sensor: &SensorModel,
+    scene: &Scene,
+    fault: Option<Fault>,
+    count: usize,
+    mut take: impl FnMut(&[f64], &Deformation),
+) {
+    let (mut rng, mut noise_rng) = (Seed(3).rng(Stream::Live), Seed(3).rng(Stream::LiveNoise));
+    let rows: Vec<usize> = (0..sensor.scale.rows()).collect();
+    let columns = sensor.scale.columns();
+    let source = scene.noise.source(sensor).unwrap();
+    let faulty = fault.map(|fault| FaultySensor::new(sensor, scene.noise, fault).unwrap());
+    let sampler = scene.sampler(sensor);
+    let mut frame_ohm = vec![0.0; rows.len() * columns];
+    for _ in 0..count {
+        let deformation = sampler.draw(&mut rng);
+        for (&row, ohm) in rows.iter().zip(frame_ohm.chunks_exact_mut(columns)) {
+            sensor.row_resistances_into(row, deformation.row_mm(row), ohm).unwrap();
+        }
+        if let Some(faulty) = &faulty {
+            faulty.before_noise(&rows, &deformation, &mut frame_ohm);
+        }
+        source.disturb(&mut frame_ohm, &mut noise_rng);
+        take(&frame_ohm, &deformation);
+    }
+}
+
+/// Two row-wires that touch have readings that Eq. (2) explains: only that they stay equal gives them away.
+#[test]
+fn rows_that_touch_are_named_by_readings_that_stay_equal_and_forgotten_when_they_differ() {
+    let sensor = SensorModel::new("6x4_2x12".parse().unwrap());
+    for loading in ["random", "smooth:4", "indenter:sphere"] {
+        let scene = Scene {
+            noise: Noise {
+                drift: 0.01,
+                ..Noise::relative(1e-3)
+            },
+            loading: loading.parse().unwrap(),
+            ..Scene::default()
+        };
+        let mut monitor = FaultMonitor::new(&sensor, &scene, &[0, 1, 2, 3, 4, 5]).unwrap();
+        let mut events = Vec::new();
+        let mut check = |frame_ohm: &[f64], _: &Deformation| events.extend(monitor.check(frame_ohm));
+        frames(&sensor, &scene, None, 300, &mut check);
+        frames(
+            &sensor,
+            &scene,
+            Some("short-rows:3-4".parse().unwrap()),
+            100,
+            &mut check,
+        );
+        frames(&sensor, &scene, None, 50, &mut check);
+        let [FaultEvent::Named(named), FaultEvent::Recovered] = events[..] else {
+            panic!("{loading}: {events:?}");
+        };
+        assert_eq!(
+            (named.wire, named.cause),
+            (FaultyWire::Rows(2), FaultCause::Shorted),
+            "{loading}"
+        );
+        assert!(named.probability >= FaultMonitor::SURE);
+    }
+}
+
+/// Rows on both sides of the columns' middle read the same at rest, or wherever they are pressed alike.
+#[test]
+fn equal_readings_of_symmetric_rows_at_rest_or_under_a_held_press_are_no_short() {
+    let mut sensor = SensorModel::new("2x4_2x12".parse().unwrap());
+    sensor.geometry.row_x0_mm = 16.0;
+    let scene = Scene {
+        noise: Noise::relative(1e-3),
+        loading: Loading::Indenter(Indenter::default()),
+        ..Scene::default()
+    };
+    let source = scene.noise.source(&sensor).unwrap();
+    let mut monitor = FaultMonitor::new(&sensor, &scene, &[0, 1]).unwrap();
+    let mut rng = Seed(1).rng(Stream::LiveNoise);
+    for depth_mm in [0.0, 0.7] {
+        let pressed = vec![DVec3::Z * depth_mm; 4];
+        let rows = [0, 1].map(|row| sensor.row_resistances(row, &pressed).unwrap());
+        assert!(
+            rows[0]
+                .iter()
+                .zip(&rows[1])
+                .all(|(one, other)| (one / other - 1.0).abs() < 1e-12)
+        );
+        for frame in 0..500 {
+            let mut frame_ohm = rows.concat();
+            source.disturb(&mut frame_ohm, &mut rng);
+            assert_eq!(monitor.check(&frame_ohm), None, "{depth_mm} {frame}");
+        }
+    }
+}
+
+#[test]
+fn an_answer_without_a_wire_depends_on_no_frame_before() {
+    let (sensor, scene) = sensor_and_scene();
+    let rows = Vec::from_iter(0..10);
+    let mut decoder = LeftOutDecoder::new(&sensor, &scene, &rows).unwrap();
+    let mut all_ohm = Vec::new();
+    frames(&sensor, &scene, None, 6, |frame_ohm, _| {
+        all_ohm.push(frame_ohm.to_vec())
+    });
+    for (wire, cause) in [
+        (FaultyWire::Row(4), FaultCause::NoSignal),
+        (FaultyWire::Row(0), FaultCause::Unknown),
+        (FaultyWire::Rows(3), FaultCause::Shorted),
+        (FaultyWire::Column(2), FaultCause::NoSignal),
+    ] {
+        decoder.leave_out(Some(Diagnosis {
+            wire,
+            cause,
+            probability: 1.0,
+        }));
+        let mut decode = |frame_ohm: &[f64]| {
+            let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+            decoder.decode(frame_ohm, &mut answer_mm).unwrap();
+            for row in 0..10 {
+                let mut of_row = vec![0.0; decoder.outputs()];
+                decoder.decode_row_of(frame_ohm, row, &mut of_row).unwrap();
+                assert_eq!(
+                    of_row,
+                    answer_mm[row * decoder.outputs()..][..of_row.len()],
+                    "{wire} {row}"
+                );
+            }
+            answer_mm
+        };
+        let forwards: Vec<_> = all_ohm.iter().map(|frame_ohm| decode(frame_ohm)).collect();
+        let mut backwards: Vec<_> = all_ohm.iter().rev().map(|frame_ohm| decode(frame_ohm)).collect();
+        backwards.reverse();
+        assert_eq!(forwards, backwards, "{wire}");
+    }
+    // A row without signal is between its neighbours.
+    decoder.leave_out(Some(Diagnosis {
+        wire: FaultyWire::Row(4),
+        cause: FaultCause::NoSignal,
+        probability: 1.0,
+    }));
+    let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+    decoder.decode(&all_ohm[0], &mut answer_mm).unwrap();
+    let z_mm = |row: usize| answer_mm[row * decoder.outputs() + 2];
+    assert!((z_mm(4) - 0.5 * (z_mm(3) + z_mm(5))).abs() < 1e-12);
 }
 
 /// Errors in mm of z, of frames that the fault spoils, with all wires and without those at fault.

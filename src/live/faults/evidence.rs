@@ -15,6 +15,21 @@ struct Hypothesis {
     score: f64,
     /// χ² of all readings.
     chi_squared: f64,
+    /// Number of readings in it.
+    readings: usize,
+    /// Number of fits of rows in it, each with its prior.
+    rows: usize,
+}
+
+/// The most probable fault.
+pub(super) struct Explained {
+    pub(super) diagnosis: Diagnosis,
+    /// χ² of the readings that it does not leave open.
+    pub(super) chi_squared: f64,
+    /// Number of these readings.
+    pub(super) readings: usize,
+    /// Number of fits of rows, each with its prior.
+    pub(super) rows: usize,
 }
 
 /// Compares the faults that a single wire can have by their evidence in the same frames.
@@ -53,8 +68,8 @@ struct Predicted {
 }
 
 impl Evidence<'_> {
-    /// Returns the most probable fault and its χ².
-    pub(super) fn compare(mut self) -> Option<(Diagnosis, f64)> {
+    /// Returns the most probable fault.
+    pub(super) fn compare(mut self) -> Option<Explained> {
         let sound: Vec<Fitted> = (0..self.lines())
             .map(|line| self.fit(line, [None; 2], self.nodes_per_row))
             .collect();
@@ -83,7 +98,12 @@ impl Evidence<'_> {
             cause: best.cause,
             probability: of_wire.map(weight).sum::<f64>() / all,
         };
-        Some((diagnosis, best.chi_squared))
+        Some(Explained {
+            diagnosis,
+            chi_squared: best.chi_squared,
+            readings: best.readings,
+            rows: best.rows,
+        })
     }
 
     /// Rows of all frames.
@@ -124,12 +144,16 @@ impl Evidence<'_> {
             let lines: Vec<usize> = (index..self.lines()).step_by(self.rows.len()).collect();
             let of_row = sum_of(sound, &lines);
             let rest = (total.score - of_row.score, total.chi_squared - of_row.chi_squared);
-            let mut add = |wire, cause, score: f64, chi_squared: f64| {
+            let (rest_readings, rest_rows) = (total.readings - of_row.readings, self.lines() - lines.len());
+            let mut add = |wire, cause, score: f64, chi_squared: f64, readings: usize| {
+                let is_fitted = matches!(cause, FaultCause::Broken { .. });
                 hypotheses.push(Hypothesis {
                     wire,
                     cause,
                     score: rest.0 + score,
                     chi_squared: rest.1 + chi_squared,
+                    readings: rest_readings + readings,
+                    rows: rest_rows + if is_fitted { lines.len() } else { 0 },
                 });
             };
             let wire = FaultyWire::Row(row);
@@ -141,8 +165,8 @@ impl Evidence<'_> {
                 misfit,
                 variance: self.one.deviation(row, k).powi(2),
             });
-            let (score, chi_squared) = self.no_signal(readings);
-            add(wire, FaultCause::NoSignal, score, chi_squared);
+            let (score, chi_squared, count) = self.no_signal(readings);
+            add(wire, FaultCause::NoSignal, score, chi_squared, count);
             for before_node in 1..self.nodes_per_row {
                 let broken: Vec<Fitted> = lines
                     .iter()
@@ -154,10 +178,11 @@ impl Evidence<'_> {
                     FaultCause::Broken { before_node },
                     broken.score,
                     broken.chi_squared,
+                    broken.readings,
                 );
             }
             let unknown = 2.0 * WIDTH.ln() * (lines.len() * self.columns) as f64;
-            add(wire, FaultCause::Unknown, unknown, 0.0);
+            add(wire, FaultCause::Unknown, unknown, 0.0, 0);
             if let Some(next) = self.rows.iter().position(|&other| other == row + 1) {
                 let next_lines: Vec<usize> = (next..self.lines()).step_by(self.rows.len()).collect();
                 let of_next = sum_of(sound, &next_lines);
@@ -169,6 +194,9 @@ impl Evidence<'_> {
                     cause: FaultCause::Shorted,
                     score: rest.0 - of_next.score + both.score,
                     chi_squared: rest.1 - of_next.chi_squared + both.chi_squared,
+                    readings: rest_readings - of_next.readings + both.readings,
+                    // Both rows have a prior in one fit.
+                    rows: self.lines(),
                 });
             }
         }
@@ -196,6 +224,7 @@ impl Evidence<'_> {
         Fitted {
             score: score + fitted.score,
             chi_squared: chi_squared + fitted.chi_squared,
+            readings: self.columns + fitted.readings,
         }
     }
 
@@ -245,6 +274,7 @@ impl Evidence<'_> {
             rest: Fitted {
                 score: 0.0,
                 chi_squared: 0.0,
+                readings: 0,
             },
             predicted: vec![Vec::new(); self.nodes_per_column],
             shared: Vec::new(),
@@ -254,6 +284,7 @@ impl Evidence<'_> {
             let fitted = self.fit(line, left_out, self.nodes_per_row);
             found.rest.score += fitted.score;
             found.rest.chi_squared += fitted.chi_squared;
+            found.rest.readings += fitted.readings;
             let row = self.row(line);
             let noise = self.one.deviation(row, first).powi(2);
             found.noise.push(noise);
@@ -285,25 +316,28 @@ impl Evidence<'_> {
         found
     }
 
-    /// Score and χ² of logarithms of readings that do not depend on the deformation: all at the end of the converter's
+    /// Score, χ² and number of the logarithms of readings that do not depend on the deformation: all at the end of the converter's
     /// range, which is certain without any current, or at another level.
-    fn no_signal(&self, readings: impl Iterator<Item = Predicted> + Clone) -> (f64, f64) {
+    fn no_signal(&self, readings: impl Iterator<Item = Predicted> + Clone) -> (f64, f64, usize) {
         let full_scale = self.one.log_full_scale();
         if readings.clone().all(|reading| reading.misfit < full_scale) {
-            let level = Level::of(readings);
-            return (level.score, level.chi_squared);
+            let level = Level::of(readings.clone());
+            // Its level is fitted.
+            return (level.score, level.chi_squared, readings.count().saturating_sub(1));
         }
         let below = readings.filter(|reading| reading.misfit < full_scale);
         let square = |reading: &Predicted| (reading.misfit - full_scale).powi(2) / reading.variance;
         let chi_squared = below.clone().map(|reading| square(&reading)).sum::<f64>();
-        let noise: f64 = below.map(|reading| (TAU * reading.variance).ln()).sum();
-        (chi_squared + noise, chi_squared)
+        let noise: f64 = below.clone().map(|reading| (TAU * reading.variance).ln()).sum();
+        (chi_squared + noise, chi_squared, below.count())
     }
 
     /// Faults of one column-wire.
     fn add_column(&self, column: usize, left_out: &ColumnLeftOut, hypotheses: &mut Vec<Hypothesis>) {
-        let mut add = |cause, score: f64, chi_squared: f64| {
+        let mut add = |cause, score: f64, chi_squared: f64, count: usize| {
             hypotheses.push(Hypothesis {
+                readings: left_out.rest.readings + count,
+                rows: left_out.noise.len(),
                 wire: FaultyWire::Column(column),
                 cause,
                 score: left_out.rest.score + score,
@@ -312,18 +346,25 @@ impl Evidence<'_> {
         };
         let readings = self.log_readings(column);
         let constant = readings.iter().zip(&left_out.noise);
-        let (score, chi_squared) = self.no_signal(constant.map(|(&misfit, &variance)| Predicted { misfit, variance }));
-        add(FaultCause::NoSignal, score, chi_squared);
+        let constant = constant.map(|(&misfit, &variance)| Predicted { misfit, variance });
+        let (score, chi_squared, count) = self.no_signal(constant);
+        add(FaultCause::NoSignal, score, chi_squared, count);
         for (before_node, predicted) in left_out.predicted.iter().enumerate().skip(1) {
             let predicted = predicted.iter().flatten();
             let chi_squared: f64 = predicted.clone().map(|p| p.misfit * p.misfit / p.variance).sum();
-            let score = chi_squared + predicted.map(|p| (TAU * p.variance).ln()).sum::<f64>();
-            add(FaultCause::Broken { before_node }, score, chi_squared);
+            let score = chi_squared + predicted.clone().map(|p| (TAU * p.variance).ln()).sum::<f64>();
+            add(
+                FaultCause::Broken { before_node },
+                score,
+                chi_squared,
+                predicted.count(),
+            );
         }
         let gain = Level::of(left_out.predicted[0].iter().flatten().copied());
         let relative = gain.mean.exp() - 1.0;
-        add(FaultCause::Gain { relative }, gain.score, gain.chi_squared);
-        add(FaultCause::Unknown, 2.0 * WIDTH.ln() * readings.len() as f64, 0.0);
+        let count = readings.len().saturating_sub(1);
+        add(FaultCause::Gain { relative }, gain.score, gain.chi_squared, count);
+        add(FaultCause::Unknown, 2.0 * WIDTH.ln() * readings.len() as f64, 0.0, 0);
     }
 }
 
@@ -346,6 +387,8 @@ impl ColumnLeftOut {
             cause: FaultCause::Shorted,
             score,
             chi_squared,
+            readings: self.rest.readings + 2 * self.noise.len(),
+            rows: self.noise.len(),
         }
     }
 }
@@ -378,6 +421,7 @@ fn sum(fits: &[Fitted]) -> Fitted {
     Fitted {
         score: fits.iter().map(|fit| fit.score).sum(),
         chi_squared: fits.iter().map(|fit| fit.chi_squared).sum(),
+        readings: fits.iter().map(|fit| fit.readings).sum(),
     }
 }
 

@@ -7,6 +7,7 @@ mod monitor;
 mod prior;
 mod row_fit;
 mod row_prediction;
+mod shorts;
 
 pub use diagnosis::{Diagnosis, FaultCause, FaultyWire};
 pub use monitor::{FaultEvent, FaultMonitor};

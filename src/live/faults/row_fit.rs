@@ -75,6 +75,8 @@ pub(in crate::live) struct Fitted {
     pub(super) score: f64,
     /// Smallest χ².
     pub(super) chi_squared: f64,
+    /// Number of readings that were used: neither left out nor clipped.
+    pub(super) readings: usize,
 }
 
 /// Noise below which none is assumed: the model is no better.
@@ -169,6 +171,7 @@ impl RowFit {
         Fitted {
             score: chi_squared + self.cholesky.log_determinant() - of_priors - of_gain + noise,
             chi_squared,
+            readings: self.weights.iter().filter(|weight| **weight > 0.0).count(),
         }
     }
 

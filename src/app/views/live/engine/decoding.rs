@@ -63,6 +63,11 @@ impl Decoding {
         let y_mm: Vec<f64> = nodes.map(|node| sensor.geometry.node_y_mm(scale, node)).collect();
         let surface = SurfaceMap::new(&x_mm, &y_mm).map_err(|error| error.to_string())?;
         let height_mm = sensor.geometry.height_mm;
+        let noise = scene
+            .noise
+            .in_test()
+            .source(&sensor)
+            .map_err(|error| error.to_string())?;
         let answer_mm = vec![0.0; rows.len() * scale.coordinates_per_row()];
         Ok(Self {
             compiled: CompiledNetworks::new(&network.network, rows.len()),
@@ -70,7 +75,7 @@ impl Decoding {
             sensor,
             surface: Arc::new(surface),
             z_range_mm: height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm,
-            re_zero: ReZero::new(rest_ohm.clone(), scale.columns(), scene.noise.relative),
+            re_zero: ReZero::new(rest_ohm.clone(), scale.columns(), noise),
             zero: zero.filter(|zero| zero.is_sound(rows.len(), scale.columns())),
             watch: Watch::new(&sensor, scene, &rows).map_err(|error| error.to_string())?,
             frame_ohm: rest_ohm.clone(),
@@ -104,20 +109,21 @@ impl Decoding {
         if let Some(zero) = &self.zero {
             zero.apply(&mut frame_ohm);
         }
-        let decoded = self.decode_zeroed(&frame_ohm, truth, now);
+        let decoded = self.decode_zeroed(readings_ohm, &frame_ohm, truth, now);
         self.frame_ohm = frame_ohm;
         decoded
     }
 
     fn decode_zeroed(
         &mut self,
+        readings_ohm: &[f64],
         frame_ohm: &[f64],
         truth: Option<&Deformation>,
         now: Instant,
     ) -> Result<Option<f64>, String> {
         let by_all = self.compiled.decode(frame_ohm, &mut self.by_all_mm);
         by_all.map_err(|error| error.to_string())?;
-        if self.watch.check(frame_ohm, now) {
+        if self.watch.check(readings_ohm, frame_ohm, now) {
             self.since_named = Default::default();
         }
         let is_left_out = self.watch.decode(frame_ohm, &mut self.answer_mm);

@@ -88,6 +88,7 @@ fn read_lines(
                     all_ohm.append(&mut frame_ohm);
                 }
             }
+            Err(error) if error.is_final() => return Err(error.to_string()),
             Err(error) => tally.bad(error.to_string()),
         }
     }
@@ -141,6 +142,13 @@ mod tests {
                 ndarray::array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
             );
         }
+    }
+
+    #[test]
+    fn names_that_lack_a_resistance_are_refused() {
+        let (refused, _) = read(b"time,r_1,r_2\n1,2,3\n4,5,6\n", Rows::Known);
+        let message = refused.unwrap_err();
+        assert!(message.contains("line 1: there is no column r_3"), "{message}");
     }
 
     #[test]

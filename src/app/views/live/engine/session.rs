@@ -59,6 +59,12 @@ impl Session {
             }
             Next::Nothing if self.source.is_stream() => self.has_news |= self.tally.falls_silent(Instant::now()),
             Next::Nothing => {}
+            // Nothing was shown, and the view would say nothing of why.
+            Next::End(Ok(())) if self.tally.counts().decoded == 0 => {
+                let reason = self.tally.counts().last_bad;
+                let reason = reason.unwrap_or_else(|| "it has no line of readings".to_owned());
+                return Some(Err(format!("no line could be decoded: {reason}")));
+            }
             Next::End(end) => return Some(end),
         }
         None

@@ -6,7 +6,7 @@ use std::{
 use super::{counts::Tally, frame_source::Next, message::Arrived};
 use crate::{
     dataset::system_cause,
-    live::{Keeping, LineError, LineParser, Lines, NextLine, ParsedLine, Source},
+    live::{Keeping, LineParser, Lines, NextLine, ParsedLine, Source},
     scene::Rows,
     sensor::ArrayScale,
 };
@@ -15,6 +15,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct StreamFrames {
     name: String,
+    begins_anywhere: bool,
     lines: Lines,
     parser: LineParser,
     columns: usize,
@@ -42,6 +43,7 @@ impl StreamFrames {
         lines.set_kept(read);
         Ok(Self {
             name: source.to_string(),
+            begins_anywhere: source.begins_anywhere(),
             lines,
             parser,
             columns: scale.columns(),
@@ -96,7 +98,9 @@ impl StreamFrames {
                 frame_ohm.copy_from_slice(&self.latest_ohm);
                 false
             }
-            Err(error @ LineError::NoRow(_)) => return Next::End(Err(format!("{}: {error}", self.name))),
+            Err(error) if error.is_final() && !(self.begins_anywhere && number == 1) => {
+                return Next::End(Err(format!("{}: {error}", self.name)));
+            }
             Err(error) => return Next::Bad(error.to_string()),
         };
         if is_snapshot {

@@ -64,14 +64,14 @@ impl Watch {
         }
     }
 
-    /// Checks a frame, unless another was checked just now. Returns `true` if another fault is named than before.
-    pub(super) fn check(&mut self, frame_ohm: &[f64], now: Instant) -> bool {
+    /// Checks a frame, which came as `raw_ohm` and was divided by the gains of the unloaded state, unless another was checked just now. Returns `true` if another fault is named than before.
+    pub(super) fn check(&mut self, raw_ohm: &[f64], frame_ohm: &[f64], now: Instant) -> bool {
         let Some(parts) = &mut self.parts else { return false };
         let is_due = |checked: Instant| now.saturating_duration_since(checked) >= BETWEEN_CHECKS;
         if !self.checked.is_none_or(is_due) {
             return false;
         }
-        let Some(event) = parts.monitor.check(frame_ohm) else {
+        let Some(event) = parts.monitor.check_zeroed(raw_ohm, frame_ohm) else {
             self.checked = Some(Instant::now());
             return false;
         };
