@@ -1,13 +1,15 @@
 //! Work of the interface thread for each frame of the window, without a GPU: layout and tessellation, at rest, under a
 //! moving pointer and while a network trains; and the first frame. Drawing the triangles is the renderer's and not counted.
 //!
-//! `cargo bench --bench interface`
+//! `cargo bench --bench interface`, or with `-- own-data` the recordings alone.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
 mod clock;
+mod own_data;
 
 use std::{
+    path::PathBuf,
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -18,7 +20,7 @@ use decoupler::{
     figure::{EpochOutline, loss_figure},
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
-use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, pos2, vec2};
+use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, accesskit::TreeUpdate, pos2, vec2};
 
 /// Time between two frames of a screen.
 const FRAME: Duration = Duration::from_millis(16);
@@ -30,6 +32,10 @@ struct Bench {
     ctx: Context,
     window: DecouplerWindow,
     begun: Instant,
+    /// Files dropped on the window in the next frame.
+    dropped: Vec<PathBuf>,
+    /// What the last frame says to assistive technology, if that was asked for.
+    nodes: Option<TreeUpdate>,
 }
 
 impl Bench {
@@ -37,7 +43,13 @@ impl Bench {
         let ctx = Context::default();
         let window = DecouplerWindow::new(&ctx, DialogKind::None, None);
         let begun = Instant::now();
-        Self { ctx, window, begun }
+        Self {
+            ctx,
+            window,
+            begun,
+            dropped: Vec::new(),
+            nodes: None,
+        }
     }
 
     fn state(&self) -> &Shared {
@@ -50,6 +62,7 @@ impl Bench {
             screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), vec2(1440.0, 900.0))),
             time: Some(self.begun.elapsed().as_secs_f64()),
             events,
+            dropped_files: self.dropped.drain(..).map(own_data::dropped).collect(),
             ..RawInput::default()
         };
         let begun = Instant::now();
@@ -60,6 +73,7 @@ impl Bench {
         let primitives = ctx.tessellate(shapes, output.pixels_per_point);
         let taken = begun.elapsed();
         std::hint::black_box(primitives);
+        self.nodes = output.platform_output.accesskit_update.take();
         output.drop_without_applying_deltas();
         taken
     }
@@ -171,6 +185,10 @@ fn long_training() {
 }
 
 fn main() {
+    if std::env::args().any(|argument| argument == "own-data") {
+        clock::print_head();
+        return own_data::measure();
+    }
     let begun = Instant::now();
     let mut bench = Bench::open();
     let first = bench.frame(Vec::new());
@@ -220,4 +238,5 @@ fn main() {
         bench.wait(|state| matches!(state.phase, Phase::Ended(_)));
     }
     long_training();
+    own_data::measure();
 }

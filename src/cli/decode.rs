@@ -7,11 +7,12 @@ use std::{
 use clap::Args;
 use ndarray::{Array2, Axis, Slice};
 
-use super::{failure::Failure, follow::Follow, measured_decode, outside_training::OutsideTraining, same_file::is_same};
+use super::{failure::Failure, follow::Follow, measured_decode, outside_training::OutsideTraining};
 use crate::{
     dataset::{ReadError, Reading, ResistanceReader, SimulationError},
     export::{
-        AtomicFile, DocumentError, MeasuredNetworkFile, NetworkFile, WriteError, write_decoded, write_decoded_header,
+        AtomicFile, DocumentError, MeasuredNetworkFile, NetworkFile, WriteError, is_same, write_decoded,
+        write_decoded_header,
     },
     network::Networks,
     scene::RowModel,

@@ -8,11 +8,11 @@ use clap::Args;
 use super::{
     export_report::{print_json, print_text},
     failure::Failure,
-    same_file::is_same,
 };
 use crate::export::{
     DocumentError, MeasuredNetworkFile, NetworkFile,
     bundle::{BundleFormat, BundlePrecision, ExportedNetwork, export_bundle},
+    is_same,
 };
 
 /// Write a network for other programs, and verify what was written

@@ -7,12 +7,11 @@ use super::{
     failure::Failure,
     frames::FrameArguments,
     output::{print, print_object, progress_bar},
-    same_file::is_same,
 };
 use crate::{
     dataset::{Dataset, Division, SplitBy, Stream},
     evaluation::{Errors, fine_tune, press_limits},
-    export::{NetworkFile, check_writable, format_number},
+    export::{NetworkFile, check_writable, format_number, is_same},
     network::Networks,
     training::StoppingRules,
 };

@@ -37,7 +37,6 @@ mod parse_error;
 mod parsers;
 mod reproduce;
 mod reproduce_report;
-mod same_file;
 mod scene_arguments;
 mod shell;
 mod simulate;

@@ -13,7 +13,6 @@ use super::{
     import_arguments::ImportArguments,
     interruption::Graceful,
     output::{print_object, progress_bar},
-    same_file::is_same,
     shell::quoted,
     train_report::{print_text, report},
     training_arguments::TrainingArguments,
@@ -23,7 +22,7 @@ use crate::{
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
     export::{
         CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, SensorFile, check_writable, format_number,
-        report::RunReport,
+        is_same, report::RunReport,
     },
     training::TrainingSettings,
 };

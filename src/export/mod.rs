@@ -23,6 +23,8 @@ mod recorded_words;
 #[cfg(feature = "figures")]
 pub mod report;
 mod run_folder;
+#[cfg(any(feature = "cli", feature = "gui"))]
+mod same_file;
 mod samples;
 mod sealed;
 mod sensor_file;
@@ -52,6 +54,8 @@ pub use recorded_words::{
     describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
 };
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
+#[cfg(any(feature = "cli", feature = "gui"))]
+pub(crate) use same_file::is_same;
 #[cfg(feature = "cli")]
 pub(crate) use samples::{write_decoded, write_decoded_header};
 pub use samples::{write_samples, write_samples_header};

@@ -25,6 +25,7 @@ mod of_trade_off;
 mod plot;
 mod plot_figure;
 mod point_labels;
+mod regression;
 mod summary;
 pub mod surface;
 pub(crate) mod ticks;
@@ -40,9 +41,9 @@ pub use of_decoders::decoders_figure;
 pub use of_epochs::{compared_losses_figure, loss_figure, training_state_figure};
 pub use of_experiment::experiment_figure;
 pub use of_learning::learning_curve_figure;
-pub use of_nodes::{ErrorBins, error_histogram_figure, node_figure, pair_address, regression_figure, z_pairs_mm};
+pub use of_nodes::{ErrorBins, error_histogram_figure, node_figure, pair_address, z_pairs_mm};
 pub use of_readings::{readings_figure, zero_gains_figure};
-pub use of_recorded::{position_error_map, target_regression_figure};
+pub use of_recorded::position_error_map;
 pub use of_rows::singular_values_figure;
 pub use of_sample::sample_figure;
 pub use of_section::{SectionNodes, section_figure};
@@ -51,6 +52,7 @@ pub use of_trade_off::trade_off_figure;
 pub use plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span};
 pub use plot_figure::PlotFigure;
 pub(crate) use point_labels::{PointLabel, along, place_labels};
+pub use regression::{RegressionLine, regression_figure, target_regression_figure};
 
 use surface::SurfaceFigure;
 

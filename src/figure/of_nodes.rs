@@ -7,7 +7,7 @@ use super::{
     axis::{PlotAxis, TickRule},
     look::{Hue, Key, LineStyle, Look, Marker},
     plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
-    plot_figure::{PlotFigure, thinned},
+    plot_figure::PlotFigure,
 };
 use crate::{
     dataset::Dataset,
@@ -128,105 +128,6 @@ pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) ->
             ..plot
         }],
         notes: Vec::new(),
-    }
-}
-
-/// Decoupled against actual z, with the line on which they would be equal and the line fitted to them.
-pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
-    regression(pairs_mm, ("z", Some("mm")), ["decoupled", "nodes of the test set"])
-}
-
-/// Actual values of a quantity (its name and unit), and against them what a network makes of the readings, called `answer`,
-/// in pairs of `what`.
-pub(super) fn regression(
-    pairs: &[(f64, f64)],
-    (name, unit): (&str, Option<&str>),
-    [answer, what]: [&str; 2],
-) -> PlotFigure {
-    let numbered: Vec<(usize, (f64, f64))> = pairs.iter().copied().enumerate().collect();
-    let dots = thinned(&numbered).map(|(pair, (actual, decoupled))| PlotPoint {
-        item: Some(pair),
-        ..PlotPoint::from([actual, decoupled])
-    });
-    let actual = || pairs.iter().map(|pair| pair.0).filter(|value| value.is_finite());
-    let ends = [actual().reduce(f64::min), actual().reduce(f64::max)];
-    let line = |name: &str, look: Look, of: &dyn Fn(f64) -> f64| {
-        Series::new(
-            name,
-            look,
-            ends.into_iter().flatten().map(|actual| [actual, of(actual)]),
-        )
-    };
-    let mut series = vec![
-        Series {
-            points: dots.collect(),
-            ..Series::new(what, Look::marker(Hue::Blue, Marker::Dot), [])
-        },
-        line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual),
-    ];
-    let mut notes = Vec::new();
-    if let Some(fit) = Fit::new(pairs) {
-        let look = Look::line(Hue::Orange, LineStyle::Solid);
-        series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset));
-        let sign = if fit.offset < 0.0 { '−' } else { '+' };
-        let [slope, offset] = [fit.slope, fit.offset.abs()].map(format_number);
-        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
-        notes = vec![
-            format!("Correlation R = {}", format_number(fit.correlation)),
-            format!("Fitted line: {answer} = {slope} · actual {sign} {offset}{unit}"),
-        ];
-    }
-    let title = match unit {
-        Some(unit) => format!("{name} ({unit})"),
-        None => name.to_owned(),
-    };
-    PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
-        plots: vec![Plot {
-            has_equal_scales: true,
-            ..Plot::new(
-                PlotAxis::linear(format!("actual {title}")),
-                PlotAxis::linear(format!("{answer} {title}")),
-                series,
-            )
-        }],
-        notes,
-    }
-}
-
-/// The least-squares line through pairs of actual and decoupled values.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Fit {
-    /// Pearson's.
-    correlation: f64,
-    slope: f64,
-    /// In the unit of the values.
-    offset: f64,
-}
-
-impl Fit {
-    /// `None` where one side does not vary.
-    fn new(pairs: &[(f64, f64)]) -> Option<Self> {
-        let count = pairs.len() as f64;
-        let mean = |pick: fn(&(f64, f64)) -> f64| pairs.iter().map(pick).sum::<f64>() / count;
-        let (mean_a, mean_d) = (mean(|pair| pair.0), mean(|pair| pair.1));
-        let (mut aa, mut dd, mut ad) = (0.0, 0.0, 0.0);
-        for (a, d) in pairs {
-            aa += (a - mean_a).powi(2);
-            dd += (d - mean_d).powi(2);
-            ad += (a - mean_a) * (d - mean_d);
-        }
-        let slope = ad / aa;
-        let fit = Self {
-            correlation: ad / (aa * dd).sqrt(),
-            slope,
-            offset: mean_d - slope * mean_a,
-        };
-        let is_finite = fit.correlation.is_finite() && fit.offset.is_finite();
-        is_finite.then_some(fit)
     }
 }
 
@@ -362,21 +263,6 @@ mod tests {
         assert_eq!(lit.look.marker, Some(Marker::Halo));
         let places: Vec<[f64; 2]> = lit.points.iter().map(|point| [point.x, point.y]).collect();
         assert_eq!(places, [[2.0, 4.5], [2.0, 4.4]]);
-    }
-
-    #[test]
-    fn the_fit_finds_a_line_and_none_without_variation() {
-        let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 * f64::from(i) - 1.0)).collect();
-        let fit = Fit::new(&line).unwrap();
-        assert!((fit.correlation - 1.0).abs() < 1e-15);
-        assert!((fit.slope - 3.0).abs() < 1e-14 && (fit.offset + 1.0).abs() < 1e-13);
-        assert_eq!(Fit::new(&[(1.0, 2.0), (1.0, 3.0)]), None);
-        assert_eq!(Fit::new(&[]), None);
-        assert_eq!(
-            regression_figure(&[(1.0, 2.0), (1.0, 3.0)]).keys.len(),
-            2,
-            "no fitted line"
-        );
     }
 
     #[test]

@@ -8,20 +8,12 @@ use super::{
     axis::PlotAxis,
     colour_map::SequentialMap,
     heat_map::HeatMap,
-    of_nodes::regression,
-    plot_figure::PlotFigure,
     ticks::{step_for, tick_text},
 };
 use crate::{evaluation::format::format_number, sensor::counted};
 
 /// Largest number of cells along an axis of a map, but for those that round limits add.
 const CELLS: usize = 16;
-
-/// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and the
-/// line fitted to them. `pairs` are actual and decoded values.
-pub fn target_regression_figure(pairs: &[(f64, f64)], name: &str, unit: Option<&str>) -> PlotFigure {
-    regression(pairs, (name, unit), ["decoded", "samples of the test set"])
-}
 
 /// Error of a position over the position: root mean square of the distance between the decoded and the actual one, for
 /// the samples in each cell. `targets` and `answers` are samples × 2; `names` are those of both axes, in `unit`.
@@ -159,17 +151,5 @@ mod tests {
         }
         let huge = array![[-1e308, 0.0], [1e308, 1.0]];
         assert!(position_error_map(huge.view(), huge.view(), ["x", "y"], None).is_none());
-    }
-
-    #[test]
-    fn the_regression_names_its_target_with_the_unit_if_there_is_one() {
-        let pairs = [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)];
-        let figure = target_regression_figure(&pairs, "force", Some("N"));
-        assert_eq!(figure.plots[0].x.name, "actual force (N)");
-        assert_eq!(figure.notes[1], "Fitted line: decoded = 2.00 · actual + 1.00 N");
-        assert_eq!(
-            target_regression_figure(&pairs, "c2", None).plots[0].y.name,
-            "decoded c2"
-        );
     }
 }

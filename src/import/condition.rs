@@ -47,6 +47,18 @@ impl Condition {
     pub(super) fn comparisons(&self) -> &[Comparison] {
         &self.comparisons
     }
+
+    /// Returns this condition with other names of columns: `name` returns the new name of a column, or `None` if it stays.
+    #[must_use]
+    pub fn renamed(&self, name: impl Fn(&str) -> Option<String>) -> Self {
+        let renamed = |comparison: &Comparison| Comparison {
+            column: name(&comparison.column).unwrap_or_else(|| comparison.column.clone()),
+            ..comparison.clone()
+        };
+        Self {
+            comparisons: self.comparisons.iter().map(renamed).collect(),
+        }
+    }
 }
 
 impl Comparison {
@@ -162,6 +174,13 @@ mod tests {
             let error = text.parse::<Condition>().unwrap_err().to_string();
             assert!(error.contains(reason), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn columns_are_renamed_and_nothing_else() {
+        let condition: Condition = "c4<145.1 and c5!=0 and c4>1".parse().unwrap();
+        let renamed = condition.renamed(|name| (name == "c4").then(|| "states.c4".to_owned()));
+        assert_eq!(renamed.to_string(), "states.c4<145.1 and c5!=0 and states.c4>1");
     }
 
     #[test]

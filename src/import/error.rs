@@ -111,6 +111,9 @@ pub enum ImportError {
         /// Cure.
         cure: Cure,
     },
+    /// A file for the test is one of those that are trained on.
+    #[error("'{}' is trained on, so it cannot test: give another file for the test", .0.display())]
+    TrainedOn(PathBuf),
     /// No row is left.
     #[error("none of the {rows} rows is left: {reasons}")]
     NoRows {

@@ -87,7 +87,7 @@ impl Recipe {
     }
 
     /// Names in front of the columns of the joined files.
-    pub(super) fn stems(&self) -> Vec<String> {
+    pub fn stems(&self) -> Vec<String> {
         let mut stems: Vec<String> = Vec::new();
         for joined in &self.join {
             let wanted = joined.stem.clone().unwrap_or_else(|| stem(&joined.file));

@@ -54,6 +54,6 @@ pub use positions::{PositionsError, TargetPosition, holds_positions};
 pub use read::read_table;
 pub use recipe::{Joined, Recipe};
 pub use recording::{Channel, Dropped, FileReport, JoinReport, Recording};
-pub use suggestion::suggested_plan;
+pub use suggestion::{suggested_plan, suggested_plan_in_order};
 pub use table::{Excess, Format, Table};
 pub use watch::{Progress, Watch};

@@ -53,7 +53,10 @@ impl Plan {
         let recording = self.recording(folder, watch)?;
         let test_recording = match &self.test {
             None => None,
-            Some(files) => Some(self.import.of_test(files)?.import(folder, watch)?),
+            Some(files) => {
+                self.check_test_files(folder, files)?;
+                Some(self.import.of_test(files)?.import(folder, watch)?)
+            }
         };
         let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
         Ok(PlannedSets {
@@ -62,6 +65,15 @@ impl Plan {
             split,
             test,
         })
+    }
+
+    /// Refuses rows for the test that are trained on. A file joined to both may be the same: its times tell its rows apart.
+    fn check_test_files(&self, folder: &Path, tests: &TestFiles) -> Result<(), ImportError> {
+        let real = |path: &PathBuf| folder.join(path).canonicalize().ok();
+        match (real(&self.import.data), real(&tests.data)) {
+            (Some(trained), Some(tested)) if trained == tested => Err(ImportError::TrainedOn(tests.data.clone())),
+            _ => Ok(()),
+        }
     }
 
     /// Divides samples that were imported before; `seed` is that of the run.
@@ -110,6 +122,20 @@ impl Plan {
             absolute.strip_prefix(&folder).map(Path::to_owned).unwrap_or(absolute)
         };
         self.with_paths(relative)
+    }
+
+    /// All files that it reads.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let import = &self.import;
+        let joined = import.join.iter().map(|joined| &joined.file);
+        let tests = self
+            .test
+            .iter()
+            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
+        std::iter::once(&import.data)
+            .chain(joined)
+            .chain(&import.positions)
+            .chain(tests)
     }
 
     /// This plan with absolute paths.

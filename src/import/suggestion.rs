@@ -91,6 +91,19 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     let mut order: Vec<&InspectedFile> = training;
     // The readings first: those that look least like targets, then the widest file.
     order.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
+    Plan {
+        test,
+        ..plan_of(&order)
+    }
+}
+
+/// As [`suggested_plan`], of files of which it is known that the first has the readings, to which the others are joined.
+pub fn suggested_plan_in_order(files: &[InspectedFile]) -> Plan {
+    plan_of(&Vec::from_iter(files))
+}
+
+/// Guesses what the columns are for, of the file with the readings and of those joined to it.
+fn plan_of(order: &[&InspectedFile]) -> Plan {
     let Some((first, joined)) = order.split_first() else {
         return Plan::default();
     };
@@ -102,6 +115,7 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
             .iter()
             .map(|file| Joined {
                 file: file.path.clone(),
+                stem: own_stem(file),
                 time: time_of(file),
                 ..Joined::default()
             })
@@ -114,7 +128,6 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
             time: time_of(first),
             ..recipe
         },
-        test,
         ..Plan::default()
     };
     let first_meanings = guesses(first, joined.is_empty());
@@ -142,6 +155,13 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
         };
     }
     plan
+}
+
+/// Name in front of the columns of a joined file, if it is not made from the name of the file.
+fn own_stem(file: &InspectedFile) -> Option<String> {
+    let of_file = stem(&file.path);
+    let is_own = |given: &&String| given.split_once('#').map_or(given.as_str(), |(before, _)| before) != of_file;
+    file.stem.as_ref().filter(is_own).cloned()
 }
 
 /// Files for the training, and those for the test if there is one for each, as `trainPose` and `testPose`.

@@ -8,3 +8,4 @@ mod positions;
 mod recordings;
 mod samples;
 mod suggestions;
+mod test_files;

@@ -4,6 +4,7 @@
 mod colour_scale;
 mod effect;
 mod export;
+mod file_in_use;
 mod file_task;
 mod look;
 mod network_exports;
@@ -25,6 +26,7 @@ pub use effect::Effect;
 pub use export::{
     Ask, Export, ExportGroup, copy_exports, csv_export, error_table_export, loss_export, picture_exports,
 };
+pub use file_in_use::{FileInUse, refuse_in_use};
 pub use file_task::{Contents, FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
 pub use network_exports::{NetworkSource, file_stem, network_exports, own_network_exports};

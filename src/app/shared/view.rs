@@ -2,7 +2,7 @@ use std::{fmt::Debug, path::PathBuf};
 
 use eframe::egui::{Context, Ui};
 
-use super::{Effect, Export, Offers, Shared, training_status_ui};
+use super::{Effect, Export, FileInUse, Offers, Shared, training_status_ui};
 use crate::app::theme::space;
 
 /// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
@@ -30,6 +30,11 @@ pub trait View: Debug {
     /// Returns true while closing the window would lose a training.
     fn has_unfinished(&self) -> bool {
         false
+    }
+
+    /// Returns the files that it needs, over which nothing is to be saved.
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        Vec::new()
     }
 
     /// Offers what can be done in it, and does what the user wants of that.

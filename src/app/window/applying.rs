@@ -3,11 +3,11 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, closing::Closing, remembered::is_within_limits, save_form::Saving};
+use super::{DecouplerWindow, closing::Closing, path_look::Found, remembered::is_within_limits, save_form::Saving};
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileTask, Look, Matter, Notice, Offers, Phase, Purpose},
+        shared::{Effect, FileInUse, FileTask, Look, Matter, Notice, Offers, Phase, Purpose, refuse_in_use},
         test_view::HeightScale,
         theme,
         training_worker::{Inspection, LOST, Request, Worker},
@@ -26,6 +26,7 @@ impl DecouplerWindow {
             Effect::ShowTraining => self.show(0),
             Effect::Train => {
                 let settings = Box::new(shared.draft);
+                self.opened = None;
                 self.prepare(Request::Train(settings));
             }
             // A training may have begun in the same frame.
@@ -142,12 +143,67 @@ impl DecouplerWindow {
             Some(typed) => typed.path.clone(),
             None => task.suggested_path().display().to_string(),
         };
-        self.saving = Some(Saving { task, path });
+        self.saving = Some(Saving::new(task, path));
+    }
+
+    /// Takes the path typed in the form. What exists there is found out first, unless the file is read or its contents
+    /// replace nothing.
+    pub(super) fn take_typed(&mut self, path: PathBuf) {
+        let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
+            return;
+        };
+        // A folder is only ever filled anew.
+        if task.is_read() || task.words.extensions.is_empty() {
+            return self.take_path(path);
+        }
+        // What is on its way there exists as good as already.
+        let found = self.files.paths().any(|other| other == path).then_some(Found::File);
+        let used = self.files_in_use(&task);
+        if let Some(saving) = &mut self.saving {
+            saving.wait_for_look();
+            match found {
+                Some(found) => {
+                    saving.take(&path, found);
+                }
+                None => self.looks.start(path, used),
+            }
+        }
+        self.ctx.request_repaint();
+    }
+
+    /// Takes what was found at typed paths.
+    pub(super) fn take_looks(&mut self) {
+        while let Some((path, found)) = self.looks.next_found() {
+            if self.saving.as_mut().is_some_and(|saving| saving.take(&path, found)) {
+                self.take_path(path);
+            }
+        }
+    }
+
+    /// Closes the form and does with the file in `path` what it was asked for.
+    pub(super) fn take_path(&mut self, path: PathBuf) {
+        self.typed = self.saving.take();
+        if let Some(typed) = self.typed.clone() {
+            self.answer(typed.task, path);
+        }
+    }
+
+    /// Files that the program needs, over which the file of `task` must not be saved.
+    fn files_in_use(&mut self, task: &FileTask) -> Vec<FileInUse> {
+        let mut used: Vec<FileInUse> = self.views.all().iter().flat_map(|view| view.files_in_use()).collect();
+        used.extend(self.opened.clone().map(FileInUse::Checkpoint));
+        // A checkpoint may be saved over the one before it.
+        let is_checkpoint = task.words.kind == CHECKPOINT.kind;
+        used.retain(|used| !(is_checkpoint && matches!(used, FileInUse::Checkpoint(_))));
+        used.extend(self.shared.runs.path.clone().map(FileInUse::Kept));
+        used
     }
 
     /// Does with the file in `path` what it was asked for.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
         let is_checkpoint = task.words == CHECKPOINT;
+        // A dialog of the desktop has asked whether a file is to be replaced, but does not know what is in use.
+        let used = self.files_in_use(&task);
         if is_checkpoint && self.closing == Some(Closing::ChoosingPath) {
             self.closing = Some(Closing::Finishing);
         }
@@ -161,11 +217,15 @@ impl DecouplerWindow {
                 });
                 self.worker.ask(Request::Inspect(run, inspection));
                 self.files.write(path, move |path| {
+                    refuse_in_use(path, &used)?;
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
                     taken?.write(path)
                 });
             }
-            Purpose::Save(contents) => self.files.write(path, move |path| contents.write(path)),
+            Purpose::Save(contents) => self.files.write(path, move |path| {
+                refuse_in_use(path, &used)?;
+                contents.write(path)
+            }),
             Purpose::Choose(chosen) => {
                 // A view that has asked for another file since has no use for this one.
                 let _ = chosen.send(path);
@@ -173,7 +233,10 @@ impl DecouplerWindow {
             }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => self.prepare(Request::Open(path)),
+            Purpose::Open => {
+                self.opened = Some(path.clone());
+                self.prepare(Request::Open(path));
+            }
         }
     }
 

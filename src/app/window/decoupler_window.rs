@@ -15,6 +15,7 @@ use super::{
     memory::Memory,
     notice::{self, notice_ui},
     notices::Notices,
+    path_look::PathLooks,
     remembered::{Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
     top_bar::{Reach, top_bar_ui},
@@ -43,6 +44,9 @@ pub struct DecouplerWindow {
     pub(super) saving: Option<Saving>,
     /// The path last typed, offered again for the same file.
     pub(super) typed: Option<Saving>,
+    pub(super) looks: PathLooks,
+    /// The checkpoint that the training of the Train view was opened from.
+    pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
     pub(super) previews: Job<PreviewEvent>,
     pub(super) runs: RunsWorker,
@@ -91,6 +95,8 @@ impl DecouplerWindow {
             notices: Notices::default(),
             saving: None,
             typed: None,
+            looks: PathLooks::new(Arc::clone(&wake)),
+            opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             previews: Job::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
@@ -287,12 +293,8 @@ impl DecouplerWindow {
 
     fn ask_for_path(&mut self, ui: &mut Ui) {
         match self.saving.as_mut().and_then(|saving| save_form_ui(ui, saving)) {
-            Some(save_form::Reply::Path(path)) => {
-                self.typed = self.saving.take();
-                if let Some(typed) = self.typed.clone() {
-                    self.answer(typed.task, path);
-                }
-            }
+            Some(save_form::Reply::Path(path)) => self.take_typed(path),
+            Some(save_form::Reply::Replace(path)) => self.take_path(path),
             Some(save_form::Reply::Cancel) => self.saving = None,
             None => {}
         }

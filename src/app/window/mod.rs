@@ -20,6 +20,7 @@ mod notice;
 mod notices;
 mod open;
 mod palette;
+mod path_look;
 mod remembered;
 mod save_form;
 #[cfg(test)]

@@ -35,6 +35,7 @@ impl DecouplerWindow {
                 Answer::Cancelled => {}
             }
         }
+        self.take_looks();
         let mut effects = Vec::new();
         let mut working = Vec::new();
         for view in self.views.all() {

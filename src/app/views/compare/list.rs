@@ -104,14 +104,16 @@ fn run_ui(
 /// The name, to be changed in place; what is typed counts when the field is left.
 fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect>) {
     let id = Id::unique(("run name", run.id));
-    let mut name: String = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| run.name.clone());
+    let typed: Option<String> = ui.data(|data| data.get_temp(id));
+    let mut name = typed.clone().unwrap_or_else(|| run.name.clone());
     let edit = ui.add(TextEdit::singleline(&mut name).id(id).desired_width(f32::INFINITY));
     ui.ctx()
         .accesskit_node_builder(edit.id, |node| node.set_label(format!("Name of run {}", position + 1)));
     if edit.changed() {
         ui.data_mut(|data| data.insert_temp(id, name.clone()));
     }
-    if edit.lost_focus() {
+    // Also a field that lost the focus while another view was on show.
+    if !edit.has_focus() && typed.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {
             effects.push(Effect::RenameRun(run.id, name));

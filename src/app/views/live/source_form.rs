@@ -89,7 +89,7 @@ impl SourceForm {
         self.noise.unwrap_or(of_scene)
     }
 
-    /// The source; that of a file begins at `at_s`.
+    /// The source; that of a file begins at `at_s`. Asked in every frame, it asks no file system.
     ///
     /// # Errors
     /// If something is still to be filled in, with what to do.
@@ -106,16 +106,11 @@ impl SourceForm {
             },
             SourceKind::Replay => {
                 let path = PathBuf::from(filled(&self.path, "Choose a file of frames, or record one.")?);
-                if path.exists() && !path.is_file() && !path.is_dir() {
-                    // A named pipe or a device has no end to go back from.
-                    SourcePlan::Stream(Source::File(path))
-                } else {
-                    SourcePlan::Replay {
-                        path,
-                        at_s,
-                        speed: self.speed,
-                        is_playing: true,
-                    }
+                SourcePlan::Replay {
+                    path,
+                    at_s,
+                    speed: self.speed,
+                    is_playing: true,
                 }
             }
             SourceKind::Serial => SourcePlan::Stream(Source::Serial {

@@ -241,6 +241,11 @@ impl LiveView {
         let mut tell = |notice| effects.push(Effect::Tell(Matter::Live, notice));
         while let Some(event) = self.job.next_event() {
             match event {
+                LiveEvent::Source(source) => {
+                    if let Some(running) = &mut self.running {
+                        running.source = source;
+                    }
+                }
                 LiveEvent::Shown(shown) => {
                     if let Some(frame) = &shown.frame {
                         self.drops.take(frame);

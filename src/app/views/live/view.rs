@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Effect, Export, Offers, Shared, View},
+        shared::{Effect, Export, FileInUse, Offers, Shared, View},
         theme::{Theme, space, type_size},
         widgets::{card_ui, scrolled_ui, state_ui},
     },
@@ -37,6 +37,15 @@ impl View for LiveView {
 
     fn is_working(&self) -> bool {
         self.running.is_some()
+    }
+
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        let replayed = self.running.as_ref().and_then(|running| match &running.source {
+            SourcePlan::Replay { path, .. } => Some(FileInUse::Recording(path.clone())),
+            _ => None,
+        });
+        let recorded = self.recording.clone().map(FileInUse::Recorded);
+        replayed.into_iter().chain(recorded).collect()
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -1,9 +1,11 @@
-use ndarray::Axis;
+use std::sync::Arc;
 
-use super::model::{Positions, Tested, Trained, position_pair};
+use super::{
+    curves::Curves,
+    model::{Positions, Tested, Trained, position_pair},
+};
 use crate::figure::{
-    Figure, HeatMap, PlotFigure, loss_figure, position_error_map, sample_figure, target_regression_figure,
-    training_state_figure,
+    Figure, HeatMap, PlotFigure, loss_figure, sample_figure, target_regression_figure, training_state_figure,
 };
 
 /// Charts of a network.
@@ -37,7 +39,7 @@ pub(super) struct ChartChoice {
 /// A chart, or why there is none.
 pub(super) enum Chart {
     Plots(PlotFigure),
-    Map(Box<HeatMap>),
+    Map(Arc<HeatMap>),
     /// Surfaces, which the look of all views belongs to.
     Surfaces,
     None(&'static str),
@@ -97,19 +99,22 @@ impl ChartChoice {
     }
 
     /// The chart of a network.
-    pub(super) fn chart(&self, trained: &Trained) -> Chart {
+    pub(super) fn chart(&self, trained: &Trained, curves: &Curves) -> Chart {
         const NO_SAMPLES: &str = "There are no test samples at hand: the recording of this network was not found.";
         let record = &trained.file.training;
         let targets = &trained.file.targets;
         match (self.tab, &trained.tested) {
-            (ChartTab::Loss, _) => Chart::Plots(loss_figure(&record.history, &record.stages, record.best_epoch)),
-            (ChartTab::TrainingState, _) => Chart::Plots(training_state_figure(&record.history, &record.stages)),
+            (ChartTab::Loss, _) => Chart::Plots(loss_figure(curves.records(), &record.stages, record.best_epoch)),
+            (ChartTab::TrainingState, _) => Chart::Plots(training_state_figure(curves.records(), &record.stages)),
             (_, None) => Chart::None(NO_SAMPLES),
             (ChartTab::Regression, Some(tested)) => {
                 let target = self.target.min(targets.len().saturating_sub(1));
                 let channel = &targets[target];
-                let pairs = tested.pairs(target);
-                Chart::Plots(target_regression_figure(&pairs, &channel.name, channel.unit.as_deref()))
+                let pair = |sample| tested.pair(sample, target);
+                let line = &tested.lines[target];
+                let samples = tested.set().samples();
+                let unit = channel.unit.as_deref();
+                Chart::Plots(target_regression_figure((samples, &pair), line, &channel.name, unit))
             }
             (ChartTab::Surfaces, Some(_)) => Chart::Surfaces,
             (ChartTab::Sample, Some(tested)) => {
@@ -118,21 +123,10 @@ impl ChartChoice {
                 let decoded = tested.answers.row(sample).to_vec();
                 Chart::Plots(sample_figure(targets, &actual, &decoded, &tested.ranges))
             }
-            (ChartTab::Map, Some(tested)) => {
-                let Some(pair) = position_pair(targets) else {
-                    return Chart::None(
-                        "A map needs two targets that are positions: lengths in the same unit, or both without a unit.",
-                    );
-                };
-                let [actual, answers] =
-                    [tested.set().targets(), tested.answers.view()].map(|values| values.select(Axis(1), &pair));
-                let names = pair.map(|target| targets[target].name.as_str());
-                let unit = targets[pair[0]].unit.as_deref();
-                position_error_map(actual.view(), answers.view(), names, unit).map_or(
-                    Chart::None("The positions of the test samples do not vary, so there is no map."),
-                    |map| Chart::Map(Box::new(map)),
-                )
-            }
+            (ChartTab::Map, Some(tested)) => match &tested.error_map {
+                Ok(map) => Chart::Map(Arc::clone(map)),
+                Err(reason) => Chart::None(reason),
+            },
         }
     }
 }
@@ -142,7 +136,7 @@ impl Chart {
     pub(super) fn into_figure(self) -> Option<Figure> {
         match self {
             Self::Plots(plots) => Some(plots.into()),
-            Self::Map(map) => Some((*map).into()),
+            Self::Map(map) => Some(HeatMap::clone(&map).into()),
             Self::Surfaces | Self::None(_) => None,
         }
     }

@@ -1,8 +1,8 @@
 //! Trying an import out in the background: which samples it gives, and which rows it drops.
 
-use std::{ops::ControlFlow, path::Path};
+use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use super::remarks::in_window;
+use super::{planned::Planned, remarks::in_window};
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     dataset::{Dataset, Seed},
@@ -35,7 +35,7 @@ struct CheckingEvent(Result<Box<Checked>, String>);
 #[derive(Debug)]
 pub(super) struct Checking {
     job: Job<CheckingEvent>,
-    asked: Option<(Plan, Seed)>,
+    asked: Option<(Arc<Planned>, Seed)>,
     /// Its outcome, once it is known.
     pub(super) checked: Option<Result<Box<Checked>, String>>,
 }
@@ -50,15 +50,22 @@ impl Checking {
     }
 
     /// Tries this plan out, unless that is done or under way; none if there is nothing to try.
-    pub(super) fn follow(&mut self, plan: Option<Plan>, seed: Seed) {
-        let wanted = plan.map(|plan| (plan, seed));
-        if wanted != self.asked {
-            self.asked.clone_from(&wanted);
+    pub(super) fn follow(&mut self, planned: Option<Arc<Planned>>, seed: Seed) {
+        let wanted = planned.map(|planned| (planned, seed));
+        let is_same = match (&wanted, &self.asked) {
+            (None, None) => true,
+            (Some((wanted, seed)), Some((asked, before))) => {
+                seed == before && (Arc::ptr_eq(wanted, asked) || wanted.plan == asked.plan)
+            }
+            _ => false,
+        };
+        self.asked.clone_from(&wanted);
+        if !is_same {
             self.checked = None;
             match wanted {
                 None => self.job.abandon(),
-                Some((plan, seed)) => self.job.start(
-                    move |report| check(&plan, seed, report),
+                Some((planned, seed)) => self.job.start(
+                    move |report| check(&planned.plan, seed, report),
                     |checked: Result<_, JobError>| {
                         CheckingEvent(checked.unwrap_or_else(|error| Err(error.to_string())))
                     },

@@ -4,7 +4,7 @@ use eframe::egui::{Align, ComboBox, Label, Layout, RichText, Sense, Ui, WidgetIn
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::{
-    column_cells::{figure_ui, meaning_ui, range_text, remark, unit_ui},
+    column_cells::{figure_ui, meaning_ui, missing_texts, range_texts, remark, unit_ui},
     draft::{Draft, file_name},
     histogram::paint_histogram,
     import_form::invitation_ui,
@@ -201,25 +201,18 @@ fn column_ui(
         response.on_hover_text("Number of rows in each sixteenth of the range.");
     });
     row.col(|ui| {
-        let range = match (summary.min, summary.max) {
-            (Some(min), Some(max)) => range_text(min, max),
-            _ => "–".to_owned(),
-        };
-        let exact = summary.min.zip(summary.max).map(|(min, max)| format!("{min} to {max}"));
-        let label = format!("Range of {name}: {range}");
-        let response = figure_ui(ui, &range, &label, colour);
+        let ends = summary.min.zip(summary.max);
+        let texts = ends.map_or_else(|| vec!["–".to_owned()], |(min, max)| range_texts(min, max));
+        let exact = ends.map(|(min, max)| format!("{min} to {max}"));
+        let response = figure_ui(ui, &texts, &format!("Range of {name}"), colour);
         if let Some(exact) = exact {
             response.on_hover_text(exact);
         }
     });
     row.col(|ui| {
-        let missing = if summary.missing == 0 {
-            "–".to_owned()
-        } else {
-            summary.missing.to_string()
-        };
-        let label = format!("Missing in {name}: {}", summary.missing);
-        figure_ui(ui, &missing, &label, colour);
+        let texts = missing_texts(summary.missing, inspected.inspection.rows);
+        let response = figure_ui(ui, &texts, &format!("Missing in {name}"), colour);
+        response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.inspection.rows));
     });
     row.col(|ui| {
         if let Some((text, is_bad)) = remark(summary, column) {

@@ -107,13 +107,13 @@ pub(super) fn own_data_exports(view: &OwnDataView, look: Look) -> Vec<Export<'_>
     ));
     let plan = match &view.draft {
         None => Err("No recording is open.".to_owned()),
-        Some(draft) => draft.plan(),
+        Some(draft) => draft.planned(),
     };
     let recipe = plan.map(|plan| {
         save(
             RECIPE,
             stem("recipe"),
-            Contents::new(move |path| RecipeFile::save(&plan, path)),
+            Contents::new(move |path| RecipeFile::save(&plan.plan, path)),
         )
     });
     exports.push(one(
@@ -135,7 +135,10 @@ fn shown_chart(view: &OwnDataView, look: Look) -> (Result<Figure, String>, &'sta
             shown_surfaces(view, look).map(Figure::Surfaces),
             view.chart.tab.file_word(),
         ),
-        (_, Some(shown)) => (view.chart.chart(shown).into_figure(), view.chart.tab.file_word()),
+        (_, Some(shown)) => (
+            view.chart.chart(shown, &view.curves).into_figure(),
+            view.chart.tab.file_word(),
+        ),
         (_, None) => (None, "chart"),
     };
     (figure.ok_or_else(|| "This chart has nothing to show.".to_owned()), word)

@@ -36,8 +36,8 @@ pub(super) fn form_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Eff
         ui.add_enabled_ui(!is_busy || is_held, |ui| {
             method_choice_ui(ui, &mut view.settings.training.method);
         });
-        if view.settings.training.method.short_name() != before.short_name() && !is_held {
-            view.set_held_out();
+        if !is_held && view.settings.training.method.short_name() != before.short_name() {
+            view.follow_method(before);
         }
         ui.add_space(space(2));
         ui.separator();
@@ -95,9 +95,8 @@ fn hidden_ui(ui: &mut Ui, view: &mut OwnDataView) {
 fn inputs_fold_ui(ui: &mut Ui, view: &mut OwnDataView) {
     let has_row_wires = view.has_row_wires();
     let settings = &mut view.settings;
-    if !has_row_wires {
-        settings.source = Measured { rows: RowModel::Shared }.into();
-    }
+    let rows = if has_row_wires { view.rows } else { RowModel::Shared };
+    settings.source = Measured { rows }.into();
     let summary = match settings.inputs.scaling {
         ScalingChoice::MinMax => "min-max",
         ScalingChoice::Whitening => "whitening",
@@ -132,7 +131,7 @@ fn inputs_fold_ui(ui: &mut Ui, view: &mut OwnDataView) {
             ];
             let hint = "One network for all row-wires or one for each.";
             if let Some(rows) = options_ui(ui, "Rows", hint, &options, settings.source.row_model()) {
-                settings.source = Measured { rows }.into();
+                view.rows = rows;
             }
         }
     });

@@ -1,6 +1,8 @@
 //! The user's word on the files: which they are, how they are laid out and joined, which rows count, and how the
 //! samples are divided.
 
+use std::path::PathBuf;
+
 use eframe::egui::{Align, Id, Label, Layout, Response, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
@@ -71,12 +73,12 @@ pub(super) fn invitation_ui(ui: &mut Ui, view: &OwnDataView, effects: &mut Vec<E
 }
 
 /// An open file by its use.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 enum OpenFile {
     /// A recording by its number: the first, or one that is joined to it.
     Recording(usize),
-    /// Recordings of the test.
-    Test,
+    /// A file for the test, by the recording in whose place it is read.
+    Test(PathBuf),
     /// Positions of targets.
     Positions,
 }
@@ -88,16 +90,20 @@ pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Ef
     if let Some(draft) = &view.draft {
         let recordings = draft.paths().into_iter().enumerate();
         let recordings = recordings.map(|(number, path)| (OpenFile::Recording(number), path));
-        let test = draft.test_paths().into_iter().map(|path| (OpenFile::Test, path));
+        let tests = draft.tests();
+        let tests = tests.map(|(recording, test)| (OpenFile::Test(recording.to_owned()), test.to_owned()));
         let positions = draft.plan.import.positions.iter();
         let positions = positions.map(|path| (OpenFile::Positions, path.clone()));
-        for (file, path) in recordings.chain(test).chain(positions) {
+        for (file, path) in recordings.chain(tests).chain(positions) {
             let name = file_name(&path);
-            let what = match file {
-                OpenFile::Recording(0) => "",
-                OpenFile::Recording(_) => ", joined",
-                OpenFile::Test => ", for the test",
-                OpenFile::Positions => ", positions",
+            let what = match &file {
+                OpenFile::Recording(0) => String::new(),
+                OpenFile::Recording(_) => ", joined".to_owned(),
+                OpenFile::Test(recording) if draft.files.len() > 1 => {
+                    format!(", for the test of {}", file_name(recording))
+                }
+                OpenFile::Test(_) => ", for the test".to_owned(),
+                OpenFile::Positions => ", positions".to_owned(),
             };
             ui.horizontal(|ui| {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -117,7 +123,7 @@ pub(super) fn files_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Ef
     }
     match (closed, &mut view.draft) {
         (Some(OpenFile::Recording(number)), _) => view.close(number),
-        (Some(OpenFile::Test), Some(draft)) => draft.plan.test = None,
+        (Some(OpenFile::Test(recording)), Some(draft)) => draft.close_test_file(&recording),
         (Some(OpenFile::Positions), Some(draft)) => draft.plan.import.positions = None,
         _ => {}
     }
@@ -182,8 +188,8 @@ pub(super) fn import_folds_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut
 }
 
 fn split_summary(draft: &Draft) -> String {
-    match &draft.plan.test {
-        Some(test) => format!("test: {}", file_name(&test.data)),
+    match draft.tests().next() {
+        Some((_, test)) => format!("test: {}", file_name(test)),
         None => format!(
             "{}, {} % test",
             draft.plan.division.by,
@@ -193,9 +199,7 @@ fn split_summary(draft: &Draft) -> String {
 }
 
 fn split_ui(ui: &mut Ui, draft: &mut Draft, needs_validation: bool, task: FileTask, effects: &mut Vec<Effect>) {
-    let has_group = draft.has(Meaning::Group);
-    let division = &mut draft.plan.division;
-    let is_given = draft.plan.test.is_some();
+    let (has_group, is_given) = (draft.has(Meaning::Group), draft.has_tests());
     let options = [
         (SplitBy::Time, "time", "The last part of the samples tests."),
         (SplitBy::Group, "group", "Whole groups test, drawn at random."),
@@ -206,9 +210,10 @@ fn split_ui(ui: &mut Ui, draft: &mut Draft, needs_validation: bool, task: FileTa
         .filter(|(by, ..)| has_group || *by != SplitBy::Group)
         .collect();
     let hint = "Rule by which samples are divided into training, validation and test.";
-    if let Some(by) = options_ui(ui, "Split by", hint, &offered, division.by) {
-        division.by = by;
+    if let Some(by) = options_ui(ui, "Split by", hint, &offered, draft.plan.division.by) {
+        draft.split_by(by);
     }
+    let division = &mut draft.plan.division;
     if is_given {
         dim_ui(
             ui,
@@ -271,7 +276,8 @@ fn rows_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
                 between them. Empty cells are missing anyway. Rows in which a cell that is used is missing are dropped.";
     let response = text_ui(ui, "Missing cells", hint, "-1, states.c5=-1", &mut draft.missing);
     let is_new = missing(&draft.missing) != draft.plan.import.missing;
-    let is_left = response.lost_focus() && is_new;
+    // Also one that lost the focus while another view was on show.
+    let is_left = !response.has_focus() && is_new;
     if is_left {
         draft.plan.import.missing = missing(&draft.missing);
     }

@@ -1,13 +1,13 @@
 use std::{sync::Arc, time::Duration};
 
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 
 use crate::{
     app::shared::Phase,
     dataset::Dataset,
     evaluation::{TargetErrors, TargetRow},
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
-    figure::TargetSurface,
+    figure::{HeatMap, RegressionLine, TargetSurface, position_error_map},
     import::{Channel, Recording},
     surface::SurfaceError,
 };
@@ -43,6 +43,10 @@ pub(super) struct Tested {
     pub(super) answers: Array2<f64>,
     /// Least and largest value of each target.
     pub(super) ranges: Vec<(f64, f64)>,
+    /// Lines through the actual and decoded values of each target.
+    pub(super) lines: Vec<RegressionLine>,
+    /// Error over the position, or why there is none.
+    pub(super) error_map: Result<Arc<HeatMap>, &'static str>,
     /// Positions of targets.
     pub(super) positions: Positions,
 }
@@ -72,15 +76,33 @@ impl Positions {
 }
 
 impl Tested {
-    pub(super) fn new(set: impl Into<Arc<Dataset>>, answers: Array2<f64>, positions: Positions) -> Self {
+    /// Test samples with the answers to them, and what charts of all of them show: computed here, away from the window's
+    /// thread.
+    pub(super) fn new(
+        set: impl Into<Arc<Dataset>>,
+        answers: Array2<f64>,
+        positions: Positions,
+        targets: &[Channel],
+    ) -> Self {
         let set: Arc<Dataset> = set.into();
         let range = |target| {
             let values = set.targets();
             let extreme = |pick: fn(f64, f64) -> f64, none| values.column(target).iter().copied().fold(none, pick);
             (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY))
         };
+        let line = |target| {
+            let (actual, decoded) = (set.targets(), answers.column(target));
+            RegressionLine::of(actual.column(target).iter().copied().zip(decoded.iter().copied()))
+        };
+        let error_map = match &positions {
+            // Targets that have positions are no positions themselves.
+            Positions::None => error_map(&set, &answers, targets),
+            _ => Err(NO_PAIR),
+        };
         Self {
             ranges: (0..set.outputs()).map(range).collect(),
+            lines: (0..set.outputs()).map(line).collect(),
+            error_map,
             answers,
             set,
             positions,
@@ -97,16 +119,22 @@ impl Tested {
         TargetErrors::measure(self.set.targets(), self.answers.view())
     }
 
-    /// Actual and decoded values of a target.
-    pub(super) fn pairs(&self, target: usize) -> Vec<(f64, f64)> {
-        let (targets, answers) = (self.set.targets(), self.answers.column(target));
-        targets
-            .column(target)
-            .iter()
-            .copied()
-            .zip(answers.iter().copied())
-            .collect()
+    /// Actual and decoded value of a target of a sample.
+    pub(super) fn pair(&self, sample: usize, target: usize) -> (f64, f64) {
+        let at = [sample, target];
+        (self.set.targets()[at], self.answers[at])
     }
+}
+
+const NO_PAIR: &str = "A map needs two targets that are positions: lengths in the same unit, or both without a unit.";
+
+fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Result<Arc<HeatMap>, &'static str> {
+    let pair = position_pair(targets).ok_or(NO_PAIR)?;
+    let [actual, answers] = [set.targets(), answers.view()].map(|values| values.select(Axis(1), &pair));
+    let names = pair.map(|target| targets[target].name.as_str());
+    let map = position_error_map(actual.view(), answers.view(), names, targets[pair[0]].unit.as_deref());
+    map.map(Arc::new)
+        .ok_or("The positions of the test samples do not vary, so there is no map.")
 }
 
 impl Trained {
@@ -165,11 +193,10 @@ pub(super) fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
         None => is_coordinate(&channel.name),
         Some(unit) => LENGTHS.contains(&unit.trim()),
     };
-    let pairs = (0..targets.len()).flat_map(|one| (one + 1..targets.len()).map(move |other| [one, other]));
-    let mut pairs = pairs.filter(|[one, other]| {
-        may_be(&targets[*one]) && targets[*one].unit == targets[*other].unit && may_be(&targets[*other])
-    });
-    pairs.next()
+    let candidates = Vec::from_iter((0..targets.len()).filter(|&target| may_be(&targets[target])));
+    let pairs = candidates.iter().enumerate();
+    let mut pairs = pairs.flat_map(|(place, &one)| candidates[place + 1..].iter().map(move |&other| [one, other]));
+    pairs.find(|[one, other]| targets[*one].unit == targets[*other].unit)
 }
 
 /// Tells whether a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.

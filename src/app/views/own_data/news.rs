@@ -1,6 +1,6 @@
 //! News of the view's threads and of the dialogs, and what becomes of it.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{
     keeping::KeepingEvent,
@@ -8,18 +8,23 @@ use super::{
     state::{OwnDataView, Tab},
     training::{Task, TrainingEvent},
 };
-use crate::app::shared::{Effect, Matter, Notice, Phase, Shared};
+use crate::{
+    app::shared::{Effect, Matter, Notice, Phase, Shared},
+    export::MeasuredNetworkFile,
+    training::Method,
+};
 
 impl OwnDataView {
     /// Opens the files that the user has chosen.
-    pub(super) fn take_chosen(&mut self) {
+    pub(super) fn take_chosen(&mut self, effects: &mut Vec<Effect>) {
         let paths: Vec<PathBuf> = self.chosen.try_iter().collect();
         if !paths.is_empty() {
             self.open(paths);
         }
         let paths: Vec<PathBuf> = self.chosen_for_test.try_iter().collect();
         if let (Some(draft), false) = (&mut self.draft, self.phase.is_busy()) {
-            paths.into_iter().for_each(|path| draft.add_test_file(path));
+            let refused = paths.into_iter().filter_map(|path| draft.add_test_file(path).err());
+            effects.extend(refused.map(|reason| failed(&reason)));
         }
         let path = self.chosen_positions.try_iter().last();
         if let (Some(draft), Some(path), false) = (&mut self.draft, path, self.phase.is_busy()) {
@@ -60,23 +65,24 @@ impl OwnDataView {
             self.take_training(event, effects);
         }
         let draft = self.draft.as_ref().filter(|draft| draft.obstacle().is_none());
-        let plan = draft.and_then(|draft| draft.plan().ok());
+        let planned = draft.and_then(|draft| draft.planned().ok());
         // The machine is for the training then.
         if !self.phase.is_busy() {
-            self.checking.follow(plan, self.settings.seed);
+            self.checking.follow(planned, self.settings.seed);
         }
     }
 
     fn take(&mut self, opened: Opened) {
         match opened {
             Opened::Recordings(draft) => {
-                let draft = match &self.draft {
-                    Some(older) => draft.keeping(older),
-                    None => *draft,
-                };
                 self.tab = Tab::Columns;
-                self.draft = Some(draft);
-                self.set_held_out();
+                match &self.draft {
+                    Some(older) => self.draft = Some(draft.keeping(older)),
+                    None => {
+                        self.draft = Some(*draft);
+                        self.set_held_out();
+                    }
+                }
             }
             Opened::Positions(path) => {
                 if let Some(draft) = &mut self.draft {
@@ -88,8 +94,9 @@ impl OwnDataView {
             }
             Opened::Network(trained, draft) => {
                 self.draft = draft.map(|draft| *draft).or(self.draft.take());
-                self.settings = trained.file.settings.into();
+                self.take_settings(trained.file.settings.into());
                 let mut trained = *trained;
+                trained.file = self.listed(trained.file);
                 trained.name = self.runs.name_of(&trained);
                 self.runs.add(&trained);
                 self.show(trained, None);
@@ -97,11 +104,21 @@ impl OwnDataView {
             }
             Opened::Checkpoint(path, file, draft) => {
                 self.draft = draft.map(|draft| *draft).or(self.draft.take());
-                self.settings = file.settings.into();
+                self.take_settings(file.settings.into());
                 self.asked = Some(self.settings);
+                self.checkpoint = Some(path.clone());
                 self.tab = Tab::Results;
                 self.begin(Task::Resume(path, file));
             }
+        }
+    }
+
+    /// Holds out for validation what the method needs, if the method before needed something else; a share of the user stays.
+    pub(super) fn follow_method(&mut self, before: Method) {
+        let mut settings = self.settings;
+        settings.training.method = before;
+        if settings.validation_fraction() != self.settings.validation_fraction() {
+            self.set_held_out();
         }
     }
 
@@ -111,6 +128,13 @@ impl OwnDataView {
         if let Some(draft) = &mut self.draft {
             draft.plan.division.validation_fraction = fraction;
         }
+    }
+
+    /// The same network file as it is in the list, if it is there: lists and cards, which ask in every frame, know a network
+    /// by its place in memory.
+    fn listed(&self, file: Arc<MeasuredNetworkFile>) -> Arc<MeasuredNetworkFile> {
+        let same = self.runs.runs.iter().find(|run| *run.trained.file == *file);
+        same.map_or(file, |run| Arc::clone(&run.trained.file))
     }
 
     fn take_training(&mut self, event: TrainingEvent, effects: &mut Vec<Effect>) {
@@ -125,10 +149,13 @@ impl OwnDataView {
                     self.tab = Tab::Results;
                     self.chart.fit(&trained);
                 }
-                if matches!(trained.phase, Phase::Ended(_)) && self.runs.add(&trained) {
-                    self.keeping.keep(&trained.file);
+                if matches!(trained.phase, Phase::Ended(_)) {
+                    trained.file = self.listed(trained.file);
+                    if self.runs.add(&trained) {
+                        self.keeping.keep(&trained.file);
+                    }
                 }
-                self.shown = Some(*trained);
+                self.put_on_show(*trained);
             }
             TrainingEvent::Validated(validated) => {
                 self.validated = Some(*validated);

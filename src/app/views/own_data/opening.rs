@@ -6,14 +6,15 @@ use std::{
 };
 
 use super::{
-    draft::{Draft, file_name},
+    draft::{Draft, file_name, missing},
     model::{Positions, Tested, Trained},
     remarks::in_window,
+    renaming::Renaming,
 };
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     export::{DocumentKind, MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
-    import::{DialectChoice, InspectedFile, Joined, Missing, Plan, Progress, Recipe, holds_positions, suggested_plan},
+    import::{InspectedFile, Joined, Plan, Progress, Recipe, holds_positions, suggested_plan, suggested_plan_in_order},
 };
 
 /// Files to be opened.
@@ -32,10 +33,8 @@ pub(super) struct Files {
     pub(super) new: Vec<PathBuf>,
     /// Files that are open, to which recordings are added.
     pub(super) open: Vec<PathBuf>,
-    /// Layout of files of text, as far as the user has told it.
-    pub(super) dialect: DialectChoice,
-    /// Cells that mean missing.
-    pub(super) missing: Vec<Missing>,
+    /// The import with them, whose choices the new one keeps.
+    pub(super) older: Option<Box<Draft>>,
 }
 
 /// Contents of a file that was opened.
@@ -140,6 +139,14 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             }
         }
     }
+    let of_test = files.older.as_ref().and_then(|older| older.tests().next());
+    let is_test = |path: &&PathBuf| of_test.is_some_and(|(_, test)| test == *path);
+    if let Some(path) = files.new.iter().find(is_test) {
+        return Err(format!(
+            "'{}' is a file for the test, so it cannot be trained on: close it under “Files” first",
+            path.display()
+        ));
+    }
     let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) =
         files.new.into_iter().partition(|path| holds_positions(path));
     let positions = match (&positions[..], files.open.is_empty() && recordings.is_empty()) {
@@ -161,31 +168,59 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     if let (Some(path), []) = (&positions, &recordings[..]) {
         return Ok(Opened::Positions(path.clone()));
     }
+    let is_same_files = recordings.is_empty();
     let mut paths = files.open;
     for path in recordings {
         if !paths.contains(&path) {
             paths.push(path);
         }
     }
+    let recipe = to_look_at(paths, files.older.as_deref());
+    let inspected_files = recipe.inspect(Path::new(""), &mut watch);
+    let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
+    // Which file has the readings is guessed only where there are others than before.
+    let mut plan = if is_same_files {
+        suggested_plan_in_order(&inspected_files)
+    } else {
+        suggested_plan(&inspected_files)
+    };
+    plan.import.dialect = recipe.dialect;
+    plan.import.missing = match &files.older {
+        Some(older) => {
+            let stems = plan.import.stems();
+            let joined = plan.import.join.iter().zip(&stems);
+            let joined = joined.map(|(joined, stem)| (joined.file.as_path(), Some(stem.as_str())));
+            let all = std::iter::once((plan.import.data.as_path(), None)).chain(joined);
+            missing(&Renaming::new(&older.files, all).missing(&older.missing))
+        }
+        None => recipe.missing,
+    };
+    plan.import.positions = positions;
+    Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+}
+
+/// The recipe by which recordings are looked at for the first time: laid out as those of an older import, whose stems they
+/// keep. Cells that mean missing in a column are left out, as its name may change.
+fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
+    let of_older = |file: &PathBuf| {
+        let mut joined = older.iter().flat_map(|older| &older.plan.import.join);
+        joined.find(|joined| joined.file == *file)?.stem.clone()
+    };
+    let missing = older.map(|older| missing(&older.missing)).unwrap_or_default();
     let mut paths = paths.into_iter();
-    let recipe = Recipe {
+    Recipe {
         data: paths.next().unwrap_or_default(),
         join: paths
             .map(|file| Joined {
+                stem: of_older(&file),
                 file,
                 ..Joined::default()
             })
             .collect(),
-        dialect: files.dialect,
-        missing: files.missing,
+        dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
+        missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
         ..Recipe::default()
-    };
-    let inspected_files = recipe.inspect(Path::new(""), &mut watch);
-    let mut plan = suggested_plan(&inspected_files.map_err(|error| in_window(&error))?);
-    plan.import.dialect = recipe.dialect;
-    plan.import.missing = recipe.missing;
-    plan.import.positions = positions;
-    Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+    }
 }
 
 /// The import of a plan.
@@ -242,7 +277,7 @@ fn opened_network(file: MeasuredNetworkFile, watch: &mut dyn FnMut(Progress) -> 
             return Err("it has other columns now".to_owned());
         }
         let answers = file.network.decouple(&sets.test);
-        let tested = Tested::new(sets.test, answers, Positions::of(&sets.recording));
+        let tested = Tested::new(sets.test, answers, Positions::of(&sets.recording), &file.targets);
         if tested.errors() == file.errors {
             Ok(tested)
         } else {

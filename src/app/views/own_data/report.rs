@@ -2,6 +2,7 @@ use eframe::egui::{RichText, Ui};
 
 use super::{
     checking::Checked,
+    draft::Draft,
     error_table::error_tables_ui,
     model::{Trained, Validated},
     remarks::{flattery, sentence},
@@ -15,7 +16,6 @@ use crate::{
     },
     dataset::SplitBy,
     export::{format_duration, format_number},
-    import::Plan,
     sensor::counted,
 };
 
@@ -47,7 +47,7 @@ pub(super) fn report_ui(ui: &mut Ui, view: &OwnDataView) {
 fn samples_ui(ui: &mut Ui, view: &OwnDataView) {
     section_heading_ui(ui, "Samples");
     match &view.checking.checked {
-        Some(Ok(checked)) => checked_ui(ui, checked, view.draft.as_ref().map(|draft| &draft.plan)),
+        Some(Ok(checked)) => checked_ui(ui, checked, view.draft.as_ref()),
         Some(Err(reason)) => {
             note_ui(ui, &sentence(reason));
         }
@@ -61,7 +61,7 @@ fn samples_ui(ui: &mut Ui, view: &OwnDataView) {
     }
 }
 
-fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
+fn checked_ui(ui: &mut Ui, checked: &Checked, draft: Option<&Draft>) {
     let [training, validation, test] = checked.samples;
     fact_ui(
         ui,
@@ -107,7 +107,7 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
     if let Some(positions) = &checked.positions {
         dim_ui(ui, &sentence(positions));
     }
-    let is_random = plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random);
+    let is_random = draft.is_some_and(|draft| !draft.has_tests() && draft.plan.division.by == SplitBy::Random);
     if is_random {
         note_ui(ui, flattery(SplitBy::Random));
     }
@@ -119,9 +119,8 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, plan: Option<&Plan>) {
 fn errors_ui(ui: &mut Ui, shown: &Trained, view: &OwnDataView) {
     section_heading_ui(ui, "Errors on the test set");
     let plan = &shown.file.plan;
-    let now = view.draft.as_ref().and_then(|draft| draft.plan().ok());
-    let is_changed =
-        now.is_some_and(|now| now.absolute() != *plan) || view.asked.is_some_and(|asked| asked != view.settings);
+    let is_changed = view.planned().is_some_and(|now| now.absolute != *plan)
+        || view.asked.is_some_and(|asked| asked != view.settings);
     if is_changed && !view.phase.is_busy() {
         let name = &shown.name;
         dim_ui(

@@ -63,7 +63,7 @@ pub(super) fn results_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effect
             view.chart.sample = number - 1;
         }
     });
-    match view.chart.chart(shown) {
+    match view.chart.chart(shown, &view.curves) {
         Chart::Plots(figure) => {
             legend_ui(ui, &figure.keys);
             plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
@@ -93,7 +93,7 @@ fn surfaces_and_sample_ui(ui: &mut Ui, view: &mut OwnDataView, look: Look, effec
         tab: ChartTab::Sample,
         ..view.chart
     };
-    let values = view.shown.as_ref().map(|shown| values.chart(shown));
+    let values = view.shown.as_ref().map(|shown| values.chart(shown, &view.curves));
     match values {
         Some(Chart::Plots(figure)) if whole.height() > TALL => {
             let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + (SURFACES * whole.height()).floor());

@@ -1,5 +1,7 @@
 //! The list of networks, and two of them side by side.
 
+use std::sync::Arc;
+
 use eframe::egui::{Button, RichText, ScrollArea, Ui};
 
 use super::{error_table::error_tables_ui, model::Trained, runs::Runs, state::OwnDataView};
@@ -36,7 +38,9 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     let mut click = None;
     ui.allocate_ui([ui.available_width(), 0.45 * whole].into(), |ui| {
         ui.set_min_height(0.45 * whole);
-        click = list_ui(ui, &view.runs, |run| shown.as_ref() == Some(&run.file));
+        click = list_ui(ui, &view.runs, |run| {
+            shown.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &run.file))
+        });
     });
     match click {
         Some(TableClick::Mark(place)) => {
@@ -53,7 +57,7 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
     marked_ui(ui, view);
     let marked = view.runs.marked.and_then(|place| view.runs.get(place));
     match (marked.map(|(marked, _)| marked), &view.shown) {
-        (Some(marked), Some(shown)) if marked.file != shown.file => {
+        (Some(marked), Some(shown)) if !Arc::ptr_eq(&marked.file, &shown.file) => {
             ScrollArea::vertical()
                 .id_salt("compared")
                 .auto_shrink(false)
@@ -95,21 +99,18 @@ fn list_ui(ui: &mut Ui, runs: &Runs, is_shown: impl Fn(&Trained) -> bool) -> Opt
     let palette = Theme::of(ui).palette;
     // As many targets as there is room for; all are in the report.
     const MOST_TARGETS: usize = 3;
-    let targets: Vec<String> = runs
+    let mut targets: Vec<String> = Vec::new();
+    for target in runs
         .runs
         .iter()
-        .flat_map(|run| run.trained.file.targets.iter().map(|target| target.title()))
-        .fold(Vec::new(), |mut names, name| {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-            names
-        });
-    let headings: Vec<String> = targets
-        .iter()
-        .take(MOST_TARGETS)
-        .map(|name| format!("RMSE {name}"))
-        .collect();
+        .flat_map(|run| run.trained.file.targets.iter().take(MOST_TARGETS))
+    {
+        let name = target.title();
+        if targets.len() < MOST_TARGETS && !targets.contains(&name) {
+            targets.push(name);
+        }
+    }
+    let headings = Vec::from_iter(targets.iter().map(|name| format!("RMSE {name}")));
     let figure = |heading, text| TableColumn {
         heading,
         is_figure: true,
@@ -138,7 +139,7 @@ fn list_ui(ui: &mut Ui, runs: &Runs, is_shown: impl Fn(&Trained) -> bool) -> Opt
             cell(split(&run.file.plan)),
             cell(run.epochs_run.to_string()),
         ];
-        cells.extend(targets.iter().take(MOST_TARGETS).map(rmse));
+        cells.extend(targets.iter().map(rmse));
         TableRow {
             label: run.name.clone(),
             is_marked: runs.marked == Some(place),

@@ -9,11 +9,13 @@ use std::{
 use super::{
     charts::ChartChoice,
     checking::Checking,
+    curves::Curves,
     draft::{Draft, file_name},
     judging::Measuring,
     keeping::Keeping,
     model::{Trained, Validated},
     opening::{Files, Opening, ToOpen},
+    planned::Planned,
     runs::Runs,
     surfaces::SurfacesChoice,
     training::{Command, Task, Trainer, ValidationChoice},
@@ -21,7 +23,7 @@ use super::{
 use crate::{
     app::{job::Wake, shared::Phase},
     evaluation::{Measured, RunSettings},
-    import::{Meaning, Progress},
+    import::{Meaning, Plan, Progress},
     scene::RowModel,
 };
 
@@ -69,6 +71,12 @@ pub struct OwnDataView {
     /// As [`Self::choices`], for the file with positions of targets.
     pub(super) positions_choices: Sender<PathBuf>,
     pub(super) chosen_positions: Receiver<PathBuf>,
+    /// The checkpoint that the training on show was resumed from.
+    pub(super) checkpoint: Option<PathBuf>,
+    /// Row-wires told apart or not, as chosen, also while no column has their numbers.
+    pub(super) rows: RowModel,
+    /// The epochs of the network on show, as far as its curves need them.
+    pub(super) curves: Curves,
 }
 
 /// Cards in the middle.
@@ -122,6 +130,9 @@ impl OwnDataView {
             chosen_for_test,
             positions_choices,
             chosen_positions,
+            checkpoint: None,
+            rows: RowModel::Shared,
+            curves: Curves::default(),
         }
     }
 
@@ -154,13 +165,8 @@ impl OwnDataView {
     }
 
     fn open_with(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
-        let import = self.draft.as_ref().map(|draft| &draft.plan.import);
-        self.opening.start(ToOpen::Files(Files {
-            new,
-            open,
-            dialect: import.map(|import| import.dialect).unwrap_or_default(),
-            missing: import.map(|import| import.missing.clone()).unwrap_or_default(),
-        }));
+        let older = self.draft.clone().map(Box::new);
+        self.opening.start(ToOpen::Files(Files { new, open, older }));
     }
 
     /// Reason for which no training can begin, with what to do.
@@ -180,11 +186,10 @@ impl OwnDataView {
         if self.phase.is_busy() || self.obstacle().is_some() {
             return;
         }
-        let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) else {
-            return;
-        };
+        let Some(planned) = self.planned() else { return };
         self.asked = Some(self.settings);
-        self.begin(Task::Train(Box::new(plan), self.settings));
+        self.checkpoint = None;
+        self.begin(Task::Train(Box::new(planned.plan.clone()), self.settings));
     }
 
     /// Begins a cross-validation.
@@ -192,11 +197,12 @@ impl OwnDataView {
         if self.phase.is_busy() || self.obstacle().is_some() {
             return;
         }
-        if let Some(plan) = self.draft.as_ref().and_then(|draft| draft.plan().ok()) {
+        if let Some(planned) = self.planned() {
             self.is_validating = true;
             // The thread that could go on is gone.
             self.asked = None;
-            self.begin(Task::Validate(Box::new(plan), self.settings, self.validation));
+            let plan = Box::new(planned.plan.clone());
+            self.begin(Task::Validate(plan, self.settings, self.validation));
         }
     }
 
@@ -238,17 +244,11 @@ impl OwnDataView {
                 Phase::Ended(reason) => reason != crate::training::StopReason::Diverged,
                 _ => false,
             };
-        let is_same_plan = || {
-            self.draft
-                .as_ref()
-                .and_then(|draft| draft.plan().ok())
-                .map(|plan| plan.absolute())
-        };
         let fixed = RunSettings {
             training: asked.training,
             ..self.settings
         };
-        is_there && fixed == asked && shown.checkpoint.is_some() && is_same_plan().as_ref() == Some(&shown.file.plan)
+        is_there && fixed == asked && shown.checkpoint.is_some() && self.is_planned(&shown.file.plan)
     }
 
     /// Goes on from the present weights.
@@ -257,6 +257,16 @@ impl OwnDataView {
             self.asked = Some(self.settings);
             self.trainer.command(Command::Continue(self.settings.training));
         }
+    }
+
+    /// The plan of the import, if it is complete.
+    pub(super) fn planned(&self) -> Option<Arc<Planned>> {
+        self.draft.as_ref()?.planned().ok()
+    }
+
+    /// Tells whether the import is still this one, whose paths are absolute.
+    pub(super) fn is_planned(&self, plan: &Plan) -> bool {
+        self.planned().is_some_and(|planned| planned.absolute == *plan)
     }
 
     pub(super) fn phase_at_rest(&self) -> Phase {
@@ -282,7 +292,7 @@ impl OwnDataView {
             }
             _ => {
                 let trained = trained.clone();
-                self.settings = trained.file.settings.into();
+                self.take_settings(trained.file.settings.into());
                 self.opening.start(ToOpen::Plan(Box::new(trained.file.plan.clone())));
                 self.show(trained, None);
                 self.tab = Tab::Results;
@@ -295,7 +305,19 @@ impl OwnDataView {
         self.phase = trained.phase;
         self.asked = asked;
         self.chart.fit(&trained);
+        self.put_on_show(trained);
+    }
+
+    /// Shows a network, or how it stands by now.
+    pub(super) fn put_on_show(&mut self, trained: Trained) {
+        self.curves.follow(&trained.file.training.history);
         self.shown = Some(trained);
+    }
+
+    /// Takes the settings of a network.
+    pub(super) fn take_settings(&mut self, settings: RunSettings) {
+        self.rows = settings.source.row_model();
+        self.settings = settings;
     }
 
     /// Name of the recording, for names of files.

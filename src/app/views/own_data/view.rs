@@ -15,7 +15,7 @@ use super::{
     tools,
 };
 use crate::app::{
-    shared::{Columns, Effect, Export, Look, Matter, Notice, Offers, Phase, Shared, View},
+    shared::{Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, Shared, View},
     theme::space,
     widgets::{card_ui, tabs_ui},
 };
@@ -29,7 +29,7 @@ impl View for OwnDataView {
     }
 
     fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.take_chosen();
+        self.take_chosen(effects);
         self.follow_keeping(shared, effects);
         self.follow(effects);
     }
@@ -50,6 +50,23 @@ impl View for OwnDataView {
             self.open(paths.to_vec());
         }
         true
+    }
+
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        let mut used: Vec<FileInUse> = Vec::new();
+        if let Some(draft) = &self.draft {
+            let tests = draft.tests().map(|(_, test)| test.to_owned());
+            let positions = draft.plan.import.positions.clone();
+            let all = draft.paths().into_iter().chain(tests).chain(positions);
+            used.extend(all.map(FileInUse::Recording));
+        }
+        // Its charts, its checkpoint and its decoders are of these.
+        if let Some(shown) = &self.shown {
+            used.extend(shown.file.plan.files().cloned().map(FileInUse::Recording));
+        }
+        used.extend(self.checkpoint.clone().map(FileInUse::Checkpoint));
+        used.extend(self.keeping.folder.clone().map(FileInUse::Kept));
+        used
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {

@@ -22,6 +22,9 @@ const LONGEST_WAIT: Duration = Duration::from_secs(60);
 /// If decoding cannot begin or go on, with the reason.
 pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
     let send = |event| report.send(event);
+    let source = plan.source.looked_up();
+    send(LiveEvent::Source(source.clone()));
+    let plan = LivePlan { source, ..plan };
     let Some(mut session) = Session::open(plan, &|| !report.is_cancelled())? else {
         return Ok(());
     };

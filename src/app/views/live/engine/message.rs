@@ -58,6 +58,19 @@ pub enum SourcePlan {
     Stream(Source),
 }
 
+impl SourcePlan {
+    /// The source by what is at its path: a named pipe or a device has no end to go back from, and is a stream. Asks the
+    /// file system, which may take its time.
+    pub(super) fn looked_up(self) -> Self {
+        match self {
+            Self::Replay { path, .. } if path.exists() && !path.is_file() && !path.is_dir() => {
+                Self::Stream(Source::File(path))
+            }
+            other => other,
+        }
+    }
+}
+
 /// Change to what is decoded.
 #[derive(Clone, Debug)]
 pub enum Command {
@@ -86,6 +99,8 @@ pub enum Command {
 /// News from the thread.
 #[derive(Debug)]
 pub enum LiveEvent {
+    /// The source, by what was found at its path.
+    Source(SourcePlan),
     /// The latest frame, and how decoding stands.
     Shown(Box<LiveShown>),
     /// Gains of the unloaded state, or the reason for which there are none.

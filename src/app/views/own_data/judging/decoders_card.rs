@@ -68,7 +68,7 @@ pub fn decoders_ui(ui: &mut Ui, view: &mut OwnDataView) {
             is_wanted = ui.add_enabled(is_possible, ghost_button("Measure again")).clicked();
         }
     });
-    if decoders.of != shown {
+    if !Arc::ptr_eq(&decoders.of, &shown) {
         dim_ui(
             ui,
             "These were measured beside another network: measure again for the one on show.",

@@ -25,11 +25,11 @@ const CURVE_HEIGHT: f32 = space(60);
 pub fn findings_ui(ui: &mut Ui, view: &mut OwnDataView) {
     scrolled_ui(ui, "findings", |ui| {
         begin_ui(ui, view);
-        let now = view.draft.as_ref().and_then(|draft| draft.plan().ok());
+        let now = view.planned();
         let settings = view.settings;
         let Measuring { told, target, .. } = &mut view.measuring;
         let Some(told) = told else { return };
-        if now.is_some_and(|now| now.absolute() != told.plan) || settings != told.settings {
+        if now.is_some_and(|now| now.absolute != told.plan) || settings != told.settings {
             dim_ui(
                 ui,
                 "The import or the settings have changed since: measure again for what is chosen now.",
@@ -102,8 +102,8 @@ fn begin_ui(ui: &mut Ui, view: &mut OwnDataView) {
         let of_last = view.shown.as_ref().and_then(|shown| shown.wall_time);
         dim_ui(ui, &cost(view.measuring.model, channels, folds, of_last));
     }
-    if is_wanted && let Some(plan) = view.draft.as_ref().and_then(|draft| draft.plan().ok()) {
-        view.measuring.find(plan, view.settings, folds);
+    if is_wanted && let Some(planned) = view.planned() {
+        view.measuring.find(planned.plan.clone(), view.settings, folds);
         ui.request_repaint();
     }
 }

@@ -181,7 +181,7 @@ impl<'a> Training<'a> {
         let is_standing = phase != Phase::Training;
         let saved = is_standing.then(|| MeasuredCheckpointFile::from_run(&self.run, plan, &self.about.samples_crc32));
         let answers = self.run.decouple_test();
-        let tested = Tested::new(Arc::clone(self.run.test()), answers.clone(), positions.clone());
+        let tested = Tested::new(Arc::clone(self.run.test()), answers.clone(), positions.clone(), targets);
         let trained = Trained {
             name: String::new(),
             tested: Some(Arc::new(tested)),

@@ -2,7 +2,7 @@ use std::{fs, path::Path};
 
 /// Returns true if two paths lead to the same file, existing or not, also through links and hard links. Pipes and devices
 /// are never the same: reading from one does not destroy what was written to it.
-pub(super) fn is_same(one: &Path, other: &Path) -> bool {
+pub(crate) fn is_same(one: &Path, other: &Path) -> bool {
     let is_special = |path: &Path| fs::metadata(path).is_ok_and(|found| !found.is_file());
     if is_special(one) || is_special(other) {
         return false;

@@ -1,0 +1,258 @@
+//! What the user chose for an import stays when a file is added, or the files are looked at again.
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use decoupler::{dataset::SplitBy, export::RecipeFile, import::Plan};
+use eframe::egui::{Event, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, vec2};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use tempfile::TempDir;
+
+use crate::{
+    driver::Driver,
+    recordings::{opened, opened_text, recording, written},
+};
+
+/// The import as it is saved now.
+fn saved_plan(driver: &mut Driver, folder: &TempDir) -> Plan {
+    let path = folder.path().join("saved recipe.json");
+    // A file of that name is asked about.
+    let _ = fs::remove_file(&path);
+    driver.save("Recipe of the import, JSON", &path);
+    RecipeFile::load(&path).unwrap()
+}
+
+/// Looks at the files again, with other cells that mean missing.
+fn call_missing(driver: &mut Driver, text: &str) {
+    if !driver.has("Missing cells") {
+        driver.click("Rows");
+    }
+    driver.enter("Missing cells", text);
+    driver.wait("the files", |driver| !driver.says("Reading "));
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    driver.settle();
+}
+
+/// Picks an option of the layout of text.
+fn lay_out(driver: &mut Driver, field: &str, option: &str) {
+    if !driver.has(field) {
+        driver.click("Layout of text");
+    }
+    driver.click(field);
+    driver.click_button(option);
+    driver.wait("the files", |driver| !driver.says("Reading "));
+    driver.settle();
+}
+
+fn meaning(driver: &Driver, column: &str) -> Option<String> {
+    driver.get(&format!("Meaning of {column}")).accesskit_node().value()
+}
+
+fn sensor_and_states(rows: usize) -> (String, String) {
+    let (mut sensor, mut states) = (String::new(), String::new());
+    for row in 0..rows {
+        let t = 1000.0 + 0.05 * row as f64;
+        let x = (row % 20) as f64;
+        writeln!(sensor, "{t:.3},{:.3},{:.3},{:.3}", 0.5 * x, x * x / 20.0, row % 7).unwrap();
+        writeln!(states, "{:.3},{x},{}", t + 0.004, row % 4).unwrap();
+    }
+    (sensor, states)
+}
+
+#[test]
+fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts() {
+    let folder = tempfile::tempdir().unwrap();
+    let (sensor, states) = sensor_and_states(80);
+    let sensor = written(&folder, "sensor.csv", &sensor);
+    let states = written(&folder, "states.csv", &states);
+    let mut driver = Driver::open();
+    // Alone, the column has no stem in front.
+    driver.open_recordings(&[&states]);
+    driver.enter("Unit of c2", "mm");
+    driver.mean("c3", "unused");
+    driver.drop_files(&[&sensor]);
+    driver.wait("the join", |driver| driver.says("states.csv is joined by time"));
+    driver.settle();
+    assert_eq!(meaning(&driver, "states.c3").as_deref(), Some("unused"));
+    driver.click("Joined files");
+    driver.click("Own limit for states.csv");
+    driver.enter("Limit", "0.0045");
+    driver.wait("the limit", |driver| driver.says("within 0.00450"));
+
+    call_missing(&mut driver, "-1");
+    driver.wait("the same limit", |driver| driver.says("within 0.00450"));
+    lay_out(&mut driver, "Decimal", "point");
+    driver.wait("the same limit", |driver| driver.says("within 0.00450"));
+    let third = written(&folder, "third.csv", &sensor_and_states(80).1);
+    driver.drop_files(&[&third]);
+    driver.wait("the third file", |driver| driver.says("third.csv is joined by time"));
+    driver.settle();
+    assert!(
+        driver.says("states.csv is joined by time within 0.00450"),
+        "{:#?}",
+        driver.texts()
+    );
+    let plan = saved_plan(&mut driver, &folder);
+    let of_states = plan.import.join.iter().find(|joined| joined.file == states).unwrap();
+    assert_eq!(of_states.limit, Some(0.0045));
+    assert_eq!(plan.import.units.get("states.c2").map(String::as_str), Some("mm"));
+    assert!(!plan.import.targets.contains(&"states.c3".to_owned()));
+}
+
+#[test]
+fn conditions_name_their_columns_also_where_another_file_comes_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let (sensor, states) = sensor_and_states(80);
+    let sensor = written(&folder, "sensor.csv", &sensor);
+    let states = written(&folder, "states.csv", &states);
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&states]);
+    driver.click("Rows");
+    driver.enter("Only rows with", "c3<3 and c2 >= 1");
+    driver.enter("Missing cells", "-1, c2=99");
+    driver.wait("the samples", |driver| driver.says("c3<3"));
+    driver.drop_files(&[&sensor]);
+    driver.wait("the join", |driver| driver.says("states.csv is joined by time"));
+    driver.settle();
+    let plan = saved_plan(&mut driver, &folder);
+    assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3 and states.c2>=1");
+    let missing: Vec<String> = plan.import.missing.iter().map(ToString::to_string).collect();
+    assert_eq!(missing, ["-1", "states.c2=99"]);
+}
+
+/// Rows of five sessions and two columns that could be groups.
+fn sessions() -> String {
+    let mut text = "session,block,u,v,force (N)\n".to_owned();
+    for row in 0..50 {
+        let (u, v) = (f64::from(row % 7), f64::from(row % 5));
+        writeln!(text, "s{},b{},{u},{v},{}", row / 10, row / 5, u + 2.0 * v).unwrap();
+    }
+    text
+}
+
+#[test]
+fn a_split_and_its_shares_survive_where_a_column_is_a_group() {
+    let (mut driver, _path, folder) = opened_text(&sessions());
+    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    driver.click("Split");
+    driver.click_button("time");
+    driver.enter("Test share", "30");
+    driver.enter("Validation share", "25");
+    driver.settle();
+    assert!(driver.says("time, 30 % test"));
+    call_missing(&mut driver, "-1");
+    lay_out(&mut driver, "Separator", "comma");
+    assert!(driver.says("time, 30 % test"), "{:#?}", driver.texts());
+    let division = saved_plan(&mut driver, &folder).division;
+    assert_eq!((division.by, division.test_fraction), (SplitBy::Time, 0.3));
+    assert_eq!(division.validation_fraction, 0.25);
+}
+
+#[test]
+fn the_group_chosen_last_is_the_group_and_a_wrong_layout_forgets_nothing() {
+    let (mut driver, _path, folder) = opened_text(&sessions());
+    driver.mean("session", "unused");
+    driver.mean("v", "group");
+    driver.mean("block", "group");
+    driver.mean("u", "unused");
+    driver.enter("Unit of force", "mN");
+    // One column of text, of which nothing can be used.
+    lay_out(&mut driver, "Separator", "tab");
+    assert!(!driver.has("Meaning of block"));
+    lay_out(&mut driver, "Separator", "comma");
+    for (column, expected) in [("session", "unused"), ("block", "group"), ("u", "unused")] {
+        assert_eq!(meaning(&driver, column).as_deref(), Some(expected), "{column}");
+    }
+    assert_ne!(meaning(&driver, "v").as_deref(), Some("group"));
+    driver.mean("v", "input");
+    let plan = saved_plan(&mut driver, &folder);
+    assert_eq!(plan.division.by, SplitBy::Group);
+    assert_eq!(plan.import.group.as_deref(), Some("block"));
+    assert_eq!(plan.import.units.get("force").map(String::as_str), Some("mN"));
+}
+
+fn choose_test_file(driver: &mut Driver, path: &Path) {
+    if !driver.has("Test file…") {
+        driver.click("Split");
+    }
+    driver.open_form("Test file…");
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Open");
+    driver.settle();
+}
+
+#[test]
+fn another_test_file_takes_the_place_of_the_first() {
+    let (mut driver, path, folder) = opened(60);
+    let [one, other] =
+        [("one.csv", 30), ("other.csv", 20)].map(|(name, rows)| written(&folder, name, &recording(rows)));
+    choose_test_file(&mut driver, &one);
+    driver.wait("its samples", |driver| driver.has("Test: 30"));
+    choose_test_file(&mut driver, &other);
+    driver.wait("its samples", |driver| driver.has("Test: 20"));
+    assert!(
+        driver.has("other.csv, for the test") && !driver.says("one.csv"),
+        "{:#?}",
+        driver.texts()
+    );
+    call_missing(&mut driver, "-1");
+    assert!(driver.has("Test: 20"));
+    // Samples that are trained on test nothing.
+    choose_test_file(&mut driver, &path);
+    assert!(driver.says("press.csv is trained on"), "{:#?}", driver.texts());
+    assert!(driver.has("other.csv, for the test"), "what was there stays");
+}
+
+#[test]
+fn each_joined_recording_has_a_test_file_and_no_more_are_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let (sensor, states) = sensor_and_states(80);
+    let (short_sensor, short_states) = sensor_and_states(30);
+    let file = |name: &str, text: &str| written(&folder, name, text);
+    let (sensor, states) = (file("sensor.csv", &sensor), file("states.csv", &states));
+    let (one, two) = (file("a.csv", &short_sensor), file("b.csv", &short_states));
+    let mut driver = Driver::open();
+    driver.open_recordings(&[&states, &sensor]);
+    choose_test_file(&mut driver, &one);
+    driver.wait("what is missing", |driver| {
+        driver.says("states.csv has no file for the test yet")
+    });
+    choose_test_file(&mut driver, &two);
+    driver.wait("its samples", |driver| driver.has("Test: 30"));
+    let third = file("c.csv", "1,2\n");
+    choose_test_file(&mut driver, &third);
+    assert!(driver.says("close those files first"), "{:#?}", driver.texts());
+    assert!(driver.has("Test: 30") && !driver.says("c.csv"));
+}
+
+#[test]
+fn a_unit_counts_when_its_row_scrolls_out_of_view() {
+    let mut text = (1..=120)
+        .map(|column| format!("u{column}"))
+        .collect::<Vec<_>>()
+        .join(",")
+        + ",force\n";
+    for row in 0..12 {
+        let cells: Vec<String> = (0..121)
+            .map(|column| ((row * 7 + column * 3) % 11).to_string())
+            .collect();
+        text += &(cells.join(",") + "\n");
+    }
+    let (mut driver, _path, folder) = opened_text(&text);
+    driver.type_into("Unit of u3", "m V");
+    let over = driver.get("Meaning of u3").rect().center();
+    let harness = driver.harness();
+    harness.event(Event::PointerMoved(over));
+    for _ in 0..5 {
+        harness.event(Event::MouseWheel {
+            unit: MouseWheelUnit::Point,
+            delta: vec2(0.0, -400.0),
+            phase: TouchPhase::Move,
+            source: MouseWheelSource::Wheel,
+            modifiers: Modifiers::NONE,
+        });
+        harness.run_steps(4);
+    }
+    assert!(driver.harness().query_by_label("Unit of u3").is_none(), "out of view");
+    let plan = saved_plan(&mut driver, &folder);
+    assert_eq!(plan.import.units.get("u3").map(String::as_str), Some("m V"));
+}
