@@ -1,5 +1,3 @@
-use rand::Rng;
-
 use super::{Interval, channel_importance::rmse_ratio};
 use crate::{
     dataset::{Dataset, SplitBy},
@@ -19,16 +17,11 @@ impl NonlinearGain {
     ///
     /// # Panics
     /// If the set is not the one that was cross-validated.
-    pub fn of_validated(
-        set: &Dataset,
-        validated: &CrossValidated,
-        by: SplitBy,
-        rng: &mut impl Rng,
-    ) -> Vec<Option<Self>> {
+    pub fn of_validated(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Self>> {
         let answers = [validated.network.view(), validated.linear.view()];
         (0..set.outputs())
             .map(|target| {
-                let ratio = rmse_ratio(set, answers, target, by, rng)?;
+                let ratio = rmse_ratio(set, answers, target, by)?;
                 Some(Self { ratio })
             })
             .collect()
@@ -45,11 +38,15 @@ impl NonlinearGain {
     /// A sentence on the target of this name where the network is no better than ridge, or hardly.
     pub fn remark(&self, name: &str) -> Option<String> {
         (!self.is_supported()).then(|| {
-            let Interval { value, low, high } = self.ratio;
-            let better = if high < 1.0 { "hardly better" } else { "no better" };
+            let better = if self.ratio.high < 1.0 {
+                "hardly better"
+            } else {
+                "no better"
+            };
             format!(
-                "the network is {better} than ridge for {name} (error {value:.2} times ridge's, {low:.2} to {high:.2}): \
-                 these data do not support more than a linear map; give more samples, or take ridge"
+                "the network is {better} than ridge for {name} (error {} times ridge's): these \
+                 data do not support more than a linear map; give more samples, or take ridge",
+                self.ratio
             )
         })
     }
