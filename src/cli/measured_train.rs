@@ -131,6 +131,7 @@ impl Train {
         targets: &[Channel],
     ) -> Result<Vec<String>, Failure> {
         let by = SplitBy::honest(set);
+        let graceful = Graceful::begin();
         announce_comparison(by);
         let settings = *run.settings();
         let honest = || -> Result<Run, RunError> {
@@ -151,7 +152,6 @@ impl Train {
             settings.training.stopping.epochs,
             "{bar:30} second training, to compare",
         );
-        let graceful = Graceful::begin();
         while !graceful.is_end_requested() && honest.step().is_none() {
             bar.inc(1);
         }
@@ -186,8 +186,8 @@ impl Train {
         let (mut flattery, mut end) = (Vec::new(), Ok(()));
         if by == SplitBy::Random {
             let honest = SplitBy::honest(set);
-            announce_comparison(honest);
             let graceful = Graceful::begin();
+            announce_comparison(honest);
             let is_cancelled = || graceful.is_end_requested();
             match SplitComparison::complete(settings, set, folds, (by, &validated), &is_cancelled)? {
                 Some(comparison) => flattery = sentences(&comparison, &recording.targets),
