@@ -1,4 +1,5 @@
 use std::{
+    fmt,
     io::{Write, stderr},
     path::PathBuf,
     time::{Duration, Instant},
@@ -31,6 +32,22 @@ pub(super) struct CheckpointArguments {
     /// Seconds between two checkpoints
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "checkpoint")]
     checkpoint_interval: f64,
+}
+
+/// Refuses an argument that differs from what the checkpoint has. Every argument that a checkpoint fixes goes through here.
+pub(super) fn check_same<T: fmt::Display>(
+    argument: &str,
+    given: Option<T>,
+    saved: impl fmt::Display,
+) -> Result<(), Failure> {
+    let saved = saved.to_string();
+    match given.map(|given| given.to_string()).filter(|given| *given != saved) {
+        Some(given) => Err(Failure::Arguments(format!(
+            "--{argument} {given}: the checkpoint has {saved}; leave it out to resume, or start a new training with another \
+             --checkpoint"
+        ))),
+        None => Ok(()),
+    }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

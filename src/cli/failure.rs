@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::{interruption, specification_error::SpecificationError};
 use crate::{
-    dataset::{ReadError, SimulationError, system_cause},
+    dataset::{ReadError, SimulationError, SplitBy, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
     export::{
         DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
@@ -54,6 +54,10 @@ pub(super) enum Failure {
     OtherSamples { path: PathBuf, data: PathBuf },
     #[error("{0}")]
     Interrupted(Interruption),
+    #[error(
+        "interrupted during the second training; the first is complete, and how optimistic its random test samples are is not known: use --split {by}"
+    )]
+    InterruptedComparison { by: SplitBy },
     #[error(transparent)]
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
@@ -199,6 +203,7 @@ impl Failure {
             Self::Run(error) if comes_of_arguments(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_)
+            | Self::InterruptedComparison { .. }
             | Self::InterruptedTrials { .. }
             | Self::InterruptedTrade { .. }
             | Self::InterruptedFollow => interruption::STATUS,

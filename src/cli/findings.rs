@@ -66,7 +66,8 @@ impl StudyArguments {
         let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
         settings.hidden = self.hidden.unwrap_or(settings.hidden);
         settings.seed = self.seed.map_or(settings.seed, Seed);
-        let folds = import.folds.unwrap_or(FOLDS);
+        let by = plan.division.by;
+        let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
         let begin = |stage: Stage| {
             bar.inc(1);

@@ -97,6 +97,12 @@ impl From<Interval> for Figure {
     }
 }
 
+impl From<Figure> for Interval {
+    fn from(Figure { value, low, high }: Figure) -> Self {
+        Self { value, low, high }
+    }
+}
+
 /// A sentence of its own.
 fn capitalised(sentence: &str) -> String {
     let mut letters = sentence.chars();
@@ -231,10 +237,7 @@ impl<'a> Report<'a> {
         for channel in &self.channels {
             write!(out, "{:<width$}", channel.name)?;
             for (growth, column) in channel.growth.iter().zip(&columns) {
-                let text = growth.map_or_else(
-                    || "–".to_owned(),
-                    |Figure { value, low, high }| format!("{value:.2} ({low:.2} to {high:.2})"),
-                );
+                let text = growth.map_or_else(|| "–".to_owned(), |growth| Interval::from(growth).to_string());
                 write!(out, "  {text:>column$}")?;
             }
             writeln!(out, "{}", if channel.is_dispensable { "  dispensable" } else { "" })?;
@@ -290,7 +293,7 @@ impl<'a> Target<'a> {
             }),
             sentence: describe_target(name, of),
             r2_network: r2(of.network),
-            r2_ridge: r2(of.ridge),
+            r2_ridge: r2(of.ridge.ok()),
             network_to_ridge: of.gain.map(|gain| gain.ratio.into()),
             splits: findings.comparison.as_ref().map(|comparison| {
                 let rmse = |errors: &[TargetErrors]| errors[index].rmse;

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{failure::Failure, output::progress_bar};
+use super::{checkpointing::check_same, failure::Failure, output::progress_bar};
 use crate::{
     dataset::{Division, SplitBy},
     export::RecipeFile,
@@ -82,7 +82,7 @@ pub(super) struct ImportArguments {
     /// Write a file (JSON) by which --recipe repeats this import and split
     #[arg(long, value_name = "FILE")]
     save_recipe: Option<PathBuf>,
-    /// Samples of the test: the last in time, whole groups, or random ones [default: time]
+    /// Samples of the test: the last in time, whole groups, or random ones [default: group with --group, else time]
     #[arg(long, value_name = "time|group|random")]
     split: Option<SplitBy>,
     /// Share of the samples for the test [default: 0.2]
@@ -207,6 +207,32 @@ impl ImportArguments {
         }
     }
 
+    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Those that name files and columns
+    /// need --data, which is refused already.
+    pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {
+        let division = &saved.division;
+        check_same("split", self.split, division.by)?;
+        check_same("test-fraction", self.test_fraction, division.test_fraction)?;
+        check_same(
+            "validation-fraction",
+            self.validation_fraction,
+            division.validation_fraction,
+        )?;
+        let given = [
+            (self.test_data.is_some(), "--test-data"),
+            (self.folds.is_some(), "--folds"),
+            (self.save_recipe.is_some(), "--save-recipe"),
+            (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
+        ];
+        match given.into_iter().find(|(is_given, _)| *is_given) {
+            Some((_, argument)) => Err(Failure::Arguments(format!(
+                "{argument}: the checkpoint names the files and their division; leave it out to resume, or start a new \
+                 training with another --checkpoint"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
     pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
         self.plan_of(inputs, &self.targets)
@@ -222,10 +248,16 @@ impl ImportArguments {
                 }
                 RecipeFile::load(path)?
             }
-            None => Plan {
-                import: self.import(inputs, targets)?,
-                ..Plan::default()
-            },
+            None => {
+                let mut plan = Plan {
+                    import: self.import(inputs, targets)?,
+                    ..Plan::default()
+                };
+                if self.group.is_some() {
+                    plan.division.by = SplitBy::Group;
+                }
+                plan
+            }
         };
         let Division {
             by,

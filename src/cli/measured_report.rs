@@ -13,10 +13,10 @@ use super::{
     output::{print as print_with, print_object},
 };
 use crate::{
-    dataset::{Dataset, Stream},
+    dataset::Dataset,
     evaluation::{
         CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
-        recorded::{Determination, NonlinearGain},
+        recorded::{Determination, NonlinearGain, Undetermined},
     },
     export::{MeasuredNetworkFile, describe_positions, describe_standings, describe_worse_than_ridge, format_duration},
     import::{Channel, Dropped, Plan, PlannedSets, Recording, TargetPosition},
@@ -179,7 +179,7 @@ pub(super) struct Judged<'a> {
     pub(super) flaw: Option<&'a RunFlaw>,
     pub(super) wall_time: Option<Duration>,
     /// R² of each target on the test samples, with its interval.
-    pub(super) told: Vec<Option<Determination>>,
+    pub(super) told: Vec<Result<Determination, Undetermined>>,
     /// Errors that a random split hides, in words.
     pub(super) flattery: Vec<String>,
 }
@@ -267,9 +267,8 @@ impl<'a> Folds<'a> {
     ) -> Self {
         let (set, channels, by) = (&recording.set, &recording.targets, plan.division.by);
         let table = validated.target_table(set);
-        let mut rng = settings.seed.rng(Stream::Resampling);
-        let told = Determination::measure(set, validated.network.view(), by, &mut rng);
-        let gains = NonlinearGain::of_validated(set, validated, by, &mut rng);
+        let told = Determination::measure(set, validated.network.view(), by);
+        let gains = NonlinearGain::of_validated(set, validated, by);
         let better: Vec<&'static str> = (0..channels.len()).map(|target| best(&table, target)).collect();
         let mut warnings = recording.warnings.clone();
         warnings.extend(flattery);
@@ -283,7 +282,8 @@ impl<'a> Folds<'a> {
                 channel.name
             )
         }));
-        let of = |row: usize, told: &[Option<Determination>]| targets(channels, &table[row].targets, told);
+        let of =
+            |row: usize, told: &[Result<Determination, Undetermined>]| targets(channels, &table[row].targets, told);
         Self {
             files: files(std::iter::once(recording)),
             inputs: &recording.inputs,

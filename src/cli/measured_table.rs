@@ -3,7 +3,10 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use crate::{
-    evaluation::{TargetErrors, recorded::Determination},
+    evaluation::{
+        TargetErrors,
+        recorded::{Determination, Undetermined},
+    },
     export::format_number,
     import::Channel,
 };
@@ -26,7 +29,7 @@ pub(super) struct Target<'a> {
 pub(super) fn targets<'a>(
     channels: &'a [Channel],
     errors: &[TargetErrors],
-    told: &[Option<Determination>],
+    told: &[Result<Determination, Undetermined>],
 ) -> Vec<Target<'a>> {
     let target = |(index, (channel, errors)): (usize, (&'a Channel, &TargetErrors))| Target {
         name: &channel.name,
@@ -36,8 +39,7 @@ pub(super) fn targets<'a>(
         r2: errors.r2,
         r2_interval: told
             .get(index)
-            .copied()
-            .flatten()
+            .and_then(|told| told.ok())
             .map(|told| [told.r2.low, told.r2.high]),
         worst: errors.worst,
         percent_of_range: errors.percent_of_range,

@@ -13,6 +13,7 @@ use crate::{
     decoupling::DecoderKind,
     evaluation::{self, RunSettings, decoded_unit, measure_target_trade_off},
     import::{Plan, PlannedSets},
+    scene::RowModel,
     training::Method,
 };
 
@@ -112,6 +113,7 @@ impl Trade {
             self.test_samples.is_some(),
             false,
         ])?;
+        let rows = rows.unwrap_or(RowModel::Shared);
         let mut settings = RunSettings::from(evaluation::Measured { rows });
         settings.inputs.scaling = scaling.unwrap_or(settings.inputs.scaling);
         settings.seed = Seed(self.seed);

@@ -161,7 +161,7 @@ impl TradeOff {
         let mut warnings = self.report.warnings().to_vec();
         if self.by == SplitBy::Random && !self.report.has_test_file() {
             let message = "random test samples flatter where neighbouring rows of a recording are alike; decoupler train \
-                           measures by how much, and --split time or group avoids it";
+                           measures by how much, and --split group or time avoids it";
             warnings.push(message.to_owned());
         }
         warnings.extend(self.refused.iter().cloned());

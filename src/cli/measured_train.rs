@@ -1,9 +1,13 @@
-use std::path::Path;
+use std::{
+    io::{Write, stderr},
+    path::Path,
+};
 
 use super::{
     checkpointing::Saving,
     failure::Failure,
     import_arguments::{with_bar, working_folder},
+    interruption::Graceful,
     measured_report::{self, Folds, Judged, Report},
     output::progress_bar,
     train::Train,
@@ -11,7 +15,7 @@ use super::{
 use crate::{
     dataset::{self, Dataset, Division, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Run, RunError, RunSettings, TargetRow,
+        CrossValidated, Run, RunError, RunSettings,
         recorded::{Determination, SplitComparison},
     },
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
@@ -49,9 +53,12 @@ impl Train {
     /// Resumes the training of a checkpoint on measured samples.
     pub(super) fn resume_measured(&self, path: &Path, file: MeasuredCheckpointFile) -> Result<(), Failure> {
         let saved = file.settings;
-        self.training.check_resumed(&saved)?;
-        let training = self.training.training(saved.training)?;
         let plan = file.plan.clone();
+        self.import.check_resumed(&plan)?;
+        let has_row_wires = plan.import.row_wire.is_some();
+        let training = self
+            .training
+            .resumed_measured(&saved, &plan.import.inputs, has_row_wires)?;
         let settings: RunSettings = saved.into();
         let sets = self.sets(&plan, &settings)?;
         let found = MeasuredCheckpointFile::checksum(&sets);
@@ -91,57 +98,71 @@ impl Train {
         (report, set): (Report, Option<Dataset>),
     ) -> Result<(), Failure> {
         let checkpointing = self.checkpoint.checkpointing(saving);
-        let end = self.train(&mut run, checkpointing);
+        let mut end = self.train(&mut run, checkpointing);
         let division = plan.division;
         let file = MeasuredNetworkFile::from_run(&run, plan, channels)?;
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
-        let mut rng = run.settings().seed.rng(Stream::Resampling);
         let answers = run.decouple_test();
-        let flattery = match set.filter(|_| end.is_ok()) {
-            Some(set) => self.compared_in_time(&run, &set, division, channels.1),
-            None => Vec::new(),
-        };
+        let mut flattery = Vec::new();
+        if let Some(set) = set.filter(|_| end.is_ok()) {
+            match self.compared(&run, &set, division, channels.1) {
+                Ok(sentences) => flattery = sentences,
+                Err(interrupted) => end = Err(interrupted),
+            }
+        }
         let flaw = run.flaw();
         let judged = Judged {
             flaw: flaw.as_ref(),
             wall_time: run.wall_time(),
-            told: Determination::measure(run.test(), answers.view(), division.by, &mut rng),
+            told: Determination::measure(run.test(), answers.view(), division.by),
             flattery,
         };
         measured_report::print(&report, &file, &judged, self.json)?;
         self.end(saved, end)
     }
 
-    /// Trains once more with the last samples for the test instead of random ones, and says how much these flatter.
-    fn compared_in_time(&self, run: &Run, set: &Dataset, division: Division, targets: &[Channel]) -> Vec<String> {
-        let division = Division {
-            by: SplitBy::Time,
-            ..division
-        };
+    /// Trains again on a split by group (by time without groups), and says how optimistic the random test samples are. Ctrl-C
+    /// ends only this comparison.
+    fn compared(
+        &self,
+        run: &Run,
+        set: &Dataset,
+        division: Division,
+        targets: &[Channel],
+    ) -> Result<Vec<String>, Failure> {
+        let by = SplitBy::honest(set);
+        let graceful = Graceful::begin();
+        announce_comparison(by);
         let settings = *run.settings();
-        let in_time = || -> Result<Run, RunError> {
-            let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
+        let honest = || -> Result<Run, RunError> {
+            let parts = Division { by, ..division }.divide(set, &mut settings.seed.rng(Stream::Split))?;
             Run::on_sets(settings, parts.split(set), parts.test_set(set))
         };
-        let mut in_time = match in_time() {
-            Ok(in_time) => in_time,
+        let mut honest = match honest() {
+            Ok(honest) => honest,
             Err(error) => {
-                return vec![format!(
+                return Ok(vec![format!(
                     "a random split flatters where neighbouring rows are alike, and how much is not known here: split by \
-                     time, {error}"
-                )];
+                     {by}, {error}"
+                )]);
             }
         };
         let bar = progress_bar(
             self.json,
             settings.training.stopping.epochs,
-            "{bar:30} split by time, to compare",
+            "{bar:30} second training, to compare",
         );
-        while in_time.step().is_none() {
+        while !graceful.is_end_requested() && honest.step().is_none() {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        sentences([&in_time, run].map(Run::target_table), targets)
+        if honest.stop_reason().is_none() {
+            return Err(Failure::InterruptedComparison { by });
+        }
+        Ok(sentences(
+            &SplitComparison::of(by, [&honest, run].map(Run::target_table)),
+            targets,
+        ))
     }
 
     fn cross_validate(&self, plan: &Plan, settings: &RunSettings, folds: usize) -> Result<(), Failure> {
@@ -158,23 +179,34 @@ impl Train {
         let recording = with_bar(self.json, |watch| plan.recording(working_folder(), watch))?;
         self.import.save_recipe(plan)?;
         let set = &recording.set;
-        let validate = |by| -> Result<CrossValidated, Failure> {
-            let dealt = dataset::Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
-            let dealt = dealt.map_err(|error| Failure::Arguments(error.to_string()))?;
-            let validated = CrossValidated::on_folds(settings, set, dealt, || false)?;
-            Ok(validated.expect("nothing cancels it"))
-        };
-        let validated = validate(plan.division.by)?;
-        let flattery = if plan.division.by == SplitBy::Random {
-            let in_time = validate(SplitBy::Time)?;
-            let tables = [&in_time, &validated].map(|validated| validated.target_table(set));
-            sentences(tables, &recording.targets)
-        } else {
-            Vec::new()
-        };
+        let by = plan.division.by;
+        let dealt = dataset::Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
+        let dealt = dealt.map_err(|error| Failure::Arguments(error.to_string()))?;
+        let validated = CrossValidated::on_folds(settings, set, dealt, || false)?.expect("nothing cancels it");
+        let (mut flattery, mut end) = (Vec::new(), Ok(()));
+        if by == SplitBy::Random {
+            let honest = SplitBy::honest(set);
+            let graceful = Graceful::begin();
+            announce_comparison(honest);
+            let is_cancelled = || graceful.is_end_requested();
+            match SplitComparison::complete(settings, set, folds, (by, &validated), &is_cancelled)? {
+                Some(comparison) => flattery = sentences(&comparison, &recording.targets),
+                None => end = Err(Failure::InterruptedComparison { by: honest }),
+            }
+        }
         let report = Folds::new(plan, &recording, settings, &validated, flattery);
-        measured_report::print_folds(&report, &recording.targets, self.json)
+        measured_report::print_folds(&report, &recording.targets, self.json)?;
+        end
     }
+}
+
+/// Reports on standard error that the same settings are trained again.
+fn announce_comparison(by: SplitBy) {
+    // Nobody is left to tell if this fails.
+    let _ = writeln!(
+        stderr(),
+        "training again on a split by {by}, to measure how optimistic random test samples are; Ctrl-C skips this"
+    );
 }
 
 /// Returns `true` if the test samples are random ones of a recording.
@@ -182,9 +214,8 @@ fn flatters(plan: &Plan) -> bool {
     plan.division.by == SplitBy::Random && plan.test.is_none()
 }
 
-/// Says how much random test samples flatter; the tables are those of a split in time and of a random one.
-fn sentences(tables: [Vec<TargetRow>; 2], targets: &[Channel]) -> Vec<String> {
-    let comparison = SplitComparison::of(SplitBy::Time, tables);
+/// Says of each target how optimistic random test samples are.
+fn sentences(comparison: &SplitComparison, targets: &[Channel]) -> Vec<String> {
     let targets = targets.iter().enumerate();
     targets
         .map(|(index, target)| comparison.sentence(index, &target.name))

@@ -111,11 +111,11 @@ impl SceneArguments {
         &self.inputs
     }
 
-    /// Row model and scaling for own data.
+    /// Row model and scaling for own data, where they are given.
     ///
     /// # Errors
     /// Names the first argument given that has a meaning for a simulated sensor only.
-    pub(super) fn measured(&self, has_row_wires: bool) -> Result<(RowModel, Option<ScalingChoice>), Failure> {
+    pub(super) fn measured(&self, has_row_wires: bool) -> Result<(Option<RowModel>, Option<ScalingChoice>), Failure> {
         let refuse = |argument: &str, reason: &str| Err(Failure::Arguments(format!("{argument}: {reason}")));
         let scene = "own data (--data) have no scene to be drawn from; leave it out";
         let given = [
@@ -137,8 +137,9 @@ impl SceneArguments {
             return refuse(argument, "own data (--data) have their own noise already; leave it out");
         }
         let rows = match self.rows {
-            None | Some(Rows::All) => RowModel::Shared,
-            Some(Rows::Known) if has_row_wires => RowModel::Each,
+            None => None,
+            Some(Rows::All) => Some(RowModel::Shared),
+            Some(Rows::Known) if has_row_wires => Some(RowModel::Each),
             Some(Rows::Known) => return refuse("--rows known", "name the column of row-wires with --row-wire"),
             Some(Rows::One(_)) => {
                 return refuse(

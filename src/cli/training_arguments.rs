@@ -4,6 +4,7 @@ use clap::{
 };
 
 use super::{
+    checkpointing::check_same,
     failure::Failure,
     parsers::{count, number, seed},
     scene_arguments::SceneArguments,
@@ -11,7 +12,8 @@ use super::{
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
     evaluation::{MOST_STARTS, Measured, MeasuredSettings, RunSettings, SimulatedSettings, Simulation},
-    network::{InputChoice, LARGEST_HIDDEN},
+    network::{InputChoice, LARGEST_HIDDEN, ScalingChoice},
+    scene::RowModel,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
 };
@@ -83,9 +85,12 @@ impl TrainingArguments {
         })
     }
 
-    /// Settings of a new run on own data.
-    pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
-        let (rows, scaling) = self.scene.measured(has_row_wires)?;
+    /// Row model and scaling for own data, where they are given.
+    ///
+    /// # Errors
+    /// Names the first argument given that has a meaning for a simulated sensor only.
+    fn measured_inputs(&self, has_row_wires: bool) -> Result<(Option<RowModel>, Option<ScalingChoice>), Failure> {
+        let given = self.scene.measured(has_row_wires)?;
         if !self.scene.decoder.is_empty() {
             let message = "--decoder: own data (--data) are tested with the mean, ridge and the network; leave it out, or \
                            use trade";
@@ -97,6 +102,13 @@ impl TrainingArguments {
             self.test_samples.is_some(),
             self.validation_samples.is_some(),
         ])?;
+        Ok(given)
+    }
+
+    /// Settings of a new run on own data.
+    pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        let (rows, scaling) = self.measured_inputs(has_row_wires)?;
+        let rows = rows.unwrap_or(RowModel::Shared);
         let default = RunSettings::from(Measured { rows });
         Ok(RunSettings {
             inputs: InputChoice {
@@ -111,22 +123,31 @@ impl TrainingArguments {
         })
     }
 
-    /// Refuses arguments that differ from the settings `saved` of a training on own data.
-    pub(super) fn check_resumed(&self, saved: &MeasuredSettings) -> Result<(), Failure> {
-        let given = [
-            ("hidden", self.hidden.map(|hidden| hidden as u64), saved.hidden as u64),
-            ("starts", self.starts.map(|starts| starts as u64), saved.starts as u64),
-            ("seed", self.seed, saved.seed.0),
-        ];
-        for (argument, given, saved) in given {
-            if let Some(given) = given.filter(|given| *given != saved) {
-                return Err(Failure::Arguments(format!(
-                    "--{argument} {given}: the checkpoint has {saved}; leave it out to resume, or start a new training \
-                     with another --checkpoint"
-                )));
-            }
-        }
-        Ok(())
+    /// Training settings with which a run on own data of the settings `saved`, with the columns `inputs`, is resumed.
+    pub(super) fn resumed_measured(
+        &self,
+        saved: &MeasuredSettings,
+        inputs: &[String],
+        has_row_wires: bool,
+    ) -> Result<TrainingSettings, Failure> {
+        let (rows, scaling) = self.measured_inputs(has_row_wires)?;
+        check_same("rows", rows.map(rows_name), rows_name(saved.source.rows))?;
+        check_same("scaling", scaling, saved.inputs.scaling)?;
+        let columns = self.scene.columns();
+        check_same(
+            "inputs",
+            (!columns.is_empty()).then(|| columns.join(",")),
+            inputs.join(","),
+        )?;
+        self.check_network(saved.hidden, saved.starts, saved.seed)?;
+        self.training(saved.training)
+    }
+
+    /// Refuses another number of hidden nodes or starts, or another seed.
+    fn check_network(&self, hidden: usize, starts: usize, of_seed: Seed) -> Result<(), Failure> {
+        check_same("hidden", self.hidden, hidden)?;
+        check_same("starts", self.starts, starts)?;
+        check_same("seed", self.seed, of_seed)
     }
 
     /// The sensor, if an array scale is given.
@@ -136,34 +157,18 @@ impl TrainingArguments {
 
     /// Training settings with which a run of the settings `saved` is resumed.
     pub(super) fn training_from(&self, saved: &SimulatedSettings) -> Result<TrainingSettings, Failure> {
-        let same = |argument: &str, given: Option<String>, saved: String| match given {
-            Some(given) if given != saved => Err(Failure::Arguments(format!(
-                "--{argument} {given}: the checkpoint has {saved}; leave it out to resume, or start a new training \
-                 with another --checkpoint"
-            ))),
-            _ => Ok(()),
-        };
-        let count = |argument, given: Option<usize>, saved: usize| {
-            same(argument, given.map(|given| given.to_string()), saved.to_string())
-        };
         if let Some(what) = self.scene.difference(saved)? {
             return Err(Failure::Arguments(format!(
                 "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
                  with another --checkpoint"
             )));
         }
-        let scale = saved.source.sensor.scale;
-        same("array", self.array.map(|scale| scale.to_string()), scale.to_string())?;
-        count("hidden", self.hidden, saved.hidden)?;
-        count("starts", self.starts, saved.starts)?;
-        count("samples", self.samples, saved.source.samples)?;
-        count("test-samples", self.test_samples, saved.source.test_samples)?;
-        count(
-            "validation-samples",
-            self.validation_samples,
-            saved.source.validation_samples,
-        )?;
-        same("seed", self.seed.map(|seed| seed.to_string()), saved.seed.to_string())?;
+        let source = &saved.source;
+        check_same("array", self.array, source.sensor.scale)?;
+        check_same("samples", self.samples, source.samples)?;
+        check_same("test-samples", self.test_samples, source.test_samples)?;
+        check_same("validation-samples", self.validation_samples, source.validation_samples)?;
+        self.check_network(saved.hidden, saved.starts, saved.seed)?;
         self.training(saved.training)
     }
 
@@ -197,6 +202,14 @@ impl TrainingArguments {
         };
         training.check()?;
         Ok(training)
+    }
+}
+
+/// Name of a row model as an argument.
+fn rows_name(rows: RowModel) -> &'static str {
+    match rows {
+        RowModel::Shared => "all",
+        RowModel::Each => "known",
     }
 }
 
@@ -260,7 +273,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use crate::{export::report::train_command, scene::RowModel};
+    use crate::export::report::train_command;
 
     fn parsed(line: &str) -> TrainingArguments {
         let command = TrainingArguments::augment_args(Command::new("train"));

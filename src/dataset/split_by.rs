@@ -50,6 +50,21 @@ impl SplitBy {
     /// Every rule, in the order offered.
     pub const ALL: [Self; 3] = [Self::Time, Self::Group, Self::Random];
 
+    /// Returns the rule whose test samples are new to the fit: by group if samples of `set` are in groups, else by time.
+    pub fn honest(set: &Dataset) -> Self {
+        let groups = Self::Group.units(set).len();
+        if (2..set.samples()).contains(&groups) {
+            Self::Group
+        } else {
+            Self::Time
+        }
+    }
+
+    /// Number of folds of `set`: as many as wanted, or as it has units.
+    pub fn folds_of(self, set: &Dataset, wanted: usize) -> usize {
+        wanted.min(self.units(set).len())
+    }
+
     /// Returns the samples that stay together, in the order of the samples.
     pub(super) fn units(self, set: &Dataset) -> Vec<Vec<usize>> {
         match self {

@@ -2,20 +2,17 @@ use super::{MeasuredNetworkFile, format_number};
 use crate::{
     evaluation::{
         TargetErrors,
-        recorded::{Determination, Findings, Standing, TargetFindings},
+        recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
     },
     import::{Channel, TargetPosition},
     training::Method,
 };
 
 /// Warns of targets that the readings do not tell, or hardly, by what was measured of each.
-pub fn describe_standings(targets: &[Channel], told: &[Option<Determination>]) -> Vec<String> {
-    let of = |(target, told): (&Channel, &Option<Determination>)| match told {
-        None => Some(format!(
-            "{} is constant in the test samples, or they are a single stretch: nothing can be judged",
-            target.name
-        )),
-        Some(told) => (told.standing() != Standing::Told).then(|| told.sentence(&target.name)),
+pub fn describe_standings(targets: &[Channel], told: &[Result<Determination, Undetermined>]) -> Vec<String> {
+    let of = |(target, told): (&Channel, &Result<Determination, Undetermined>)| match told {
+        Err(cause) => Some(format!("{}: {cause}", target.name)),
+        Ok(told) => (told.standing() != Standing::Told).then(|| told.sentence(&target.name)),
     };
     targets.iter().zip(told).filter_map(of).collect()
 }
@@ -35,10 +32,14 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
 
 /// Says how well the readings tell a target, by the better of network and ridge.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
-    match (found.best(), found.network) {
-        (None, _) => format!("{name} is constant, or all its samples are one stretch or group: nothing can be judged"),
-        (Some((_, best)), Some(_)) => best.sentence(name),
-        (Some((_, best)), None) => format!("{}, as far as a linear map goes", best.sentence(name)),
+    match found.best() {
+        Some((_, best)) if found.network.is_some() => best.sentence(name),
+        Some((_, best)) => format!("{}, as far as a linear map goes", best.sentence(name)),
+        None => {
+            let cause = found.ridge.err();
+            let cause = cause.map_or_else(|| "nothing can be judged".to_owned(), |cause| cause.to_string());
+            format!("{name}: {cause}")
+        }
     }
 }
 

@@ -109,6 +109,36 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
     let part = TRAIN.replace("--epochs 60", "--epochs 5");
     json(&format!("{part} --checkpoint c.json --json"), folder.path());
     fs::copy(folder.path().join("c.json"), folder.path().join("d.json")).unwrap();
+    for (argument, value) in [
+        ("--split", "random"),
+        ("--inputs", "c3"),
+        ("--scaling", "whiten"),
+        ("--test-fraction", "0.5"),
+        ("--validation-fraction", "0.4"),
+        ("--folds", "3"),
+        ("--test-data", "states.csv"),
+        ("--save-recipe", "other.json"),
+        ("--skip-lines", "1"),
+        ("--rows", "known"),
+        ("--noise", "0.1"),
+        ("--drift", "0.1"),
+        ("--array", "4x3_2x8"),
+        ("--samples", "10"),
+        ("--loading", "indenter"),
+        ("--preset", "best"),
+        ("--decoder", "rbf"),
+        ("--hidden", "99"),
+        ("--starts", "9"),
+        ("--seed", "99"),
+    ] {
+        let message = failure(
+            &format!("train --checkpoint d.json --resume {argument} {value}"),
+            folder.path(),
+            2,
+        );
+        let named = message.contains(argument) || (argument == "--skip-lines" && message.contains("layout"));
+        assert!(named, "{argument}: {message}");
+    }
     let resumed = json("train --checkpoint c.json --resume --epochs 60 --json", folder.path());
     assert_eq!(
         (&resumed["targets"], &resumed["epochs"]),

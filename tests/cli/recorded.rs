@@ -1,8 +1,13 @@
 //! What a recording tells, in the terminal.
 
-use std::fs;
+use std::{
+    fs,
+    io::{BufRead, BufReader},
+    process::{Command, Stdio},
+};
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::{printed::json, terminal::decoupler};
@@ -121,6 +126,92 @@ fn a_random_split_says_by_how_much_it_flatters() {
             "{interval}"
         );
     }
+}
+
+/// Ten presses, whose readings name the press and nothing of the target, which differs from press to press; rows in a random
+/// order.
+fn presses() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let presses: Vec<[f64; 3]> = (0..10)
+        .map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+        .collect();
+    let mut text = "press,a,b,y\n".to_owned();
+    for _ in 0..300 {
+        let press = rng.random_range(0..10);
+        let [a, b, y] = presses[press].map(|value| value + 0.01 * rng.random_range(-1.0..1.0));
+        text += &format!("{press},{a},{b},{y}\n");
+    }
+    fs::write(folder.path().join("r.csv"), text).unwrap();
+    folder
+}
+
+const PRESSES: &str = "--data r.csv --inputs a,b --targets y --group press --hidden 8";
+
+#[test]
+fn a_random_split_is_compared_with_groups_where_there_are_any() {
+    let folder = presses();
+    for split in ["--split random", "--split random --folds 5"] {
+        let report = json(&format!("train {PRESSES} {split} --epochs 60 --json"), folder.path());
+        let warnings = report["warnings"].to_string();
+        assert!(
+            warnings.contains("split by group it is") && warnings.contains("random flatters by"),
+            "{split}: {warnings}"
+        );
+    }
+    for split in ["--split random", "--split time", ""] {
+        let report = json(
+            &format!("inspect {PRESSES} {split} --model ridge --json"),
+            folder.path(),
+        );
+        assert_eq!(report["split"], if split.is_empty() { "group" } else { &split[8..] });
+    }
+    let report = json(
+        &format!("inspect {PRESSES} --split time --folds 2 --json"),
+        folder.path(),
+    );
+    let splits = &report["targets"][0]["splits"];
+    assert_eq!(splits["by"], "group", "{splits}");
+    assert!(
+        splits["random_network"].as_f64() < splits["network"].as_f64(),
+        "{splits}"
+    );
+}
+
+#[test]
+fn groups_are_kept_together_unless_another_split_is_asked_for() {
+    let report = json(&format!("train {PRESSES} --epochs 5 --json"), presses().path());
+    assert_eq!(report["split"], "group");
+}
+
+/// Ctrl-C during the training that is only compared with keeps the network and its figures.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_comparison_leaves_the_training_as_it_is() {
+    let folder = presses();
+    let arguments = format!(
+        "train {PRESSES} --split random --method gdm --epochs 30000 --max-fail 1000000 --min-gradient 0 --out n.json --json"
+    );
+    let mut child = Command::new("env")
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_decoupler")])
+        .args(arguments.split_whitespace())
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let said = lines.next().unwrap();
+    assert!(said.starts_with("training again on a split by group"), "{said}");
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    let last = lines.last().unwrap();
+    assert!(last.contains("the first is complete"), "{last}");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["epochs"], 30000);
+    assert!(folder.path().join("n.json").is_file());
 }
 
 #[test]

@@ -45,20 +45,35 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
     let targets = Array2::from_shape_fn((400, 1), |(sample, _)| offsets[sample / 20] + 0.01 * normal(&mut rng));
     let groups = (0..400).map(|sample| sample / 20).collect();
     let alike = Dataset::new(readings, targets, None, groups).unwrap();
-    for by in [SplitBy::Group, SplitBy::Time] {
-        let compared = SplitComparison::measure(&settings(), &alike, 5, by, &|| false)
+    let compared = |set: &Dataset, by| {
+        let dealt = Folds::by(set, 5, by, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let validated = CrossValidated::on_folds(&settings(), set, dealt, || false)
             .unwrap()
             .unwrap();
+        SplitComparison::complete(&settings(), set, 5, (by, &validated), &|| false)
+            .unwrap()
+            .unwrap()
+    };
+    // Whichever split was asked for, where there are groups random folds are compared with folds by group.
+    for by in SplitBy::ALL {
+        let compared = compared(&alike, by);
+        assert_eq!(compared.by, SplitBy::Group);
         let ratios = [compared.network_ratio(0).unwrap(), compared.ridge_ratio(0).unwrap()];
         assert!(ratios.iter().all(|ratio| *ratio < 0.2), "{by}: {ratios:?}");
         let sentence = compared.sentence(0, "offset");
         assert!(sentence.contains("random flatters by 9"), "{sentence}");
     }
     let independent = set(400, 3, 4, |c, rng| c[0] - 0.5 * c[1] + 0.3 * normal(rng));
-    let compared = SplitComparison::measure(&settings(), &independent, 5, SplitBy::Time, &|| false);
-    let sentence = compared.unwrap().unwrap().sentence(0, "y");
+    let of_independent = compared(&independent, SplitBy::Random);
+    assert_eq!(of_independent.by, SplitBy::Time);
+    let sentence = of_independent.sentence(0, "y");
     assert!(sentence.contains("does not flatter"), "{sentence}");
-    let cancelled = SplitComparison::measure(&settings(), &independent, 5, SplitBy::Time, &|| true).unwrap();
+    let dealt = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &independent, dealt, || false)
+        .unwrap()
+        .unwrap();
+    let given = (SplitBy::Random, &validated);
+    let cancelled = SplitComparison::complete(&settings(), &independent, 5, given, &|| true).unwrap();
     assert_eq!(cancelled, None);
 }
 
@@ -169,7 +184,7 @@ fn a_network_no_better_than_ridge_is_said_to_be_no_better() {
         let validated = CrossValidated::on_folds(&settings(), set, folds, || false)
             .unwrap()
             .unwrap();
-        NonlinearGain::of_validated(set, &validated, SplitBy::Time, &mut Seed(0).rng(Stream::Resampling))[0].unwrap()
+        NonlinearGain::of_validated(set, &validated, SplitBy::Time)[0].unwrap()
     };
     let linear = gain(&set(400, 3, 7, |c, rng| c[0] + c[1] + normal(rng)));
     let remark = linear.remark("y").unwrap();

@@ -1,4 +1,6 @@
-use super::{CellResults, ExperimentResults, Trial};
+use std::cmp::Ordering;
+
+use super::{CellResults, ExperimentResults};
 use crate::evaluation::Spread;
 
 /// A cell with results.
@@ -10,14 +12,16 @@ pub(super) struct Measured {
     pub(super) published: Option<f64>,
     pub(super) linear: Option<f64>,
     pub(super) bound: Option<f64>,
-    /// Z error of each trial, by seed and repeat.
-    pub(super) trials: Vec<((u64, usize), f64)>,
+    /// Number of trials.
+    trials: usize,
 }
 
 impl Measured {
+    /// Fewest trials that have a spread. By chance, the ranges of three and three trials are apart in this order once in 20.
+    pub(super) const FEWEST_TRIALS: usize = 3;
+
     /// Returns the cells that have results.
     pub(super) fn all(results: &ExperimentResults) -> Vec<Self> {
-        let z_of = |trial: &Trial| Some(((trial.seed.0, trial.repeat), trial.errors.z_percent?));
         let measure = |cell: &CellResults| {
             let place = cell.cell;
             let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
@@ -27,19 +31,35 @@ impl Measured {
                 z: cell.z_percent()?,
                 published: place.published.map(|published| published.z_percent),
                 linear: median(cell.spread(|trial| trial.baselines.linear.z_percent)),
-                trials: cell.trials.iter().filter_map(z_of).collect(),
+                trials: cell
+                    .trials
+                    .iter()
+                    .filter(|trial| trial.errors.z_percent.is_some())
+                    .count(),
                 bound: median(cell.spread(|trial| trial.bottleneck.z_percent)),
             })
         };
         results.cells.iter().filter_map(measure).collect()
     }
 
-    /// Returns the Z errors of trials with the same seed and repeat in both cells.
-    pub(super) fn beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let partner = |key| other.trials.iter().find(move |trial| trial.0 == key);
-        self.trials
-            .iter()
-            .filter_map(move |(key, z)| Some((*z, partner(*key)?.1)))
+    /// Compares the errors of all trials with a figure; `None` within their spread, or with too few trials.
+    pub(super) fn against(&self, figure: f64) -> Option<Ordering> {
+        self.apart([figure, figure])
+    }
+
+    /// Compares the errors of all trials with those of another cell; `None` if their ranges overlap, or with too few trials.
+    pub(super) fn compare(&self, other: &Self) -> Option<Ordering> {
+        let is_enough = other.trials >= Self::FEWEST_TRIALS;
+        self.apart([other.z.smallest, other.z.largest]).filter(|_| is_enough)
+    }
+
+    fn apart(&self, [low, high]: [f64; 2]) -> Option<Ordering> {
+        match self.z {
+            _ if self.trials < Self::FEWEST_TRIALS => None,
+            Spread { largest, .. } if largest < low => Some(Ordering::Less),
+            Spread { smallest, .. } if smallest > high => Some(Ordering::Greater),
+            _ => None,
+        }
     }
 
     /// Returns the label and Z errors as text.

@@ -1,4 +1,4 @@
-use std::fmt;
+use std::{cmp::Ordering, fmt};
 
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ pub enum Standing {
     HoldsInPart,
     /// The claim does not hold.
     Fails,
-    /// The spread of the trials is too wide to tell, or results are missing.
+    /// The spread of the trials is too wide, or there are too few trials or sizes.
     Undecided,
 }
 
@@ -39,7 +39,7 @@ impl fmt::Display for Standing {
             Self::Holds => "holds",
             Self::HoldsInPart => "holds in part",
             Self::Fails => "does not hold",
-            Self::Undecided => "undecided",
+            Self::Undecided => "not decided",
         })
     }
 }
@@ -82,47 +82,82 @@ fn missing(claim: &'static str) -> Verdict {
     }
 }
 
-/// Returns the standing of a claim that is true in `so` of `of` cases.
-fn share(so: usize, of: usize) -> Standing {
-    match so {
-        _ if so == of => Standing::Holds,
-        0 => Standing::Fails,
-        _ => Standing::HoldsInPart,
+/// Returns the standing of a claim that is true, false or undecided (`None`) in each of several cases.
+fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> Standing {
+    let (mut is_true, mut is_false, mut is_open) = (false, false, false);
+    for case in cases {
+        is_true |= case == Some(true);
+        is_false |= case == Some(false);
+        is_open |= case.is_none();
+    }
+    match (is_true, is_false) {
+        (true, true) => Standing::HoldsInPart,
+        (true, false) if !is_open => Standing::Holds,
+        (false, true) if !is_open => Standing::Fails,
+        _ => Standing::Undecided,
+    }
+}
+
+/// Says in which cells the error is below a figure, above it, or within the spread of the trials.
+fn judge_cells(
+    claim: &'static str,
+    cells: &[(&Measured, f64)],
+    [below, above]: [&str; 2],
+    note: impl Fn(&Measured, f64) -> String,
+) -> Verdict {
+    let standings: Vec<Option<bool>> = cells
+        .iter()
+        .map(|(cell, figure)| Some(cell.against(*figure)?.is_lt()))
+        .collect();
+    let list = |wanted: Option<bool>| {
+        let those = cells
+            .iter()
+            .zip(&standings)
+            .filter(|(_, standing)| **standing == wanted);
+        let each = |((cell, figure), _): (&(&Measured, f64), _)| {
+            let against = format!("{} against {}", number(cell.z.median), number(*figure));
+            format!("{} ({against}{})", cell.label, note(cell, *figure))
+        };
+        those.map(each).collect::<Vec<_>>().join(", ")
+    };
+    let open = format!(
+        "not decided with fewer than {} trials or within their spread at",
+        Measured::FEWEST_TRIALS
+    );
+    let parts = [
+        (below, list(Some(true))),
+        (above, list(Some(false))),
+        (&*open, list(None)),
+    ];
+    let parts: Vec<_> = parts
+        .into_iter()
+        .filter(|(_, cells)| !cells.is_empty())
+        .map(|(what, cells)| format!("{what} {cells}"))
+        .collect();
+    Verdict {
+        claim,
+        standing: standing_of(standings),
+        finding: sentence(&parts.join("; ")),
     }
 }
 
 fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
-    let mut met = Vec::new();
-    let mut missed = Vec::new();
-    for cell in measured {
-        let Some(published) = cell.published else { continue };
-        let (label, median) = (&cell.label, cell.z.median);
-        let against = format!("{} against {}", number(median), number(published));
-        if median <= published {
-            met.push(format!("{label} ({against})"));
-            continue;
+    let cells: Vec<_> = measured
+        .iter()
+        .filter_map(|cell| Some((cell, cell.published?)))
+        .collect();
+    let note = |cell: &Measured, published: f64| {
+        if cell.z.median <= published {
+            return String::new();
         }
         let bound = cell.bound.filter(|bound| *bound > 0.5 * published);
         let bound = bound.map_or(String::new(), |bound| {
             format!("; its hidden nodes can carry {}", number(bound))
         });
-        let excess = number(100.0 * (median / published - 1.0));
-        missed.push(format!("{label} ({against}, {excess} % more{bound})"));
-    }
-    if met.is_empty() && missed.is_empty() {
-        return None;
-    }
-    let standing = share(met.len(), met.len() + missed.len());
-    let parts = [("Met or beaten at", met), ("missed at", missed)];
-    let parts = parts.into_iter().filter(|(_, cells)| !cells.is_empty());
-    let parts: Vec<_> = parts
-        .map(|(what, cells)| format!("{what} {}", cells.join(", ")))
-        .collect();
-    Some(Verdict {
-        claim: "The published Z error is reached",
-        standing,
-        finding: sentence(&parts.join("; ")),
-    })
+        format!(", {} % more{bound}", number(100.0 * (cell.z.median / published - 1.0)))
+    };
+    let claim = "The published Z error is reached";
+    (!cells.is_empty()).then(|| judge_cells(claim, &cells, ["met or beaten at", "missed at"], note))
 }
 
 /// Capitalises the first letter and adds a full stop.
@@ -142,40 +177,36 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
     let (Some((place, best)), Some(last), true) = (best, cells.last(), cells.len() >= 3) else {
         return missing(claim);
     };
-    let beyond = &cells[place + 1..];
-    let worst = beyond
-        .iter()
-        .max_by(|one, other| one.z.median.total_cmp(&other.z.median));
-    let (standing, finding) = match worst {
-        None => (
-            Standing::Fails,
-            format!(
-                "the error still falls at the most, {}; with this training more nodes only help",
-                last.figures()
-            ),
-        ),
-        Some(worst) if place == 0 => (
-            Standing::Fails,
-            format!(
-                "the error is least at the fewest, {}, and rises to {}",
-                best.figures(),
-                worst.figures()
-            ),
-        ),
-        Some(worst) if worst.z.median > best.z.largest => (
-            Standing::Holds,
-            format!("least at {}; beyond, {}", best.figures(), worst.figures()),
-        ),
-        Some(worst) => (
-            Standing::Undecided,
-            format!(
-                "least at {}; beyond, {}, which is within the spread of the trials",
-                best.figures(),
-                worst.figures()
-            ),
-        ),
+    let is_lower = |others: &[Measured]| others.iter().any(|other| best.compare(other) == Some(Ordering::Less));
+    let is_lowest = || {
+        let others = cells.iter().enumerate().filter(|(other, _)| *other != place);
+        others
+            .into_iter()
+            .all(|(_, other)| best.compare(other) == Some(Ordering::Less))
     };
-    let finding = sentence(&finding);
+    let (before, beyond) = (&cells[..place], &cells[place + 1..]);
+    let standing = if before.is_empty() || beyond.is_empty() {
+        if is_lowest() {
+            Standing::Fails
+        } else {
+            Standing::Undecided
+        }
+    } else if is_lower(before) && is_lower(beyond) {
+        Standing::Holds
+    } else {
+        Standing::Undecided
+    };
+    let ends = [&cells[0], last].into_iter().filter(|end| end.column != best.column);
+    let ends: Vec<_> = ends.map(Measured::figures).collect();
+    let open = match standing {
+        Standing::Undecided => "; not decided with so few trials or so wide a spread",
+        _ => "",
+    };
+    let finding = sentence(&format!(
+        "least at {}; at the ends {}{open}",
+        best.figures(),
+        ends.join(", ")
+    ));
     Verdict {
         claim,
         standing,
@@ -183,31 +214,18 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
     }
 }
 
-/// Checks that the errors rise along `measured`, trial by trial of the same seed and repeat.
+/// Checks that the errors rise along `measured`, beyond the spread of the trials.
 fn in_order(claim: &'static str, measured: Vec<Measured>) -> Verdict {
     if measured.len() < 2 {
         return missing(claim);
     }
-    let pairs = || measured.windows(2).map(|pair| (&pair[0], &pair[1]));
-    let rises = pairs().filter(|(before, after)| before.z.median < after.z.median);
-    let medians = share(rises.count(), measured.len() - 1);
-    let compared = pairs().flat_map(|(before, after)| before.beside(after));
-    let (in_order, all) = compared.fold((0, 0), |(in_order, all), (before, after)| {
-        (in_order + usize::from(before < after), all + 1)
-    });
-    let standing = match medians {
-        Standing::Holds if in_order < all => Standing::HoldsInPart,
-        medians => medians,
-    };
+    let pairs = measured.windows(2);
+    let standing = standing_of(pairs.map(|pair| Some(pair[0].compare(&pair[1])?.is_lt())));
     let figures: Vec<_> = measured.iter().map(Measured::figures).collect();
-    let finding = format!(
-        "{}; so in {in_order} of {all} comparisons of trials with the same seed",
-        figures.join("; ")
-    );
     Verdict {
         claim,
         standing,
-        finding: sentence(&finding),
+        finding: sentence(&figures.join("; ")),
     }
 }
 
@@ -240,7 +258,10 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         off(growth.polynomial_residual),
         number(100.0 * (growth.factor_per_unit - 1.0)),
         off(growth.exponential_residual),
-    );
+    ) + match standing {
+        Standing::Undecided => " These sizes and times do not decide between the two.",
+        _ => "",
+    };
     Verdict {
         claim,
         standing,
@@ -250,25 +271,12 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
 
 fn linear_map_is_beaten(measured: &[Measured]) -> Verdict {
     let claim = "The network beats the linear map";
-    let cells = measured.iter().filter_map(|cell| Some((cell, cell.linear?)));
-    let (wins, losses): (Vec<_>, Vec<_>) = cells.partition(|(cell, linear)| cell.z.median < *linear);
-    if wins.is_empty() && losses.is_empty() {
+    let cells: Vec<_> = measured.iter().filter_map(|cell| Some((cell, cell.linear?))).collect();
+    if cells.is_empty() {
         return missing(claim);
     }
-    let list = |cells: &[(&Measured, f64)]| {
-        let each = |&(cell, linear): &(&Measured, f64)| {
-            format!("{} ({} against {})", cell.label, number(cell.z.median), number(linear))
-        };
-        cells.iter().map(each).collect::<Vec<_>>().join(", ")
-    };
-    let parts = [("it loses to it at", &losses), ("it beats it at", &wins)];
-    let parts = parts.into_iter().filter(|(_, cells)| !cells.is_empty());
-    let parts: Vec<_> = parts.map(|(what, cells)| format!("{what} {}", list(cells))).collect();
-    Verdict {
-        claim,
-        standing: share(wins.len(), wins.len() + losses.len()),
-        finding: sentence(&parts.join("; ")),
-    }
+    let words = ["it beats it at", "it loses to it at"];
+    judge_cells(claim, &cells, words, |_, _| String::new())
 }
 
 #[cfg(test)]
@@ -295,64 +303,71 @@ mod tests {
     }
 
     #[test]
-    fn an_optimum_needs_a_rise_beyond_the_spread() {
-        let cases: [(&[&[f64]], Standing); 5] = [
-            (
-                &[&[4.0], &[3.0], &[2.0], &[1.7, 1.8], &[1.7, 1.8], &[2.0]],
-                Standing::Holds,
-            ),
-            (
-                &[&[4.0], &[3.0], &[2.0], &[1.7, 1.9], &[1.7, 2.9], &[1.9]],
-                Standing::Holds,
-            ),
-            (&[&[4.0], &[3.0], &[2.0], &[1.6, 1.7, 2.9], &[1.8]], Standing::Undecided),
-            (&[&[4.0], &[3.0], &[2.0], &[1.0]], Standing::Fails),
-            (&[&[1.0], &[3.0], &[4.0], &[5.0]], Standing::Fails),
+    fn an_optimum_needs_a_rise_beyond_the_spread_on_both_sides() {
+        let low: &[f64] = &[1.6, 1.7, 1.8];
+        let high: &[f64] = &[2.0, 2.1, 2.2];
+        let cases: [(&[&[f64]], Standing); 7] = [
+            (&[high, low, low, high], Standing::Holds),
+            // One seed or two have no spread.
+            (&[&[4.0], &[3.0], &[2.0], &[1.0], &[2.0]], Standing::Undecided),
+            (&[&high[..2], &low[..2], &high[..2]], Standing::Undecided),
+            (&[high, &[1.6, 1.7, 2.9], &[1.8, 1.9, 2.0]], Standing::Undecided),
+            (&[&[1.7, 1.9, 2.0], low, high], Standing::Undecided),
+            (&[high, high, low], Standing::Fails),
+            (&[low, high, high], Standing::Fails),
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::HiddenNodes, cells, |_, _| {});
             assert_eq!(standing(&verdicts, "optimal"), expected, "{cells:?}: {verdicts:?}");
         }
-        let few = judged(PaperTable::HiddenNodes, &[&[4.0], &[3.0]], |_, _| {});
+        let few = judged(PaperTable::HiddenNodes, &[high, low], |_, _| {});
         assert_eq!(standing(&few, "optimal"), Standing::Undecided);
     }
 
     #[test]
-    fn an_order_holds_if_no_trial_departs_from_it() {
-        let cases: [(&[&[f64]], Standing); 5] = [
-            (&[&[1.0, 1.4], &[1.3, 1.6], &[2.0]], Standing::Holds),
-            (&[&[1.0, 1.2, 1.9], &[1.3, 1.6, 1.8], &[2.0]], Standing::HoldsInPart),
-            (&[&[1.0], &[3.0], &[2.0]], Standing::HoldsInPart),
-            (&[&[3.0], &[2.0], &[1.0]], Standing::Fails),
-            (&[&[3.0]], Standing::Undecided),
+    fn an_order_holds_if_the_ranges_of_the_trials_are_apart() {
+        let rising: [&[f64]; 3] = [&[1.0, 1.1, 1.2], &[1.3, 1.4, 1.6], &[2.0, 2.1, 2.2]];
+        let [small, middle, large] = rising;
+        let cases: [(&[&[f64]], Standing); 6] = [
+            (&rising, Standing::Holds),
+            (&[small, &[1.2, 1.4, 1.6], large], Standing::Undecided),
+            (&[small, large, middle], Standing::HoldsInPart),
+            (&[large, middle, small], Standing::Fails),
+            (&[&[1.0], &[2.0], &[3.0]], Standing::Undecided),
+            (&[small], Standing::Undecided),
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::ArrayScales, cells, |_, _| {});
             assert_eq!(standing(&verdicts, "Smaller arrays"), expected, "{cells:?}");
         }
         // The large dataset is the first cell.
-        let sizes = |cells| judged(PaperTable::CrossValidation, cells, |_, _| {});
-        assert_eq!(
-            standing(&sizes(&[&[1.0, 1.1], &[3.0, 3.3]]), "larger dataset"),
-            Standing::Holds
-        );
-        assert_eq!(standing(&sizes(&[&[3.0], &[1.0]]), "larger dataset"), Standing::Fails);
+        let sizes = |cells: [&[f64]; 2]| judged(PaperTable::CrossValidation, &cells, |_, _| {});
+        assert_eq!(standing(&sizes([small, large]), "larger dataset"), Standing::Holds);
+        assert_eq!(standing(&sizes([large, small]), "larger dataset"), Standing::Fails);
     }
 
     #[test]
     fn published_figures_and_the_linear_map_are_met_everywhere_in_part_or_nowhere() {
-        let of = |cells: [&[f64]; 3]| judged(PaperTable::ArrayScales, &cells, |_, _| {});
-        let good = of([&[0.1], &[0.2], &[0.3]]);
-        let mixed = of([&[1.0], &[1.7], &[2.0]]);
-        let bad = of([&[3.0], &[3.0], &[3.0]]);
-        for (claim, mixed_standing) in [
-            ("published", Standing::HoldsInPart),
-            ("linear map", Standing::HoldsInPart),
-        ] {
+        let of = |z: [f64; 3]| {
+            let cells = z.map(|z| [z, z + 0.01, z + 0.02]);
+            judged(
+                PaperTable::ArrayScales,
+                &cells.each_ref().map(|cell| &cell[..]),
+                |_, _| {},
+            )
+        };
+        let good = of([0.1, 0.2, 0.3]);
+        let mixed = of([0.99, 1.69, 1.99]);
+        let bad = of([3.0, 3.0, 3.0]);
+        let within = of([0.1, 0.2, 2.27]);
+        for claim in ["published", "linear map"] {
             assert_eq!(standing(&good, claim), Standing::Holds);
-            assert_eq!(standing(&mixed, claim), mixed_standing);
+            assert_eq!(standing(&mixed, claim), Standing::HoldsInPart);
             assert_eq!(standing(&bad, claim), Standing::Fails);
         }
+        assert_eq!(standing(&within, "published"), Standing::Undecided);
+        let one_seed = judged(PaperTable::ArrayScales, &[&[0.1], &[0.1], &[0.1]], |_, _| {});
+        assert!(one_seed.iter().all(|verdict| verdict.standing == Standing::Undecided));
         let published = mixed
             .iter()
             .find(|verdict| verdict.claim.contains("published"))
@@ -374,8 +389,12 @@ mod tests {
             });
             standing(&verdicts, "time")
         };
-        assert_eq!(judge(&|h| 0.01 * h * h), Standing::Holds);
+        assert_eq!(judge(&|h| 0.01 * h * h * h), Standing::Holds);
         assert_eq!(judge(&|h| 0.01 * 1.3_f64.powf(h)), Standing::Fails);
+        let three = judged(PaperTable::ArrayScales, &cells[..3], |cell, trial| {
+            trial.least_epoch_seconds = [1.0, 2.0, 4.0][cell];
+        });
+        assert_eq!(standing(&three, "time"), Standing::Undecided);
     }
 
     #[test]

@@ -1,9 +1,8 @@
 use ndarray::ArrayView2;
-use rand::Rng;
 
-use super::{FittedModel, Interval, resampling::Resampling};
+use super::{FittedModel, Interval, evidence::Evidence};
 use crate::{
-    dataset::{Dataset, Folds, SplitBy, Stream},
+    dataset::{Dataset, Folds, SplitBy},
     evaluation::{RunError, RunSettings},
 };
 
@@ -39,7 +38,6 @@ pub fn channel_importance(
     let Some(with_all) = model.held_out(settings, set, folds, is_cancelled)? else {
         return Ok(None);
     };
-    let mut rng = settings.seed.rng(Stream::Resampling);
     let mut found = Vec::with_capacity(channels);
     // Without its only channel, nothing is left to fit.
     for channel in (0..channels).filter(|_| channels > 1) {
@@ -47,7 +45,7 @@ pub fn channel_importance(
         let Some(without) = model.held_out(settings, &set.of_channels(&others), folds, is_cancelled)? else {
             return Ok(None);
         };
-        let growth = |target| rmse_ratio(set, [without.view(), with_all.view()], target, by, &mut rng);
+        let growth = |target| rmse_ratio(set, [without.view(), with_all.view()], target, by);
         found.push(ChannelImportance {
             channel,
             growth: (0..set.outputs()).map(growth).collect(),
@@ -56,14 +54,13 @@ pub fn channel_importance(
     Ok(Some(found))
 }
 
-/// RMSE of the first answers in proportion to that of the second, both to the same samples, with the interval of units
-/// drawn together.
+/// RMSE of the first answers in proportion to that of the second, both to the same samples; `None` where it is not
+/// determined.
 pub(super) fn rmse_ratio(
     set: &Dataset,
     [ours, theirs]: [ArrayView2<'_, f64>; 2],
     target: usize,
     by: SplitBy,
-    rng: &mut impl Rng,
 ) -> Option<Interval> {
     let truth = set.targets();
     let squared = |answers: &ArrayView2<'_, f64>| -> Vec<f64> {
@@ -71,21 +68,14 @@ pub(super) fn rmse_ratio(
         pairs.map(|(answer, truth)| (answer - truth).powi(2)).collect()
     };
     let (ours, theirs) = (squared(&ours), squared(&theirs));
-    let ratio = ours.iter().sum::<f64>() / theirs.iter().sum::<f64>();
-    let influence: Vec<f64> = ours
+    let total: f64 = theirs.iter().sum();
+    let ratio = ours.iter().sum::<f64>() / total;
+    let influences = ours
         .iter()
         .zip(&theirs)
-        .map(|(ours, theirs)| ours - ratio * theirs)
-        .collect();
-    let resampling = Resampling::of(set, by, [&influence[..]]);
-    // NaN if neither has errors.
-    let is_positive = ratio > 0.0;
-    if resampling.count() < 2 || !is_positive {
-        return None;
-    }
-    let sums = resampling.sums(|sample| [ours[sample], theirs[sample]]);
-    let replicates = resampling.replicates(&sums, rng, |[ours, theirs]| (ours / theirs).sqrt());
-    Interval::of_replicates(ratio.sqrt(), &replicates)
+        .map(|(ours, theirs)| (ours - ratio * theirs) / total);
+    let spread = Evidence::of(set, by).variance(&influences.collect::<Vec<_>>());
+    Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
 }
 
 impl ChannelImportance {

@@ -1,16 +1,21 @@
 use ndarray::ArrayView2;
-use rand::Rng;
+use thiserror::Error;
 
-use super::{Interval, resampling::Resampling};
+use super::{
+    Interval,
+    evidence::{Evidence, SumVariance},
+};
 use crate::dataset::{Dataset, SplitBy};
 
 /// Coefficient of determination R² of held-out answers for one target: how much of it the readings tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Determination {
-    /// R² with its interval.
+    /// R² with its interval, which covers R² of the same fitted models on infinitely many other samples of this kind.
     pub r2: Interval,
-    /// Number of independent units (blocks or groups) behind the interval.
+    /// Number of independent units (samples, stretches or groups) behind the interval.
     pub units: usize,
+    /// A few samples or groups make up most of the error, so that the interval may cover less than 95 %.
+    pub is_heavy_tailed: bool,
 }
 
 /// Degrees to which readings tell a target.
@@ -25,58 +30,100 @@ pub enum Standing {
     NotTold,
 }
 
+/// Reason why R² of a target cannot be judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Undetermined {
+    /// The target is constant.
+    #[error("it is constant in the samples judged")]
+    Constant,
+    /// There are too few independent units for an interval.
+    #[error("the samples judged are only {units} independent stretch(es) or group(s): record longer, or more groups")]
+    FewUnits {
+        /// Number of independent stretches or groups.
+        units: usize,
+    },
+    /// The error is not known within a factor of 100, or is no number.
+    #[error(
+        "its R² is not determined by the {units} independent stretches or groups judged: record longer, or more groups"
+    )]
+    Unbounded {
+        /// Number of independent stretches or groups.
+        units: usize,
+    },
+}
+
 impl Determination {
     /// Fewest units for an interval that can be relied on.
     pub const FEW_UNITS: usize = 10;
 
-    /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. The interval resamples
-    /// groups if `by` is [`SplitBy::Group`], otherwise blocks in the order of the samples. `None` for a constant target,
-    /// and where there are not two units.
+    /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. Evidence are groups if `by` is
+    /// [`SplitBy::Group`], otherwise stretches in the order of the samples.
+    ///
+    /// In simulations of 2000 sets each, the interval covers 92 to 98 % of the time for independent and autocorrelated
+    /// samples (40 to 1500, memory up to 0.9), for 5 to 20 groups, and for cross-validated answers, also without any
+    /// relation. It covers more (up to 100 %) where fixed answers explain nothing, and about 88 % for noise whose squares
+    /// have no variance, such as Student's t with 3 degrees of freedom: see [`Self::is_heavy_tailed`].
     ///
     /// # Panics
     /// If the shapes differ.
-    pub fn measure(set: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy, rng: &mut impl Rng) -> Vec<Option<Self>> {
+    pub fn measure(set: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Result<Self, Undetermined>> {
         assert_eq!(set.targets().dim(), answers.dim());
-        (0..set.outputs())
-            .map(|target| Self::of_one(set, answers, target, by, rng))
-            .collect()
+        let evidence = Evidence::of(set, by);
+        let columns = set.targets().into_owned();
+        let columns = columns.columns().into_iter().zip(answers.columns());
+        let of = |(truth, answers): (ndarray::ArrayView1<'_, f64>, ndarray::ArrayView1<'_, f64>)| {
+            Self::of_one(&evidence, &truth.to_vec(), &answers.to_vec())
+        };
+        columns.map(of).collect()
     }
 
-    fn of_one(
-        set: &Dataset,
-        answers: ArrayView2<'_, f64>,
-        target: usize,
-        by: SplitBy,
-        rng: &mut impl Rng,
-    ) -> Option<Self> {
-        let truth = set.targets().column(target).to_vec();
+    fn of_one(evidence: &Evidence, truth: &[f64], answers: &[f64]) -> Result<Self, Undetermined> {
+        let off = centred(truth);
+        let scale = off.iter().copied().map(f64::abs).fold(0.0, f64::max);
+        let largest = truth.iter().copied().map(f64::abs).fold(0.0, f64::max);
+        // No more than rounding of the mean.
+        if truth.len() < 2 || scale <= 4.0 * f64::EPSILON * largest {
+            return Err(Undetermined::Constant);
+        }
+        // In units of the largest deviation, so that nothing overflows.
+        let off: Vec<f64> = off.iter().map(|off| off / scale).collect();
+        let errors: Vec<f64> = answers
+            .iter()
+            .zip(truth)
+            .map(|(answer, truth)| (answer - truth) / scale)
+            .collect();
+        let total = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+        let variation = total(&off);
+        // 1 − R².
+        let unexplained = total(&errors) / variation;
+        // By how much each sample moves it, to first order.
+        let of_sample = |(error, off): (&f64, &f64)| (error * error - unexplained * off * off) / variation;
+        let influences: Vec<f64> = errors.iter().zip(&off).map(of_sample).collect();
+        let spread = evidence.variance(&influences);
+        let units = spread.units;
+        if units < Interval::FEWEST_UNITS {
+            return Err(Undetermined::FewUnits { units });
+        }
+        let of_mean = evidence.variance(&off.iter().map(|off| off / variation.sqrt()).collect::<Vec<_>>());
         let count = truth.len() as f64;
-        let mean = truth.iter().sum::<f64>() / count;
-        let squared_error = |sample: usize| (answers[[sample, target]] - truth[sample]).powi(2);
-        let errors: f64 = (0..truth.len()).map(squared_error).sum();
-        let variation: f64 = truth.iter().map(|value| (value - mean).powi(2)).sum();
-        if truth.iter().all(|value| *value == truth[0]) {
-            return None;
-        }
-        let r2 = 1.0 - errors / variation;
-        // By how much each sample moves R², to first order: its autocorrelation decides the blocks.
-        let influence = |sample: usize| squared_error(sample) - (1.0 - r2) * (truth[sample] - mean).powi(2);
-        let influences: Vec<f64> = (0..truth.len()).map(influence).collect();
-        let resampling = Resampling::of(set, by, [&influences[..]]);
-        if resampling.count() < 2 {
-            return None;
-        }
-        // Count, Σe², Σ(y − ȳ) and Σ(y − ȳ)².
-        let sums = resampling.sums(|sample| {
-            let off = truth[sample] - mean;
-            [1.0, squared_error(sample), off, off * off]
-        });
-        let replicates = resampling.replicates(&sums, rng, |[count, errors, off, squares]| {
-            1.0 - errors / (squares - off * off / count)
-        });
-        Some(Self {
-            r2: Interval::of_replicates(r2, &replicates)?,
-            units: resampling.count(),
+        let variance = spread.variance
+            // Of the square of the mean: the mean of few units is not that of all.
+            + 2.0 * (of_mean.variance * unexplained / count).powi(2)
+            + of_fits(evidence, &off, &centred(answers), scale);
+        let ratio = if unexplained == 0.0 {
+            Some(Interval {
+                value: 0.0,
+                low: 0.0,
+                high: 0.0,
+            })
+        } else {
+            Interval::of_ratio(unexplained, SumVariance { variance, ..spread })
+        };
+        Ok(Self {
+            r2: ratio.ok_or(Undetermined::Unbounded { units })?.map(|ratio| 1.0 - ratio),
+            units,
+            is_heavy_tailed: spread.is_heavy_tailed(),
         })
     }
 
@@ -91,7 +138,7 @@ impl Determination {
         }
     }
 
-    /// A sentence on the target of this name, such as "the readings do not tell y: R² 0.04 ± 0.03".
+    /// A sentence on the target of this name, such as "the readings do not tell y: R² 0.04 (0.01 to 0.07)".
     pub fn sentence(&self, name: &str) -> String {
         let verb = match self.standing() {
             Standing::Told => "tell",
@@ -106,10 +153,39 @@ impl Determination {
         } else {
             String::new()
         };
+        let tails = if self.is_heavy_tailed {
+            ", where a few samples make up most of the error: the true R² may well lie outside"
+        } else {
+            ""
+        };
         // Decimals that show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
-        format!("the readings {verb} {name}: R² {:.digits$}{few}", self.r2)
+        format!("the readings {verb} {name}: R² {:.digits$}{few}{tails}", self.r2)
     }
+}
+
+/// Deviations from the mean.
+fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().map(|value| value / values.len() as f64).sum::<f64>();
+    values.iter().map(|value| value - mean).collect()
+}
+
+/// Variance of 1 − R² from the covariance of errors in different folds: a sample moves its own error and, by the fit, those
+/// of the other folds, in the same direction (Bengio and Grandvalet 2004). It doubles the variance of the products of the
+/// residuals with the part of the answers that is noise, whose share is 1 less the slope of the targets on the answers.
+fn of_fits(evidence: &Evidence, off: &[f64], answers: &[f64], scale: f64) -> f64 {
+    let product = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| one * other).sum::<f64>();
+    let answers: Vec<f64> = answers.iter().map(|answer| answer / scale).collect();
+    let (variation, squares) = (product(off, off), product(&answers, &answers));
+    if squares <= f64::EPSILON * f64::EPSILON * variation {
+        return 0.0;
+    }
+    let slope = product(off, &answers) / squares;
+    let cross = off
+        .iter()
+        .zip(&answers)
+        .map(|(off, answer)| 2.0 * (off - slope * answer) * answer / variation);
+    (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross.collect::<Vec<_>>()).variance
 }
 
 #[cfg(test)]
@@ -136,22 +212,136 @@ mod tests {
         (set, answers)
     }
 
-    fn measure(set: &Dataset, answers: &Array2<f64>, by: SplitBy) -> Option<Determination> {
-        Determination::measure(set, answers.view(), by, &mut ChaCha8Rng::seed_from_u64(0))[0]
+    fn measure(set: &Dataset, answers: &Array2<f64>, by: SplitBy) -> Result<Determination, Undetermined> {
+        Determination::measure(set, answers.view(), by)[0]
     }
 
-    /// The truth is known by construction: R² = 0.6 for a long recording. Of 100 intervals of 95 %, about 95 hold it;
-    /// percentile intervals of some dozen blocks hold it less often, single samples for blocks far less.
+    /// Kinds of data whose true R² is known by construction.
+    #[derive(Clone, Copy, Debug)]
+    enum Kind {
+        /// Independent samples of a linear relation with R² = 0.6.
+        Independent(usize),
+        /// As before, with noise of Student's t with 3 degrees of freedom: its squares have no variance.
+        HeavyTails(usize),
+        /// As before, with half of the variance shared by the samples of a group.
+        Groups(usize),
+        /// Autoregressive with this memory.
+        Autoregressive(usize, f64),
+        /// No relation: five folds, each answered by a linear map fitted to the others.
+        Unrelated(usize),
+    }
+
+    /// Set, answers, and R² of the decoders that answered, on infinitely many other samples.
+    fn draw(kind: Kind, seed: u64) -> (Dataset, Array2<f64>, f64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || standard_normal(&mut rng);
+        let (told, hidden, group_size): (Vec<f64>, Vec<f64>, usize) = match kind {
+            Kind::Independent(n) => (
+                (0..n).map(|_| normal()).collect(),
+                (0..n).map(|_| normal()).collect(),
+                1,
+            ),
+            Kind::HeavyTails(n) => {
+                let mut t3 = || {
+                    let squares: f64 = (0..3).map(|_| normal().powi(2)).sum();
+                    // A variance of 1.
+                    normal() / squares.sqrt()
+                };
+                let hidden = (0..n).map(|_| t3()).collect();
+                ((0..n).map(|_| normal()).collect(), hidden, 1)
+            }
+            Kind::Groups(groups) => {
+                let mut grouped = || -> Vec<f64> {
+                    let mut shared = 0.0;
+                    let of = |sample: usize| {
+                        if sample.is_multiple_of(20) {
+                            shared = normal();
+                        }
+                        0.5_f64.sqrt() * (shared + normal())
+                    };
+                    (0..20 * groups).map(of).collect()
+                };
+                (grouped(), grouped(), 20)
+            }
+            Kind::Autoregressive(n, memory) => {
+                let mut series = || -> Vec<f64> {
+                    let mut value = normal();
+                    let mut next = || {
+                        value = memory * value + (1.0 - memory * memory).sqrt() * normal();
+                        value
+                    };
+                    (0..n).map(|_| next()).collect()
+                };
+                (series(), series(), 1)
+            }
+            Kind::Unrelated(n) => return unrelated(n, &mut rng),
+        };
+        let column = |values: Vec<f64>| Array2::from_shape_vec((values.len(), 1), values).unwrap();
+        let answers: Vec<f64> = told.iter().map(|told| 0.6_f64.sqrt() * told).collect();
+        let pairs = answers.iter().zip(&hidden);
+        let targets = column(pairs.map(|(answer, hidden)| answer + 0.4_f64.sqrt() * hidden).collect());
+        let groups = (0..targets.nrows()).map(|sample| sample / group_size).collect();
+        let set = Dataset::new(targets.clone(), targets, None, groups).unwrap();
+        (set, column(answers), 0.6)
+    }
+
+    /// Targets of variance 1 that five channels do not explain. The map of a fold errs by 1 + |its weights|².
+    fn unrelated(samples: usize, rng: &mut ChaCha8Rng) -> (Dataset, Array2<f64>, f64) {
+        let readings = Array2::from_shape_simple_fn((samples, 5), || standard_normal(rng));
+        let targets = Array2::from_shape_simple_fn((samples, 1), || standard_normal(rng));
+        let (mut answers, mut error) = (Array2::zeros((samples, 1)), 0.0);
+        for fold in 0..5 {
+            let is_tested = |sample: usize| sample * 5 / samples == fold;
+            let fitted: Vec<usize> = (0..samples).filter(|sample| !is_tested(*sample)).collect();
+            let count = fitted.len() as f64;
+            let mean = fitted.iter().map(|sample| targets[[*sample, 0]]).sum::<f64>() / count;
+            let weights: Vec<f64> = (0..5)
+                .map(|channel| {
+                    let products = fitted
+                        .iter()
+                        .map(|&sample| readings[[sample, channel]] * (targets[[sample, 0]] - mean));
+                    products.sum::<f64>() / count
+                })
+                .collect();
+            for sample in (0..samples).filter(|sample| is_tested(*sample)) {
+                let terms = weights.iter().zip(readings.row(sample));
+                answers[[sample, 0]] = mean + terms.map(|(weight, reading)| weight * reading).sum::<f64>();
+            }
+            error += (1.0 + mean * mean + weights.iter().map(|weight| weight * weight).sum::<f64>()) / 5.0;
+        }
+        let set = Dataset::new(readings, targets, None, (0..samples).collect()).unwrap();
+        (set, answers, 1.0 - error)
+    }
+
+    /// Number of `sets` sets whose interval contains the true R².
+    fn coverage(kind: Kind, sets: u64) -> usize {
+        let by = match kind {
+            Kind::Groups(_) => SplitBy::Group,
+            _ => SplitBy::Time,
+        };
+        let holds = (0..sets).filter(|&seed| {
+            let (set, answers, truth) = draw(kind, seed);
+            let r2 = measure(&set, &answers, by).unwrap().r2;
+            r2.low <= truth && truth <= r2.high
+        });
+        holds.count()
+    }
+
+    /// 95 % within three standard errors of 200 sets (0.015), and within 0.92 to 0.98 but for heavy tails.
     #[test]
-    fn intervals_hold_the_true_r2_although_samples_are_correlated() {
-        for (memory, least) in [(0.0, 88), (0.9, 80)] {
-            let holds = (0..100).filter(|&seed| {
-                let (set, answers) = recording(1500, memory, 0.6, seed);
-                let r2 = measure(&set, &answers, SplitBy::Time).unwrap().r2;
-                r2.low <= 0.6 && 0.6 <= r2.high
-            });
-            let holds = holds.count();
-            assert!(holds >= least, "memory {memory}: {holds} of 100");
+    fn intervals_contain_the_true_r2_of_each_kind_of_data_as_often_as_they_say() {
+        for (kind, least) in [
+            (Kind::Independent(40), 184),
+            (Kind::Unrelated(40), 184),
+            (Kind::Unrelated(100), 180),
+            (Kind::Groups(10), 184),
+            (Kind::Autoregressive(400, 0.9), 184),
+            (Kind::Autoregressive(1500, 0.9), 184),
+            (Kind::HeavyTails(100), 170),
+            (Kind::HeavyTails(400), 170),
+        ] {
+            let covered = coverage(kind, 200);
+            assert!((least..=199).contains(&covered), "{kind:?}: {covered} of 200");
         }
     }
 
@@ -167,7 +357,10 @@ mod tests {
             measure(&few, &few_answers(&answers), SplitBy::Group).unwrap(),
         ];
         assert_eq!((by_group.units, of_few.units), (20, 20));
-        assert!((by_group.r2.half_width() / of_few.r2.half_width() - 1.0).abs() < 1e-9);
+        assert!(
+            (by_group.r2.low / of_few.r2.low - 1.0).abs() < 1e-9,
+            "{by_group:?} {of_few:?}"
+        );
     }
 
     fn few_answers(repeated: &Array2<f64>) -> Array2<f64> {
@@ -193,10 +386,59 @@ mod tests {
         assert!(sentence.contains("from only 5 independent"), "{sentence}");
     }
 
+    /// Sets in which nothing can be judged name the cause; numbers beyond measure do not appear.
     #[test]
-    fn a_constant_target_has_no_r2() {
+    fn what_determines_no_r2_is_refused_with_its_cause() {
+        let set = |targets: Vec<f64>, groups: Vec<usize>| {
+            let targets = Array2::from_shape_vec((targets.len(), 1), targets).unwrap();
+            Dataset::new(targets.clone(), targets, None, groups).unwrap()
+        };
+        let rising = || (0..30).map(f64::from).collect::<Vec<_>>();
         let zeros = Array2::zeros((30, 1));
-        let set = Dataset::new(zeros.clone(), zeros.clone(), None, (0..30).collect()).unwrap();
-        assert_eq!(measure(&set, &zeros, SplitBy::Time), None);
+        let in_order = || (0..30).collect::<Vec<_>>();
+        for constant in [0.0, 0.1, 1e300] {
+            let found = measure(&set(vec![constant; 30], in_order()), &zeros, SplitBy::Time);
+            assert_eq!(found, Err(Undetermined::Constant), "{constant}");
+        }
+        for groups in [1, 2] {
+            let set = set(rising(), (0..30).map(|sample| sample % groups).collect());
+            let found = measure(&set, &zeros, SplitBy::Group);
+            assert_eq!(found, Err(Undetermined::FewUnits { units: groups }));
+        }
+        let two = set(vec![1.0, 2.0], vec![0, 1]);
+        let found = measure(&two, &Array2::zeros((2, 1)), SplitBy::Time);
+        assert_eq!(found, Err(Undetermined::FewUnits { units: 2 }));
+        // One of three groups has all of the variation and of the error.
+        let targets = (0..30).map(|sample| if sample == 29 { 1e8 } else { 0.0 }).collect();
+        let found = measure(
+            &set(targets, (0..30).map(|sample| sample / 10).collect()),
+            &zeros,
+            SplitBy::Group,
+        );
+        match found {
+            Err(refused) => assert_eq!(refused, Undetermined::Unbounded { units: 3 }),
+            Ok(found) => assert!(found.r2.low > -99.0 && found.r2.high <= 1.0, "{found:?}"),
+        }
+    }
+
+    #[test]
+    fn extreme_scales_and_perfect_answers_have_an_r2() {
+        let (set, answers) = recording(100, 0.0, 0.6, 1);
+        let usual = measure(&set, &answers, SplitBy::Time).unwrap();
+        for scale in [1e-200, 1e200] {
+            let scaled = |values: ndarray::ArrayView2<'_, f64>| values.mapv(|value| scale * value);
+            let targets = scaled(set.targets());
+            let of_scale = Dataset::new(targets.clone(), targets, None, set.groups().to_vec()).unwrap();
+            let found = measure(&of_scale, &scaled(answers.view()), SplitBy::Time).unwrap();
+            assert!((found.r2.low - usual.r2.low).abs() < 1e-9, "{scale}: {found:?}");
+        }
+        let perfect = measure(&set, &set.targets().to_owned(), SplitBy::Time).unwrap();
+        assert_eq!((perfect.r2.low, perfect.r2.high), (1.0, 1.0));
+        let mut broken = answers.clone();
+        broken[[3, 0]] = f64::NAN;
+        assert_eq!(
+            measure(&set, &broken, SplitBy::Time),
+            Err(Undetermined::Unbounded { units: 100 })
+        );
     }
 }

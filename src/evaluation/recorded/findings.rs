@@ -1,11 +1,13 @@
 use std::fmt;
 
+use ndarray::Array2;
+
 use super::{
     ChannelImportance, ChannelRemark, Determination, FittedModel, LearningCurve, NonlinearGain, SplitComparison,
-    Standing, channel_importance, channel_remarks,
+    Standing, Undetermined, channel_importance, channel_remarks,
 };
 use crate::{
-    dataset::{Dataset, Division, Folds, SplitBy, Stream},
+    dataset::{Dataset, Division, Folds, Stream},
     evaluation::{CrossValidated, RunError, RunSettings},
 };
 
@@ -27,10 +29,10 @@ pub struct Findings {
 /// Findings on one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFindings {
-    /// R² of the network; `None` without networks, or for a constant target.
+    /// R² of the network; `None` without networks, or where it is not determined.
     pub network: Option<Determination>,
-    /// R² of ridge regression; `None` for a constant target.
-    pub ridge: Option<Determination>,
+    /// R² of ridge regression, or the reason why it is not determined.
+    pub ridge: Result<Determination, Undetermined>,
     /// Error of the network beside that of ridge.
     pub gain: Option<NonlinearGain>,
     /// Error with fewer and with more samples.
@@ -43,7 +45,7 @@ pub struct TargetFindings {
 pub enum Stage {
     /// Cross-validation by the rule of the split.
     Folds,
-    /// Cross-validation by another rule, to compare.
+    /// Cross-validation by other rules, to compare.
     OtherFolds,
     /// Fits without each channel.
     Channels,
@@ -65,7 +67,7 @@ impl fmt::Display for Stage {
 impl Findings {
     /// Largest number of networks that [`Self::measure`] trains for so many channels, with so many folds.
     pub fn most_trainings(channels: usize, folds: usize) -> usize {
-        (2 + channels + 1) * folds + LearningCurve::MOST_FITS
+        (3 + channels + 1) * folds + LearningCurve::MOST_FITS
     }
 
     /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
@@ -88,34 +90,24 @@ impl Findings {
             CrossValidated::on_folds(settings, set, folds_by(by)?, is_cancelled)
         };
         begin(Stage::Folds);
-        let mut rng = settings.seed.rng(Stream::Resampling);
+        let judged = |answers: &Array2<f64>| Determination::measure(set, answers.view(), by);
         let (network, ridge, gains, comparison);
         if model == Some(FittedModel::Ridge) {
             let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
             let Some(answers) = answers else { return Ok(None) };
-            ridge = Determination::measure(set, answers.view(), by, &mut rng);
+            ridge = judged(&answers);
             (network, gains, comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
         } else {
             let Some(validated) = validate(by)? else {
                 return Ok(None);
             };
             begin(Stage::OtherFolds);
-            let other = if by == SplitBy::Random {
-                SplitBy::Time
-            } else {
-                SplitBy::Random
-            };
-            let Some(compared) = validate(other)? else {
-                return Ok(None);
-            };
-            network = Determination::measure(set, validated.network.view(), by, &mut rng);
-            ridge = Determination::measure(set, validated.linear.view(), by, &mut rng);
-            gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
-            let tables = [&validated, &compared].map(|validated| validated.target_table(set));
-            comparison = Some(match (by, tables) {
-                (SplitBy::Random, [random, honest]) => SplitComparison::of(other, [honest, random]),
-                (by, tables) => SplitComparison::of(by, tables),
-            });
+            let compared = SplitComparison::complete(settings, set, folds, (by, &validated), is_cancelled)?;
+            let Some(compared) = compared else { return Ok(None) };
+            network = judged(&validated.network).into_iter().map(Result::ok).collect();
+            ridge = judged(&validated.linear);
+            gains = NonlinearGain::of_validated(set, &validated, by);
+            comparison = Some(compared);
         }
         // Where the readings tell nothing, the better answer is only nearer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
@@ -160,7 +152,7 @@ impl TargetFindings {
     /// R² of the better of network and ridge, with the model.
     pub fn best(&self) -> Option<(FittedModel, Determination)> {
         let network = self.network.map(|network| (FittedModel::Network, network));
-        let ridge = self.ridge.map(|ridge| (FittedModel::Ridge, ridge));
+        let ridge = self.ridge.ok().map(|ridge| (FittedModel::Ridge, ridge));
         match (network, ridge) {
             (Some(network), Some(ridge)) if ridge.1.r2.value >= network.1.r2.value => Some(ridge),
             (network, ridge) => network.or(ridge),

@@ -1,5 +1,7 @@
 use std::fmt;
 
+use super::{evidence::SumVariance, student::student_quantile};
+
 /// A figure with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
@@ -12,6 +14,24 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// Fewest independent units for an interval.
+    pub(super) const FEWEST_UNITS: usize = 3;
+    /// Largest factor by which an end may differ from the figure: beyond it, the figure is not determined.
+    const LARGEST_FACTOR: f64 = 100.0;
+
+    /// Returns the interval of a positive ratio whose sampling variance is `spread`: Student's, symmetric in the logarithm,
+    /// in which the ratio of two sums of squares is nearly normal. `None` if that determines nothing.
+    pub(super) fn of_ratio(ratio: f64, spread: SumVariance) -> Option<Self> {
+        let reach = student_quantile(spread.freedom) * spread.variance.sqrt() / ratio;
+        // Not for NaN either.
+        let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= Self::LARGEST_FACTOR.ln();
+        (is_determined && spread.units >= Self::FEWEST_UNITS).then(|| Self {
+            value: ratio,
+            low: ratio * (-reach).exp(),
+            high: ratio * reach.exp(),
+        })
+    }
+
     /// Returns the percentile interval (Efron 1979) of `replicates`, of which those that are no number are left out;
     /// `None` if the figure itself is none, or fewer than half of the replicates are left.
     pub(super) fn of_replicates(value: f64, replicates: &[f64]) -> Option<Self> {
@@ -29,19 +49,64 @@ impl Interval {
         })
     }
 
-    /// Half of the width of the interval.
-    pub fn half_width(&self) -> f64 {
-        0.5 * (self.high - self.low)
+    /// The interval of a monotonic function of the figure.
+    #[must_use]
+    pub(super) fn map(&self, function: impl Fn(f64) -> f64) -> Self {
+        let [low, high] = [self.low, self.high].map(&function);
+        Self {
+            value: function(self.value),
+            low: low.min(high),
+            high: low.max(high),
+        }
     }
 }
 
 impl fmt::Display for Interval {
-    /// Writes `0.04 ± 0.03`, with decimals as given, or two.
+    /// Writes `0.04 (0.01 to 0.09)`, with decimals as given, or two.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(2);
         // No -0.00.
         let places = 10.0_f64.powi(digits as i32);
-        let value = (self.value * places).round() / places + 0.0;
-        write!(f, "{value:.digits$} ± {:.digits$}", self.half_width())
+        let [value, low, high] =
+            [self.value, self.low, self.high].map(|figure| (figure * places).round() / places + 0.0);
+        write!(f, "{value:.digits$} ({low:.digits$} to {high:.digits$})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_ratio(ratio: f64, variance: f64, units: usize) -> Option<Interval> {
+        let freedom = units as f64 - 1.0;
+        let spread = SumVariance {
+            variance,
+            units,
+            freedom,
+        };
+        Interval::of_ratio(ratio, spread)
+    }
+
+    #[test]
+    fn an_interval_is_written_with_both_of_its_ends() {
+        // t of 20 degrees of freedom is 2.086: e^(±0.2086).
+        let interval = of_ratio(1.0, 0.01, 21).unwrap();
+        assert_eq!(format!("{interval:.4}"), "1.0000 (0.8117 to 1.2319)");
+        assert_eq!(interval.map(|ratio| 1.0 - ratio).to_string(), "0.00 (-0.23 to 0.19)");
+    }
+
+    #[test]
+    fn what_determines_nothing_has_no_interval() {
+        for (ratio, variance, units) in [
+            (1.0, 0.01, 2),
+            (1.0, 10.0, 20),
+            (1.0, f64::INFINITY, 20),
+            (1.0, f64::NAN, 20),
+            (0.0, 0.01, 20),
+            (f64::INFINITY, 0.01, 20),
+            (f64::NAN, 0.01, 20),
+        ] {
+            assert_eq!(of_ratio(ratio, variance, units), None, "{ratio} {variance} {units}");
+        }
     }
 }

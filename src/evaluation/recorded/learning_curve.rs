@@ -117,7 +117,10 @@ impl LearningCurve {
         let doubling = law.and(points.last()).and_then(|all| {
             let whole = all.samples as f64;
             let columns: Vec<Vec<f64>> = fits.iter().map(|fit| fit.squares.column(target).to_vec()).collect();
-            let resampling = Resampling::of(test, by, columns.last().map(Vec::as_slice));
+            let resampling = Resampling::of(test, by, columns.last()?);
+            if resampling.count() < Interval::FEWEST_UNITS {
+                return None;
+            }
             // Squared errors of every fit in every unit of the test set.
             let sums: Vec<Vec<[f64; 2]>> = columns
                 .iter()

@@ -1,13 +1,13 @@
 //! Judges recordings by the knowledge in them: of each target, by each channel, and with more samples.
 //!
 //! Everything is judged on held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and every
-//! figure has a 95 % confidence interval from resampling blocks or groups of samples, because neighbouring samples of a
+//! figure has a 95 % confidence interval from independent stretches or groups of samples, because neighbouring samples of a
 //! recording are nearly the same.
 
-mod block_length;
 mod channel_importance;
 mod channel_remark;
 mod determination;
+mod evidence;
 mod findings;
 mod held_out;
 mod interval;
@@ -16,10 +16,11 @@ mod nonlinear_gain;
 mod power_law;
 mod resampling;
 mod split_comparison;
+mod student;
 
 pub use channel_importance::{ChannelImportance, channel_importance};
 pub use channel_remark::{ChannelRemark, channel_remarks};
-pub use determination::{Determination, Standing};
+pub use determination::{Determination, Standing, Undetermined};
 pub use findings::{Findings, Stage, TargetFindings};
 pub use held_out::FittedModel;
 pub use interval::Interval;

@@ -1,5 +1,3 @@
-use rand::Rng;
-
 use super::{Interval, channel_importance::rmse_ratio};
 use crate::{
     dataset::{Dataset, SplitBy},
@@ -19,16 +17,11 @@ impl NonlinearGain {
     ///
     /// # Panics
     /// If the set is not the one that was cross-validated.
-    pub fn of_validated(
-        set: &Dataset,
-        validated: &CrossValidated,
-        by: SplitBy,
-        rng: &mut impl Rng,
-    ) -> Vec<Option<Self>> {
+    pub fn of_validated(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Self>> {
         let answers = [validated.network.view(), validated.linear.view()];
         (0..set.outputs())
             .map(|target| {
-                let ratio = rmse_ratio(set, answers, target, by, rng)?;
+                let ratio = rmse_ratio(set, answers, target, by)?;
                 Some(Self { ratio })
             })
             .collect()
@@ -45,17 +38,20 @@ impl NonlinearGain {
     /// A sentence on the target of this name where the network is no better than ridge, or hardly.
     pub fn remark(&self, name: &str) -> Option<String> {
         (!self.is_supported()).then(|| {
-            let Interval { value, low, high } = self.ratio;
-            let better = if high < 1.0 { "hardly better" } else { "no better" };
+            let better = if self.ratio.high < 1.0 {
+                "hardly better"
+            } else {
+                "no better"
+            };
             // Decimals that show on which side of 1 the interval ends.
-            let differs = |decimals: &usize| format!("{high:.decimals$}") != format!("{:.decimals$}", 1.0);
+            let differs = |decimals: &usize| format!("{:.decimals$}", self.ratio.high) != format!("{:.decimals$}", 1.0);
             let decimals = (2..6).find(differs).unwrap_or(2);
             // A training can miss what there is: restarts of Bayesian regularisation that all end as a linear map are no
             // proof that another method finds no more.
             format!(
-                "the network is {better} than ridge for {name} (error {value:.decimals$} times ridge's, {low:.decimals$} \
-                 to {high:.decimals$}): this training found little more than a linear map; try another method or more \
-                 starts, give more samples, or take ridge"
+                "the network is {better} than ridge for {name} (error {:.decimals$} times ridge's): this training found \
+                 little more than a linear map; try another method or more starts, give more samples, or take ridge",
+                self.ratio
             )
         })
     }
@@ -75,7 +71,7 @@ mod tests {
         };
         let worse = remark(1.004, 0.98, 1.02).unwrap();
         assert!(
-            worse.contains("no better than ridge for y (error 1.00 times ridge's, 0.98 to 1.02)"),
+            worse.contains("no better than ridge for y (error 1.00 (0.98 to 1.02) times ridge's)"),
             "{worse}"
         );
         assert!(
@@ -85,7 +81,7 @@ mod tests {
         assert!(!worse.contains("these data do not support"), "{worse}");
         let hardly = remark(0.996, 0.994, 0.9991).unwrap();
         assert!(
-            hardly.contains("hardly better") && hardly.contains("0.996 times ridge's, 0.994 to 0.999)"),
+            hardly.contains("hardly better") && hardly.contains("0.996 (0.994 to 0.999) times ridge's)"),
             "{hardly}"
         );
         assert_eq!(remark(0.7, 0.6, 0.8), None);

@@ -1,6 +1,6 @@
 use rand::{Rng, RngExt};
 
-use super::block_length::block_length;
+use super::evidence::slow_cosines;
 use crate::dataset::{Dataset, SplitBy};
 
 /// Samples in the units that a bootstrap draws: groups (Davison and Hinkley 1997, section 3.8) or consecutive blocks
@@ -16,9 +16,9 @@ impl Resampling {
     /// Most units: more would take long to draw and change no interval. Neighbours are joined to fewer.
     const MOST_UNITS: usize = 2000;
 
-    /// Units of `set`: its groups where it is split by group, otherwise blocks long enough for the autocorrelation of
-    /// each of `series`, values of the samples in the order of the recording.
-    pub(super) fn of<'a>(set: &Dataset, by: SplitBy, series: impl IntoIterator<Item = &'a [f64]>) -> Self {
+    /// Units of `set`: its groups where it is split by group, otherwise blocks as long as the independent stretches of
+    /// `series`, values of the samples in the order of the recording.
+    pub(super) fn of(set: &Dataset, by: SplitBy, series: &[f64]) -> Self {
         let units = match by {
             SplitBy::Group => {
                 let groups = set.snapshots();
@@ -26,7 +26,7 @@ impl Resampling {
                 groups.chunks(joined.max(1)).map(<[Vec<usize>]>::concat).collect()
             }
             SplitBy::Time | SplitBy::Random => {
-                let length = series.into_iter().map(block_length).max().unwrap_or(1);
+                let length = slow_cosines(series).map_or(1, |cosines| series.len().div_ceil(cosines + 1));
                 let length = length.max(set.samples().div_ceil(Self::MOST_UNITS));
                 let samples: Vec<usize> = (0..set.samples()).collect();
                 samples.chunks(length).map(<[usize]>::to_vec).collect()
@@ -65,18 +65,6 @@ impl Resampling {
             }
             replicate(&times);
         }
-    }
-
-    /// Returns the replicates of a statistic of such sums.
-    pub(super) fn replicates<const K: usize>(
-        &self,
-        sums: &[[f64; K]],
-        rng: &mut impl Rng,
-        statistic: impl Fn(&[f64; K]) -> f64,
-    ) -> Vec<f64> {
-        let mut found = Vec::with_capacity(Self::REPLICATES);
-        self.draw(rng, |times| found.push(statistic(&weighted(sums, times))));
-        found
     }
 }
 

@@ -3,8 +3,8 @@ use crate::{
     evaluation::{CrossValidated, RunError, RunSettings, TargetErrors, TargetRow},
 };
 
-/// Held-out errors of the same settings on the same samples, once with folds by time or group, once with random folds:
-/// the difference is how much a random split flatters.
+/// Held-out errors of the same settings on the same samples, once with folds by group (by time without groups), once with
+/// random folds: the difference is how much a random split flatters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitComparison {
     /// Rule of the folds that do not flatter.
@@ -23,30 +23,33 @@ impl SplitComparison {
     /// Share of the error that a random split must hide to be worth a sentence.
     const WORTH_SAYING: f64 = 0.05;
 
-    /// Cross-validates `set` with `folds` folds twice, by `by` and at random; `None` if cancelled. Takes 2 × folds
-    /// trainings.
+    /// Compares the cross-validation `validated` of `set`, with `folds` folds by `by`, with random folds: by group if there
+    /// are groups, else by `by`, or by time if that is random; `None` if cancelled. Takes up to 2 × folds trainings.
     ///
     /// # Errors
-    /// If the folds cannot be filled, or the settings are invalid.
-    pub fn measure(
+    /// If the settings are invalid.
+    pub fn complete(
         settings: &RunSettings,
         set: &Dataset,
         folds: usize,
-        by: SplitBy,
+        (by, validated): (SplitBy, &CrossValidated),
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let validate = |by| -> Result<Option<CrossValidated>, RunError> {
-            let folds = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split))?;
-            CrossValidated::on_folds(settings, set, folds, is_cancelled)
+        let table = |rule: SplitBy| -> Result<Option<Vec<TargetRow>>, RunError> {
+            if rule == by {
+                return Ok(Some(validated.target_table(set)));
+            }
+            let folds = rule.folds_of(set, folds);
+            let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
+            let validated = CrossValidated::on_folds(settings, set, folds, is_cancelled)?;
+            Ok(validated.map(|validated| validated.target_table(set)))
         };
-        let Some(honest) = validate(by)? else { return Ok(None) };
-        let Some(random) = validate(SplitBy::Random)? else {
+        let honest = SplitBy::honest(set);
+        let Some(of_honest) = table(honest)? else {
             return Ok(None);
         };
-        Ok(Some(Self::of(
-            by,
-            [honest, random].map(|validated| validated.target_table(set)),
-        )))
+        let random = table(SplitBy::Random)?;
+        Ok(random.map(|random| Self::of(honest, [of_honest, random])))
     }
 
     /// Compares the tables of errors of two runs or cross-validations, by `by` and at random:

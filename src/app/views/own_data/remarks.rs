@@ -13,7 +13,7 @@ pub(super) fn flattery(by: SplitBy) -> &'static str {
         SplitBy::Group => "Whole groups test: nothing of their press or session was trained on.",
         SplitBy::Random => {
             "A random split flatters where neighbouring rows are alike: the test has neighbours of what was trained. \
-             Compare with a split by time."
+             Compare with a split by group, or by time if there are no groups."
         }
     }
 }

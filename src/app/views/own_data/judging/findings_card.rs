@@ -12,7 +12,7 @@ use crate::{
             dim_ui, explained_options_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
-    evaluation::recorded::{Findings, FittedModel, Interval},
+    evaluation::recorded::{Findings, FittedModel},
     export::{describe_target, describe_warnings, format_duration},
     figure::{PlotFigure, learning_curve_figure},
     import::{Channel, Meaning},
@@ -139,7 +139,7 @@ fn targets_ui(ui: &mut Ui, told: &Told) {
     let Told { findings, targets, .. } = told;
     for (index, (target, found)) in targets.iter().zip(&findings.targets).enumerate() {
         ui.label(sentence(&describe_target(&target.name, found)));
-        let r2 = [("network", found.network), ("ridge", found.ridge)];
+        let r2 = [("network", found.network), ("ridge", found.ridge.ok())];
         let r2: Vec<String> = r2
             .into_iter()
             .filter_map(|(name, r2)| Some(format!("{name} {:.3}", r2?.r2.value)))
@@ -200,16 +200,14 @@ fn channels_ui(ui: &mut Ui, told: &Told) {
                     let cell = |text: &str| RichText::new(text).size(type_size().note).color(colour);
                     ui.label(cell(&told.inputs[channel.channel].title()));
                     for growth in &channel.growth {
-                        ui.label(cell(&growth.map_or_else(|| "–".to_owned(), growth_text)));
+                        ui.label(cell(
+                            &growth.map_or_else(|| "–".to_owned(), |growth| growth.to_string()),
+                        ));
                     }
                     ui.end_row();
                 }
             });
     });
-}
-
-fn growth_text(Interval { value, low, high }: Interval) -> String {
-    format!("{value:.2} ({low:.2} to {high:.2})")
 }
 
 fn curve_ui(ui: &mut Ui, told: &Told, target: &mut usize) {

@@ -190,8 +190,7 @@ impl<'a> Training<'a> {
             wall_time: self.run.wall_time(),
             flaw: self.run.flaw().map(|flaw| flaw.to_string()),
             remarks: if is_standing {
-                let mut rng = self.run.settings().seed.rng(Stream::Resampling);
-                let told = Determination::measure(self.run.test(), answers.view(), plan.division.by, &mut rng);
+                let told = Determination::measure(self.run.test(), answers.view(), plan.division.by);
                 let mut remarks = describe_standings(targets, &told);
                 remarks.extend(describe_worse_than_ridge(&file));
                 remarks
@@ -232,18 +231,24 @@ fn validate(
     };
     let table = validated.target_table(set);
     let comparison = if compares_random && by != SplitBy::Random {
-        let random = cross_validated(SplitBy::Random)?;
-        random.map(|random| SplitComparison::of(by, [table.clone(), random.target_table(set)]))
+        let compared = SplitComparison::complete(settings, set, folds, (by, &validated), &|| report.is_cancelled());
+        let compared = compared.map_err(|error| error.to_string())?;
+        if compared.is_none() {
+            return Ok(None);
+        }
+        compared
     } else {
         None
     };
-    let mut rng = settings.seed.rng(Stream::Resampling);
-    let told = Determination::measure(set, validated.network.view(), by, &mut rng);
-    let gains = NonlinearGain::of_validated(set, &validated, by, &mut rng);
+    let told = Determination::measure(set, validated.network.view(), by);
+    let gains = NonlinearGain::of_validated(set, &validated, by);
     let mut remarks = Vec::new();
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
-        remarks.extend(told[target].map(|told| told.sentence(name)));
+        remarks.push(match told[target] {
+            Ok(told) => told.sentence(name),
+            Err(cause) => format!("{name}: {cause}"),
+        });
         remarks.extend(gains[target].and_then(|gain| gain.remark(name)));
         remarks.extend(comparison.as_ref().map(|comparison| comparison.sentence(target, name)));
     }

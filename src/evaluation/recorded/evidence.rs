@@ -1,0 +1,192 @@
+use std::f64::consts::PI;
+
+use crate::dataset::{Dataset, SplitBy};
+
+/// Independent evidence in a set of samples: its groups, or stretches of its order.
+///
+/// Neighbouring samples of a recording are nearly the same, and samples of a group have much in common. The variance of a
+/// sum is therefore estimated from whole groups, or from the slow cosines of its series.
+#[derive(Clone, Debug)]
+pub(super) enum Evidence {
+    /// Samples of each group.
+    Groups(Vec<Vec<usize>>),
+    /// Samples in the order of the recording.
+    Order,
+}
+
+/// Variance of the sum of influences of samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SumVariance {
+    /// Estimated variance.
+    pub(super) variance: f64,
+    /// Number of independent groups or stretches.
+    pub(super) units: usize,
+    /// Degrees of freedom of the estimate.
+    pub(super) freedom: f64,
+}
+
+impl SumVariance {
+    /// Tells whether a few units make up most of the variance, as with heavy tails: the estimate of the variance then
+    /// depends on extreme values that short data rarely contain.
+    pub(super) fn is_heavy_tailed(&self) -> bool {
+        self.freedom < 0.15 * self.units as f64
+    }
+}
+
+impl Evidence {
+    /// Evidence in `set`: its groups where it is split by group, otherwise its order.
+    pub(super) fn of(set: &Dataset, by: SplitBy) -> Self {
+        match by {
+            SplitBy::Group => Self::Groups(set.snapshots()),
+            SplitBy::Time | SplitBy::Random => Self::Order,
+        }
+    }
+
+    /// Returns the variance of the sum of `influences`, which have a sum of 0.
+    ///
+    /// Groups are independent. Samples in order are as well if no memory is found; otherwise the variance is that of their
+    /// projections on the slowest cosines (Lazarus, Lewis, Stock and Watson 2018, doi:10.1080/07350015.2018.1506926), one
+    /// degree of freedom each. Few units with most of the variance leave fewer degrees of freedom: 2n / (κ − 1) with the
+    /// kurtosis κ (Satterthwaite 1946, doi:10.2307/3002019).
+    pub(super) fn variance(&self, influences: &[f64]) -> SumVariance {
+        match self {
+            Self::Groups(groups) => {
+                let sum = |group: &Vec<usize>| group.iter().map(|&sample| influences[sample]).sum();
+                of_independent(&groups.iter().map(sum).collect::<Vec<f64>>())
+            }
+            Self::Order => match slow_cosines(influences) {
+                None => of_independent(influences),
+                Some(cosines) => SumVariance {
+                    variance: of_cosines(influences, cosines),
+                    units: cosines + 1,
+                    freedom: tail_freedom(influences).min(cosines as f64).max(LEAST_FREEDOM),
+                },
+            },
+        }
+    }
+}
+
+/// Fewest degrees of freedom, below which intervals say nothing.
+const LEAST_FREEDOM: f64 = 2.0;
+
+fn of_independent(values: &[f64]) -> SumVariance {
+    let units = values.len();
+    let correction = units as f64 / (units as f64 - 1.0);
+    SumVariance {
+        variance: correction * values.iter().map(|value| value * value).sum::<f64>(),
+        units,
+        freedom: tail_freedom(values).min(units as f64 - 1.0).max(LEAST_FREEDOM),
+    }
+}
+
+/// 2n / (κ − 1), infinite for values of one size.
+fn tail_freedom(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let power = |exponent| values.iter().map(|value| value.powi(exponent)).sum::<f64>();
+    let kurtosis = count * power(4) / power(2).powi(2);
+    if kurtosis > 1.0 {
+        2.0 * count / (kurtosis - 1.0)
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Number of cosines that are slow compared with the memory of `series`; `None` if no memory is found.
+///
+/// The memory is that of an autoregressive series of order 1 with the correlation of neighbours, looked for in the series
+/// itself and in means of 2, 4, 8, … of its values, so that a slow drift is found beneath independent noise. The number
+/// ν limits the relative bias c·ν² with c = (π/n)²/6 · 2ρ/(1 − ρ)² against the variance 2/ν.
+pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
+    /// Shortest series in which memory can be seen.
+    const SHORTEST: usize = 16;
+    /// Weight of the squared bias: coverage suffers from bias more than from variance.
+    const WEIGHT: f64 = 25.0;
+    const FEWEST: f64 = 3.0;
+    /// More change no interval.
+    const MOST: f64 = 60.0;
+    let mut series = series.to_vec();
+    let mut slow: Option<f64> = None;
+    while series.len() >= SHORTEST {
+        let count = series.len() as f64;
+        let mean = series.iter().sum::<f64>() / count;
+        series.iter_mut().for_each(|value| *value -= mean);
+        let products: f64 = series.windows(2).map(|pair| pair[0] * pair[1]).sum();
+        let found = products / series.iter().map(|value| value * value).sum::<f64>();
+        if found > 2.0 / count.sqrt() {
+            // Short series show less memory than they have (Marriott and Pope 1954, doi:10.1093/biomet/41.3-4.390).
+            let memory = (found + (1.0 + 3.0 * found) / count).min(0.97);
+            let bias = (PI / count).powi(2) / 6.0 * 2.0 * memory / (1.0 - memory).powi(2);
+            let best = (2.0 * bias * bias * WEIGHT).powf(-0.2).round();
+            slow = Some(slow.unwrap_or(MOST).min(best).clamp(FEWEST, MOST));
+        }
+        series = series.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    }
+    slow.map(|slow| slow as usize)
+}
+
+/// Variance of the sum of `series` from its projections on the `cosines` slowest cosines.
+fn of_cosines(series: &[f64], cosines: usize) -> f64 {
+    /// Enough for the slow cosines.
+    const MOST_CELLS: usize = 2000;
+    let count = series.len();
+    let length = count.div_ceil(MOST_CELLS);
+    let cells = series.chunks(length).enumerate().map(|(cell, values)| {
+        let middle = (cell * length) as f64 + 0.5 * values.len() as f64;
+        (middle / count as f64, values.iter().sum::<f64>())
+    });
+    let cells: Vec<(f64, f64)> = cells.collect();
+    let squares = (1..=cosines).map(|wave| {
+        let terms = cells.iter().map(|(at, sum)| (PI * wave as f64 * at).cos() * sum);
+        terms.sum::<f64>().powi(2)
+    });
+    2.0 * squares.sum::<f64>() / cosines as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::scene::normal::standard_normal;
+
+    fn autoregressive(memory: f64, n: usize, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut value = standard_normal(&mut rng);
+        let mut next = || {
+            value = memory * value + (1.0 - memory * memory).sqrt() * standard_normal(&mut rng);
+            value
+        };
+        (0..n).map(|_| next()).collect()
+    }
+
+    /// The sum of n values of an autoregressive series of variance 1 has the variance n (1 + ρ) / (1 − ρ) for large n.
+    #[test]
+    fn the_variance_of_a_sum_is_that_of_theory() {
+        for memory in [0.0, 0.5, 0.9_f64] {
+            let n = 5000;
+            let theory = n as f64 * (1.0 + memory) / (1.0 - memory);
+            let found = (0..40).map(|seed| Evidence::Order.variance(&autoregressive(memory, n, seed)).variance);
+            let ratio = found.sum::<f64>() / 40.0 / theory;
+            assert!((0.85..1.1).contains(&ratio), "{memory}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn a_slow_drift_is_found_beneath_independent_noise() {
+        let slow = autoregressive(0.98, 2000, 1);
+        let noise = autoregressive(0.0, 2000, 2);
+        let mixed: Vec<f64> = slow
+            .iter()
+            .zip(&noise)
+            .map(|(slow, noise)| 0.5 * slow + noise)
+            .collect();
+        assert!(slow_cosines(&mixed).is_some_and(|cosines| cosines < 40));
+    }
+
+    #[test]
+    fn short_constant_or_missing_values_show_no_memory() {
+        for series in [vec![], vec![1.0], vec![2.0; 100], vec![f64::NAN; 50]] {
+            assert_eq!(slow_cosines(&series), None);
+        }
+    }
+}
