@@ -35,7 +35,8 @@ impl OwnDataView {
         }
         while let Some(event) = self.keeping.next_event() {
             match event {
-                KeepingEvent::Kept(path, file) => self.runs.note_kept(path, file),
+                KeepingEvent::Found(path, file) => self.runs.note_found(path, file),
+                KeepingEvent::Kept(path, file) => self.runs.note_kept(path, &file),
                 KeepingEvent::Failed(reason) => effects.push(failed(&reason)),
                 KeepingEvent::Ended => {}
             }
@@ -92,15 +93,14 @@ impl OwnDataView {
                 let mut trained = *trained;
                 trained.name = self.runs.name_of(&trained);
                 self.runs.add(&trained);
-                self.show(trained, None);
+                self.show(trained);
                 self.tab = Tab::Results;
             }
             Opened::Checkpoint(path, file, draft) => {
                 self.draft = draft.map(|draft| *draft).or(self.draft.take());
                 self.settings = file.settings.into();
-                self.asked = Some(self.settings);
                 self.tab = Tab::Results;
-                self.begin(Task::Resume(path, file));
+                self.begin(Task::Resume(path, file), Some(self.settings));
             }
         }
     }
@@ -117,10 +117,13 @@ impl OwnDataView {
         match event {
             TrainingEvent::Reading(progress) => self.reading = Some(progress),
             TrainingEvent::Progressed(mut trained) => {
-                let is_first = std::mem::take(&mut self.is_beginning);
+                let begun = self.beginning.take();
                 trained.name = self.runs.name_of(&trained);
                 self.phase = trained.phase;
-                if is_first {
+                if begun.is_some() {
+                    self.asked = begun;
+                    // One that was opened is held where it was saved.
+                    self.saved_epochs = (trained.phase == Phase::Paused).then_some(trained.epochs_run);
                     effects.push(Effect::Settle(Matter::OwnData));
                     self.tab = Tab::Results;
                     self.chart.fit(&trained);
@@ -136,12 +139,9 @@ impl OwnDataView {
             }
             TrainingEvent::Refused(reason) => effects.push(failed(&reason)),
             TrainingEvent::Ended(ended) => {
-                if let Err(reason) = ended {
-                    // The training on show, if there is one, is of an older thread.
-                    self.asked = None;
-                    effects.push(failed(&reason));
-                }
-                self.is_validating = false;
+                effects.extend(ended.err().map(|reason| failed(&reason)));
+                self.trainer.forget();
+                (self.is_validating, self.beginning) = (false, None);
                 if self.phase.is_busy() {
                     self.phase = self.phase_at_rest();
                 }
