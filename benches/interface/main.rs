@@ -15,7 +15,7 @@ use std::{
 };
 
 use decoupler::{
-    app::{DecouplerWindow, DialogKind, Effect, Phase, Shared},
+    app::{DecouplerWindow, Desktop, Effect, Phase, Shared},
     evaluation::SimulatedSettings,
     figure::{EpochOutline, loss_figure},
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
@@ -41,7 +41,7 @@ struct Bench {
 impl Bench {
     fn open() -> Self {
         let ctx = Context::default();
-        let window = DecouplerWindow::new(&ctx, DialogKind::None, None);
+        let window = DecouplerWindow::new(&ctx, Desktop::None, None);
         let begun = Instant::now();
         Self {
             ctx,

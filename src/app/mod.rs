@@ -31,4 +31,4 @@ use crate::figure::ticks;
 
 pub use shared::{Effect, Matter, Notice, Phase, Shared};
 pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeOffEnding, TradeOffPlan, Views};
-pub use window::{DecouplerWindow, DialogKind, OpenError, WindowFile, open};
+pub use window::{DecouplerWindow, Desktop, OpenError, WindowFile, open};

@@ -4,17 +4,20 @@ use std::{fs, path::Path, time::Instant};
 
 use decoupler::{
     app::{Effect, Phase},
-    export::CheckpointFile,
+    export::{CheckpointFile, MeasuredCheckpointFile},
     training::StopReason,
 };
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 
 use crate::{
+    configuring::choose_method,
     driver::{Driver, PATIENCE},
+    recordings::{cells, opened},
     training::{endless, start_endless},
 };
 
-const SAVE: &str = "Save checkpoint and close…";
+const SAVE: &str = "Save checkpoints and close…";
+const QUESTION: &str = "Close while work is in progress?";
 const DISCARD: &str = "Discard and close";
 
 /// Whether the window asked for this in the frame drawn last.
@@ -57,7 +60,7 @@ fn without_an_unfinished_training_the_window_closes_at_once() {
     driver.configure_small();
     driver.train();
     assert!(close(&mut driver));
-    assert!(!driver.says("Close during a training?"));
+    assert!(!driver.says(QUESTION));
 }
 
 #[test]
@@ -67,9 +70,14 @@ fn an_unfinished_training_is_asked_about_once_and_goes_on_if_the_user_stays() {
     assert!(!close(&mut driver));
     assert!(!close(&mut driver), "the question is not answered by closing once more");
     driver.harness().step();
-    assert!(driver.has("Close during a training?") && driver.says("of 1000000. Closing discards it"));
+    assert!(
+        driver.has(QUESTION) && driver.has("Train: Training"),
+        "{:#?}",
+        driver.texts()
+    );
+    assert!(driver.says(" of 1000000") && driver.has("can be saved as a checkpoint"));
     driver.press(Key::Escape);
-    assert!(!driver.has("Close during a training?"));
+    assert!(!driver.has(QUESTION));
     driver.wait_for_epochs(3);
     assert!(!close(&mut driver));
     driver.harness().step();
@@ -136,12 +144,151 @@ fn a_checkpoint_that_cannot_be_saved_keeps_the_window_open() {
 }
 
 #[test]
-fn a_training_that_ends_while_it_is_asked_about_needs_no_answer() {
+fn a_training_that_ends_while_it_is_asked_about_moves_no_button_and_closes_nothing() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
-    assert!(!close(&mut driver));
+    ask(&mut driver);
+    let places = |driver: &mut Driver, labels: [&str; 3]| labels.map(|label| driver.get(label).rect());
+    let before = places(&mut driver, ["Stay", DISCARD, SAVE]);
     driver.window_mut().apply(Effect::Stop);
+    let latest = Instant::now() + PATIENCE;
+    while !driver.says("has ended") {
+        driver.wait_for_frame("the end", latest);
+        assert!(!asked(&mut driver, &ViewportCommand::Close), "nobody has answered");
+    }
+    driver.harness().run_steps(5);
+    assert!(!asked(&mut driver, &ViewportCommand::Close));
+    assert!(driver.has("Train: Training") && !driver.is_enabled(SAVE) && !driver.has(DISCARD));
+    assert_eq!(places(&mut driver, ["Stay", "Close", SAVE]), before);
+    driver.click_button("Close");
     wait_for_closing(&mut driver);
+}
+
+/// Clicks the button of the title bar and waits for the question.
+fn ask(driver: &mut Driver) {
+    assert!(!close(driver));
+    driver.harness().run_steps(3);
+    assert!(driver.has(QUESTION), "{:#?}", driver.texts());
+}
+
+/// Begins a training on own data that goes on for as long as one looks.
+fn start_endless_on_own_data(driver: &mut Driver) {
+    choose_method(driver, "Momentum, Eq. (11)");
+    driver.limit_epochs("1000000");
+    driver.click("▶ Train");
+    driver.wait("an epoch", |driver| !cells(driver).is_empty());
+}
+
+#[test]
+fn two_trainings_are_both_asked_about_and_both_saved() {
+    let (mut driver, _path, folder) = opened(60);
+    start_endless_on_own_data(&mut driver);
+    driver.click_button("Train");
+    start_endless(&mut driver);
+    ask(&mut driver);
+    assert!(driver.has("Train: Training") && driver.has("Own data: Training"));
+    let savable = driver
+        .texts()
+        .into_iter()
+        .filter(|text| text == "can be saved as a checkpoint");
+    assert_eq!(savable.count(), 2);
+    driver.click_button(SAVE);
+    let [one, other] = ["one.checkpoint", "other.checkpoint"].map(|name| folder.path().join(name));
+    let mut give = |path: &Path| {
+        driver.harness().run_steps(5);
+        driver.type_into("File", &path.display().to_string());
+        driver.click_button("Save");
+    };
+    give(&one);
+    // Neither takes the file of the other.
+    give(&one);
+    give(&other);
+    wait_for_closing(&mut driver);
+    drop(driver);
+    assert_eq!(CheckpointFile::load(&one).unwrap().settings, endless());
+    let file = MeasuredCheckpointFile::load(&other).unwrap();
+    assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
+}
+
+#[test]
+fn a_training_that_ends_leaves_the_other_to_be_saved() {
+    let (mut driver, _path, folder) = opened(60);
+    start_endless_on_own_data(&mut driver);
+    driver.click_button("Train");
+    start_endless(&mut driver);
+    ask(&mut driver);
+    let before = [SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect());
+    driver.window_mut().apply(Effect::Stop);
+    driver.wait("the end of one", |driver| driver.says("has ended"));
+    assert_eq!([SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect()), before);
+    driver.click_button(SAVE);
+    driver.harness().run_steps(5);
+    let path = folder.path().join("kept.checkpoint");
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Save");
+    wait_for_closing(&mut driver);
+    assert!(MeasuredCheckpointFile::load(&path).is_ok());
+}
+
+#[test]
+fn an_experiment_and_a_trade_off_are_not_ended_unasked() {
+    let mut driver = Driver::open();
+    for (view, run, cancel, line) in [
+        ("Experiments", "▶ Run", "■ Cancel", "Experiments: Experiment"),
+        ("Trade-off", "▶ Measure", "■ Cancel", "Trade-off: Measurement"),
+    ] {
+        driver.click_button(view);
+        driver.click(run);
+        ask(&mut driver);
+        assert!(
+            driver.has(line) && driver.has("will be discarded"),
+            "{:#?}",
+            driver.texts()
+        );
+        assert!(driver.says("0 of ") && !driver.is_enabled(SAVE));
+        driver.click_button("Stay");
+        driver.click(cancel);
+        assert!(close(&mut driver), "nothing is under way any more");
+    }
+}
+
+#[test]
+fn a_cross_validation_and_findings_are_not_ended_unasked() {
+    let (mut driver, _path, _folder) = opened(160);
+    driver.limit_epochs("100000");
+    driver.click("Cross-validation");
+    driver.click_button("Cross-validate");
+    ask(&mut driver);
+    assert!(
+        driver.has("Own data: Cross-validation") && driver.has("5 folds"),
+        "{:#?}",
+        driver.texts()
+    );
+    assert!(driver.has("will be discarded"));
+    driver.click_button("Stay");
+    driver.click("■ Stop");
+    driver.settle();
+    driver.click("Findings");
+    driver.settle();
+    driver.click_button("Measure what the readings tell");
+    ask(&mut driver);
+    assert!(
+        driver.has("Own data: Findings") && driver.has("will be discarded"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button(DISCARD);
+    wait_for_closing(&mut driver);
+}
+
+#[test]
+fn a_training_being_prepared_is_not_ended_unasked() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.window_mut().apply(Effect::Train);
+    assert!(!close(&mut driver), "its samples are being drawn");
+    driver.harness().run_steps(2);
+    assert!(driver.has("Train: Training"), "{:#?}", driver.texts());
 }
 
 /// A pipe takes no byte until someone reads it.

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, DialogKind, Notice, Phase, Shared, Views, WindowFile};
+use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, Views, WindowFile};
 use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
@@ -103,7 +103,7 @@ impl Driver {
             ctx.set_request_repaint_callback(move |info| {
                 let _ = asks.send(info.delay);
             });
-            let window = DecouplerWindow::new(ctx, DialogKind::None, file);
+            let window = DecouplerWindow::new(ctx, Desktop::None, file);
             *place.borrow_mut() = Some(set_out(window));
         };
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {

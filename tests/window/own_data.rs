@@ -363,11 +363,61 @@ fn closing_asks_about_a_training_on_own_data() {
     assert!(!close(&mut driver), "the training is not lost unasked");
     driver.harness().run_steps(2);
     assert!(
-        driver.says("The training of the Own data view has not ended"),
+        driver.has("Own data: Training") && driver.has("can be saved as a checkpoint"),
         "{:#?}",
         driver.texts()
     );
     driver.click_button("Stay");
     driver.click("■ Stop");
     driver.wait("the end", |driver| driver.says("Ended: "));
+}
+
+#[test]
+fn continue_goes_on_after_another_training_was_stopped_while_it_read_its_files() {
+    let (mut driver, path, _folder) = opened(60);
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    // In one frame, so that no file is read yet.
+    for (modifiers, key) in [egui::Key::Enter, egui::Key::Period].map(|key| (egui::Modifiers::COMMAND, key)) {
+        driver.harness().key_press_modifiers(modifiers, key);
+    }
+    driver.settle();
+    assert!(
+        driver.says("Epoch 3 of 3"),
+        "the training before stays: {:#?}",
+        driver.texts()
+    );
+    driver.limit_epochs("2");
+    driver.click_button("Continue");
+    driver.wait("the end", |driver| driver.says("Epoch 5 of 5"));
+    driver.settle();
+    let rmse = trained(&plan(&path)).target_table()[2].targets[0].rmse;
+    let cell = format!("x (mm), network, RMSE: {}", format_number(rmse));
+    assert!(driver.has(&cell), "{cell} is not among {:#?}", cells(&driver));
+}
+
+#[test]
+fn continue_goes_on_after_a_cross_validation() {
+    let (mut driver, _path, _folder) = opened(60);
+    driver.limit_epochs("3");
+    driver.train_own_data();
+    driver.click("Cross-validation");
+    driver.enter("Folds", "3");
+    driver.click_button("Cross-validate");
+    driver.wait("the folds", |driver| driver.says("3 folds by time"));
+    driver.settle();
+    driver.limit_epochs("2");
+    driver.click_button("Continue");
+    driver.wait("the end", |driver| driver.says("Epoch 5 of 5"));
+}
+
+#[test]
+fn the_export_menu_has_each_heading_once() {
+    let (mut driver, _path, _folder) = opened(40);
+    driver.open_menu();
+    let texts = driver.texts();
+    for heading in ["NETWORK", "FIGURES", "TABLES", "COPY TABLE AS", "TRAINING"] {
+        let times = texts.iter().filter(|text| *text == heading).count();
+        assert_eq!(times, 1, "{heading} in {texts:#?}");
+    }
 }

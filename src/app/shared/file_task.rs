@@ -133,6 +133,11 @@ impl FileTask {
         }
     }
 
+    /// Returns true if `other` asks for the same file.
+    pub fn is_same_file(&self, other: &Self) -> bool {
+        (self.words, &self.suggestion) == (other.words, &other.suggestion)
+    }
+
     /// Returns true if the file is read, not written.
     pub fn is_read(&self) -> bool {
         matches!(self.purpose, Purpose::Open | Purpose::Choose(_))

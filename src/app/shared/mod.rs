@@ -18,6 +18,7 @@ mod state;
 mod surfaces;
 mod training_form;
 mod training_status;
+mod unfinished;
 mod view;
 
 pub use super::training_worker::RunResult;
@@ -41,4 +42,5 @@ pub use surfaces::{follow_surface, view_mode_ui};
 pub use training_form::{method_choice_ui, method_settings_ui, stopping_ui};
 pub use training_status::phase_in_words;
 use training_status::training_status_ui;
+pub use unfinished::Unfinished;
 pub use view::{Columns, View};

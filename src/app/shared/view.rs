@@ -2,7 +2,7 @@ use std::{fmt::Debug, path::PathBuf};
 
 use eframe::egui::{Context, Ui};
 
-use super::{Effect, Export, FileInUse, Offers, Shared, training_status_ui};
+use super::{Effect, Export, FileInUse, Offers, Shared, Unfinished, training_status_ui};
 use crate::app::theme::space;
 
 /// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
@@ -27,9 +27,9 @@ pub trait View: Debug {
         false
     }
 
-    /// Returns true while closing the window would lose a training.
-    fn has_unfinished(&self) -> bool {
-        false
+    /// Returns the work that closing the window would cut short, also while it is being prepared.
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        Vec::new()
     }
 
     /// Returns the files that it needs, over which nothing is to be saved.

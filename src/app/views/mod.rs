@@ -24,7 +24,6 @@ use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
     own_data::OwnDataView, trade_off::TradeOffView, train::TrainView,
 };
-pub(super) use train::{CHECKPOINT, checkpoint_task};
 
 /// All views.
 #[derive(Debug)]

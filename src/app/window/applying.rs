@@ -3,15 +3,14 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, closing::Closing, path_look::Found, remembered::is_within_limits, save_form::Saving};
+use super::{DecouplerWindow, copying::ToCopy, path_look::Found, remembered::is_within_limits, save_form::Saving};
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileInUse, FileTask, Look, Matter, Notice, Offers, Phase, Purpose, refuse_in_use},
+        shared::{Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, refuse_in_use},
         test_view::HeightScale,
         theme,
         training_worker::{Inspection, LOST, Request, Worker},
-        views::CHECKPOINT,
     },
     evaluation::SimulatedSettings,
     figure::SequentialMap,
@@ -67,11 +66,8 @@ impl DecouplerWindow {
                 }
             }
             Effect::TypePath(task) => self.type_path(task),
-            Effect::Copy { text, notice } => {
-                self.ctx.copy_text(text);
-                self.notices.tell(Matter::Clipboard, Notice::Done(notice));
-            }
-            Effect::CopyPicture { figure, notice } => self.copying.start(*figure, notice),
+            Effect::Copy { text, notice } => self.copy_text(text, notice),
+            Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
@@ -138,7 +134,7 @@ impl DecouplerWindow {
 
     /// Asks for a path in the window itself; the one last typed is offered again for the same file.
     pub(super) fn type_path(&mut self, task: FileTask) {
-        let is_same = |typed: &&Saving| (typed.task.words, &typed.task.suggestion) == (task.words, &task.suggestion);
+        let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
         let path = match self.typed.as_ref().filter(is_same) {
             Some(typed) => typed.path.clone(),
             None => task.suggested_path().display().to_string(),
@@ -201,11 +197,10 @@ impl DecouplerWindow {
 
     /// Does with the file in `path` what it was asked for.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
-        let is_checkpoint = task.words == CHECKPOINT;
         // A dialog of the desktop has asked whether a file is to be replaced, but does not know what is in use.
         let used = self.files_in_use(&task);
-        if is_checkpoint && self.closing == Some(Closing::ChoosingPath) {
-            self.closing = Some(Closing::Finishing);
+        if !self.take_path_on_closing(&task, &path) {
+            return;
         }
         match task.purpose {
             Purpose::SaveTraining(run, contents) => {

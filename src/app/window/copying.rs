@@ -1,8 +1,11 @@
-//! Pictures on their way to the clipboard, drawn in the background, and what a right click copies.
+//! Text and pictures on their way to the clipboard, and what a right click copies.
 
 use eframe::egui::{ColorImage, Id, Response, ScrollArea, Ui};
 
-use super::DecouplerWindow;
+use super::{
+    DecouplerWindow,
+    clipboard::{Clipboard, Content},
+};
 use crate::{
     app::{
         job::{Job, JobError, Wake},
@@ -13,48 +16,93 @@ use crate::{
     figure::Figure,
 };
 
-type Drawn = Result<(ColorImage, String), String>;
+/// Something to be copied.
+#[derive(Debug)]
+pub(super) enum ToCopy {
+    /// Text as it is.
+    Text(String),
+    /// A picture, still to be drawn.
+    Picture(Box<Figure>),
+}
 
-/// The picture on its way to the clipboard; the newest wins.
+impl ToCopy {
+    fn into_content(self) -> Result<Content, String> {
+        match self {
+            Self::Text(text) => Ok(Content::Text(text)),
+            Self::Picture(figure) => {
+                let (size, rgba) = figure.draw().pixels().map_err(|error| error.to_string())?;
+                Ok(Content::Picture { size, rgba })
+            }
+        }
+    }
+}
+
+/// Outcome of copying: what the toolkit still has to copy, if anything, and what the user is told then.
+type Copied = (Option<Content>, Notice);
+
+/// What is on its way to the clipboard; the newest wins.
 #[derive(Debug)]
 pub(super) struct Copying {
-    job: Job<Result<Drawn, JobError>>,
+    clipboard: Clipboard,
+    job: Job<Result<Copied, JobError>>,
 }
 
 impl Copying {
-    pub(super) fn new(wake: Wake) -> Self {
+    pub(super) fn new(clipboard: Clipboard, wake: Wake) -> Self {
         Self {
+            clipboard,
             job: Job::prompt("clipboard", wake),
         }
     }
 
-    /// Draws the picture; `notice` tells that it is there.
-    pub(super) fn start(&mut self, figure: Figure, notice: String) {
+    /// Copies `to_copy`; `notice` is what the user is told once the clipboard has it.
+    pub(super) fn start(&mut self, to_copy: ToCopy, notice: String) {
+        let clipboard = self.clipboard.clone();
         self.job.abandon();
         self.job.start(
-            move |_| {
-                let (size, pixels) = figure.draw().pixels().map_err(|error| error.to_string())?;
-                Ok((ColorImage::from_rgba_unmultiplied(size, &pixels), notice))
+            move |_| match to_copy.into_content() {
+                Ok(content) => clipboard.take(content, notice),
+                Err(reason) => (None, not_copied(&reason)),
             },
-            |drawn| drawn,
+            |copied| copied,
         );
     }
 }
 
+/// Notice that nothing was copied.
+pub(super) fn not_copied(reason: &str) -> Notice {
+    Notice::Failed(format!("Nothing was copied: {}", reason.trim_end_matches('.')))
+}
+
 impl DecouplerWindow {
-    /// Puts a picture that has been drawn on the clipboard.
-    pub(super) fn take_picture(&mut self) {
-        while let Some(drawn) = self.copying.job.next_event() {
-            match drawn.unwrap_or_else(|error| Err(error.to_string())) {
-                Ok((image, notice)) => {
-                    self.ctx.copy_image(image);
-                    self.notices.tell(Matter::Clipboard, Notice::Done(notice));
-                }
-                Err(reason) => self
-                    .notices
-                    .fail(Matter::Clipboard, format!("The picture was not copied: {reason}")),
+    /// Copies text; `notice` is what the user is told once the clipboard has it.
+    pub(super) fn copy_text(&mut self, text: String, notice: String) {
+        match &self.copying.clipboard {
+            // There is nothing to wait for.
+            toolkit @ Clipboard::Toolkit => {
+                let copied = toolkit.take(Content::Text(text), notice);
+                self.tell_copied(copied);
             }
+            _ => self.copying.start(ToCopy::Text(text), notice),
         }
+    }
+
+    /// Tells of what was copied.
+    pub(super) fn take_copied(&mut self) {
+        while let Some(copied) = self.copying.job.next_event() {
+            self.tell_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));
+        }
+    }
+
+    fn tell_copied(&mut self, (for_toolkit, notice): Copied) {
+        match for_toolkit {
+            Some(Content::Text(text)) => self.ctx.copy_text(text),
+            Some(Content::Picture { size, rgba }) => {
+                self.ctx.copy_image(ColorImage::from_rgba_unmultiplied(size, &rgba));
+            }
+            None => {}
+        }
+        self.notices.tell(Matter::Clipboard, notice);
     }
 }
 

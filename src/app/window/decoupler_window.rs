@@ -4,10 +4,12 @@ use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
 
 use super::{
     actions::Overlay,
+    clipboard::Clipboard,
     closing::Closing,
     columns::{edge_ui, widths_points},
     copying::{Copying, copy_menu_ui},
-    dialogs::{DialogKind, Dialogs},
+    desktop::Desktop,
+    dialogs::Dialogs,
     export_menu::export_menu_ui,
     files::Files,
     frames::changes_something,
@@ -71,13 +73,13 @@ pub struct DecouplerWindow {
 impl DecouplerWindow {
     /// Opens as the last window was left that kept `file`, and keeps it from now on. Without a file it opens on the default
     /// array.
-    pub fn new(ctx: &Context, dialogs: DialogKind, file: Option<WindowFile>) -> Self {
+    pub fn new(ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let woken = ctx.clone();
-        Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, dialogs, file)
+        Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, desktop, file)
     }
 
     /// As [`Self::new`]; `wake` is called whenever there is news to take.
-    pub(super) fn woken_by(wake: Wake, ctx: &Context, dialogs: DialogKind, file: Option<WindowFile>) -> Self {
+    pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
         let is_dark = remembered
             .is_dark
@@ -101,8 +103,8 @@ impl DecouplerWindow {
             previews: Job::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
-            copying: Copying::new(Arc::clone(&wake)),
-            dialogs: Dialogs::new(dialogs),
+            copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),
+            dialogs: Dialogs::new(desktop),
             closing: None,
             overlay: Overlay::None,
             // A window that cannot remember its end would begin it at every start.

@@ -8,6 +8,7 @@ use std::{
 
 use rfd::FileHandle;
 
+use super::Desktop;
 use crate::app::{
     job::{Job, Wake},
     shared::FileTask,
@@ -28,27 +29,18 @@ pub enum Answer {
     NoDialog,
 }
 
-/// Dialog in which the user is asked for a path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DialogKind {
-    /// The desktop's own dialog.
-    Native,
-    /// None: the window asks itself. For tests, which have no desktop.
-    None,
-}
-
 /// Questions under way, each with the task that it was asked for.
 #[derive(Debug)]
 pub struct Dialogs {
-    kind: DialogKind,
+    desktop: Desktop,
     asked: Vec<(FileTask, Job<Answer>)>,
 }
 
 impl Dialogs {
     /// No questions yet.
-    pub fn new(kind: DialogKind) -> Self {
+    pub fn new(desktop: Desktop) -> Self {
         Self {
-            kind,
+            desktop,
             asked: Vec::new(),
         }
     }
@@ -56,7 +48,7 @@ impl Dialogs {
     /// Asks for the path of a file; returns whether there is a dialog to ask with. `wake` is called when the answer is
     /// there. Must run on the window's thread, which some desktops require.
     pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
-        if self.kind == DialogKind::None {
+        if self.desktop == Desktop::None {
             return false;
         }
         let choice = choice(task);

@@ -47,7 +47,7 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     let mut asked = None;
     let mut told = String::new();
     let mut group = None;
-    let mut exports = exports.into_iter().peekable();
+    let mut exports = gathered(exports).into_iter().peekable();
     while let Some(first) = exports.next() {
         if group.replace(first.group) != Some(first.group) {
             section_heading_ui(ui, &first.group.heading());
@@ -83,6 +83,18 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     asked
 }
 
+/// The exports with those of one group together, in the order in which the groups begin: each has one heading.
+fn gathered(mut exports: Vec<Export<'_>>) -> Vec<Export<'_>> {
+    let mut groups = Vec::new();
+    for export in &exports {
+        if !groups.contains(&export.group) {
+            groups.push(export.group);
+        }
+    }
+    exports.sort_by_key(|export| groups.iter().position(|group| *group == export.group));
+    exports
+}
+
 /// The button of one form. Returns the request if it was clicked.
 fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
     let (label, is_there) = (export.label(), export.ask.is_ok());
@@ -95,5 +107,38 @@ fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
             button.on_disabled_hover_text(reason);
             None
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::shared::ExportGroup;
+
+    #[test]
+    fn each_group_has_one_heading_and_keeps_the_order_of_its_exports() {
+        let export = |(group, name): (ExportGroup, &str)| Export {
+            group,
+            name: name.to_owned(),
+            form: String::new(),
+            description: "",
+            ask: Err(String::new()),
+        };
+        let exports = [
+            (ExportGroup::Network, "network"),
+            (ExportGroup::Tables, "errors"),
+            (ExportGroup::Copies, "errors"),
+            (ExportGroup::Tables, "channels"),
+            (ExportGroup::Copies, "channels"),
+            (ExportGroup::Training, "checkpoint"),
+        ];
+        let gathered = gathered(exports.map(export).into());
+        let found: Vec<_> = gathered
+            .iter()
+            .map(|export| (export.group, export.name.as_str()))
+            .collect();
+        let [network, errors, copied_errors, channels, copied_channels, checkpoint] = exports;
+        let expected = [network, errors, channels, copied_errors, copied_channels, checkpoint];
+        assert_eq!(found, expected);
     }
 }

@@ -3,10 +3,12 @@
 
 mod actions;
 mod applying;
+mod clipboard;
 mod closing;
 mod columns;
 mod copying;
 mod decoupler_window;
+mod desktop;
 mod dialogs;
 mod dropping;
 mod export_menu;
@@ -30,6 +32,6 @@ mod tour;
 mod undoing;
 
 pub use decoupler_window::DecouplerWindow;
-pub use dialogs::DialogKind;
+pub use desktop::Desktop;
 pub use open::{OpenError, open};
 pub use remembered::WindowFile;

@@ -15,7 +15,7 @@ use crate::{
 impl DecouplerWindow {
     /// Takes what the threads and the dialogs have to tell.
     pub fn take_news(&mut self) {
-        self.take_picture();
+        self.take_copied();
         while let Some(event) = self.worker.next_event() {
             self.take_event(event);
         }

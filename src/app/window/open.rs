@@ -3,7 +3,7 @@ use eframe::{NativeOptions, egui};
 use thiserror::Error;
 
 use super::{
-    DecouplerWindow, DialogKind,
+    DecouplerWindow, Desktop,
     remembered::{LEAST_SIZE_POINTS, Remembered, WindowFile},
 };
 
@@ -60,7 +60,7 @@ pub fn open() -> Result<(), OpenError> {
         ..NativeOptions::default()
     };
     let create = |creation: &eframe::CreationContext<'_>| {
-        let window = DecouplerWindow::new(&creation.egui_ctx, DialogKind::Native, file);
+        let window = DecouplerWindow::new(&creation.egui_ctx, Desktop::Native, file);
         let window = match &folders {
             Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
             None => window,

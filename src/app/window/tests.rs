@@ -10,7 +10,7 @@ use std::{
 
 use eframe::egui::Context;
 
-use super::{DecouplerWindow, DialogKind};
+use super::{DecouplerWindow, Desktop};
 use crate::{
     app::{
         preview::PreviewEvent,
@@ -34,7 +34,7 @@ impl Opened {
             // At the end of a test the threads outlive the receiver.
             let _ = wake.send(());
         });
-        let window = DecouplerWindow::woken_by(wake, &Context::default(), DialogKind::None, None);
+        let window = DecouplerWindow::woken_by(wake, &Context::default(), Desktop::None, None);
         Self { window, woken }
     }
 

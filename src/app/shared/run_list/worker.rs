@@ -2,6 +2,7 @@
 //! window. When the window closes it waits for what is still to be written.
 
 use std::{
+    cell::Cell,
     fmt,
     path::PathBuf,
     sync::{
@@ -57,6 +58,8 @@ pub(super) enum RunsEvent {
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
     job: Job<RunsEvent>,
+    /// Requests that were not answered yet.
+    unanswered: Cell<usize>,
 }
 
 impl RunsWorker {
@@ -76,6 +79,7 @@ impl RunsWorker {
         Self {
             requests: Some(requests),
             job,
+            unanswered: Cell::default(),
         }
     }
 
@@ -97,13 +101,24 @@ impl RunsWorker {
     pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The other end is gone only if the thread died, which is the last event.
-            let _ = requests.send(request);
+            if requests.send(request).is_ok() {
+                self.unanswered.set(self.unanswered.get() + 1);
+            }
         }
     }
 
     /// The next event, if one has come.
     pub(super) fn next_event(&self) -> Option<RunsEvent> {
-        self.job.next_event()
+        let event = self.job.next_event()?;
+        if let RunsEvent::Listed(_) = event {
+            self.unanswered.set(self.unanswered.get().saturating_sub(1));
+        }
+        Some(event)
+    }
+
+    /// Returns true if the last list taken knows of everything that was asked for.
+    pub(super) fn is_up_to_date(&self) -> bool {
+        self.unanswered.get() == 0
     }
 }
 

@@ -16,11 +16,12 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
-        shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
+        shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
         theme::space,
         widgets::{card_ui, invitation_ui, placeholder_ui, scrolled_ui, section_heading_ui},
     },
     figure::Figure,
+    sensor::counted,
 };
 
 impl View for ExperimentsView {
@@ -52,6 +53,16 @@ impl View for ExperimentsView {
 
     fn is_working(&self) -> bool {
         self.running.is_some()
+    }
+
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        let running = self.running.iter();
+        let unfinished = running.map(|running| {
+            let (name, done) = (running.topic.name(), running.done);
+            let progress = format!("{name}, {done} of {} finished", counted(running.trials, "trial"));
+            Unfinished::discarded("Experiment", progress)
+        });
+        unfinished.collect()
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {

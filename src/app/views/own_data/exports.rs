@@ -18,7 +18,7 @@ use crate::{
     figure::Figure,
 };
 
-const CHECKPOINT: FileWords = FileWords {
+pub(super) const CHECKPOINT: FileWords = FileWords {
     kind: "checkpoint",
     description: "The training as it stands, paused or ended, without the samples. Opened here or in a terminal (train \
                   --checkpoint FILE --resume), it gives bit-identical results.",

@@ -40,7 +40,8 @@ impl OwnDataView {
         }
         while let Some(event) = self.keeping.next_event() {
             match event {
-                KeepingEvent::Kept(path, file) => self.runs.note_kept(path, file),
+                KeepingEvent::Found(path, file) => self.runs.note_found(path, file),
+                KeepingEvent::Kept(path, file) => self.runs.note_kept(path, &file),
                 KeepingEvent::Failed(reason) => effects.push(failed(&reason)),
                 KeepingEvent::Ended => {}
             }
@@ -99,16 +100,15 @@ impl OwnDataView {
                 trained.file = self.listed(trained.file);
                 trained.name = self.runs.name_of(&trained);
                 self.runs.add(&trained);
-                self.show(trained, None);
+                self.show(trained);
                 self.tab = Tab::Results;
             }
             Opened::Checkpoint(path, file, draft) => {
                 self.draft = draft.map(|draft| *draft).or(self.draft.take());
                 self.take_settings(file.settings.into());
-                self.asked = Some(self.settings);
                 self.checkpoint = Some(path.clone());
                 self.tab = Tab::Results;
-                self.begin(Task::Resume(path, file));
+                self.begin(Task::Resume(path, file), Some(self.settings));
             }
         }
     }
@@ -141,10 +141,13 @@ impl OwnDataView {
         match event {
             TrainingEvent::Reading(progress) => self.reading = Some(progress),
             TrainingEvent::Progressed(mut trained) => {
-                let is_first = std::mem::take(&mut self.is_beginning);
+                let begun = self.beginning.take();
                 trained.name = self.runs.name_of(&trained);
                 self.phase = trained.phase;
-                if is_first {
+                if begun.is_some() {
+                    self.asked = begun;
+                    // One that was opened is held where it was saved.
+                    self.saved_epochs = (trained.phase == Phase::Paused).then_some(trained.epochs_run);
                     effects.push(Effect::Settle(Matter::OwnData));
                     self.tab = Tab::Results;
                     self.chart.fit(&trained);
@@ -163,12 +166,9 @@ impl OwnDataView {
             }
             TrainingEvent::Refused(reason) => effects.push(failed(&reason)),
             TrainingEvent::Ended(ended) => {
-                if let Err(reason) = ended {
-                    // The training on show, if there is one, is of an older thread.
-                    self.asked = None;
-                    effects.push(failed(&reason));
-                }
-                self.is_validating = false;
+                effects.extend(ended.err().map(|reason| failed(&reason)));
+                self.trainer.forget();
+                (self.is_validating, self.beginning) = (false, None);
                 if self.phase.is_busy() {
                     self.phase = self.phase_at_rest();
                 }

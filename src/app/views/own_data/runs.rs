@@ -19,7 +19,7 @@ pub(super) struct Runs {
 #[derive(Debug)]
 pub(super) struct Kept {
     pub(super) trained: Trained,
-    /// Its file among the networks that are kept.
+    /// Its file among the networks that are kept, once it is there.
     path: Option<PathBuf>,
 }
 
@@ -36,15 +36,26 @@ impl Runs {
         is_new
     }
 
-    /// Notes that a network is kept in the file `path`.
-    pub(super) fn note_kept(&mut self, path: PathBuf, file: Arc<MeasuredNetworkFile>) {
+    /// Adds a network found in the file `path`.
+    pub(super) fn note_found(&mut self, path: PathBuf, file: Arc<MeasuredNetworkFile>) {
         let place = self.place(&file).unwrap_or_else(|| {
-            let mut trained = Trained::of_file(file);
+            let mut trained = Trained::of_file(Arc::clone(&file));
             trained.name = self.name_of(&trained);
             self.runs.push(Kept { trained, path: None });
             self.runs.len() - 1
         });
-        self.runs[place].path = Some(path);
+        let run = &mut self.runs[place];
+        // From here on it is known by this one, also to the thread that keeps it.
+        run.trained.file = file;
+        run.path = Some(path);
+    }
+
+    /// Notes that a network of the list is kept in the file `path` now; one that was removed meanwhile stays removed.
+    pub(super) fn note_kept(&mut self, path: PathBuf, file: &Arc<MeasuredNetworkFile>) {
+        let run = self.runs.iter_mut().find(|run| Arc::ptr_eq(&run.trained.file, file));
+        if let Some(run) = run {
+            run.path = Some(path);
+        }
     }
 
     fn place(&self, file: &MeasuredNetworkFile) -> Option<usize> {
@@ -70,10 +81,10 @@ impl Runs {
         names.find(|name| !is_taken(name)).unwrap_or(name)
     }
 
-    /// Removes the marked network from the list; returns the file in which it is kept.
-    pub(super) fn remove_marked(&mut self) -> Option<PathBuf> {
+    /// Removes the marked network from the list, and returns it.
+    pub(super) fn remove_marked(&mut self) -> Option<Arc<MeasuredNetworkFile>> {
         self.is_removing = false;
         let place = self.marked.take().filter(|place| *place < self.runs.len())?;
-        self.runs.remove(place).path
+        Some(self.runs.remove(place).trained.file)
     }
 }

@@ -80,8 +80,8 @@ fn marked_ui(ui: &mut Ui, view: &mut OwnDataView) {
         if view.runs.is_removing {
             ui.label("Remove this network?");
             if ui.button("Remove").clicked() {
-                if let Some(path) = view.runs.remove_marked() {
-                    view.keeping.remove(path);
+                if let Some(file) = view.runs.remove_marked() {
+                    view.keeping.remove(file);
                 }
             } else if ui.button("Keep").clicked() {
                 view.runs.is_removing = false;

@@ -11,6 +11,7 @@ use super::{
     checking::Checking,
     curves::Curves,
     draft::{Draft, file_name},
+    exports::CHECKPOINT,
     judging::Measuring,
     keeping::Keeping,
     model::{Trained, Validated},
@@ -21,10 +22,14 @@ use super::{
     training::{Command, Task, Trainer, ValidationChoice},
 };
 use crate::{
-    app::{job::Wake, shared::Phase},
+    app::{
+        job::Wake,
+        shared::{FileTask, Phase, Unfinished},
+    },
     evaluation::{Measured, RunSettings},
     import::{Meaning, Plan, Progress},
     scene::RowModel,
+    sensor::counted,
 };
 
 /// The Own data view.
@@ -41,14 +46,16 @@ pub struct OwnDataView {
     pub(super) trainer: Trainer,
     /// State of the trainer.
     pub(super) phase: Phase,
-    /// True until the first news of a training.
-    pub(super) is_beginning: bool,
+    /// Settings of the training that is beginning, until its first news.
+    pub(super) beginning: Option<RunSettings>,
     /// Progress of reading a file before a training.
     pub(super) reading: Option<Progress>,
     /// The network on show: in training, ended, or opened.
     pub(super) shown: Option<Trained>,
     /// Settings with which it was begun or last continued; the epochs are those asked for from where it stood.
     pub(super) asked: Option<RunSettings>,
+    /// Epochs of the training on show when it was opened from a checkpoint: while it is held there, nothing is unsaved.
+    pub(super) saved_epochs: Option<usize>,
     /// The last cross-validation.
     pub(super) validated: Option<Validated>,
     /// True while a cross-validation is under way.
@@ -112,10 +119,11 @@ impl OwnDataView {
             },
             trainer: Trainer::new(Arc::clone(&wake)),
             phase: Phase::Idle,
-            is_beginning: false,
+            beginning: None,
             reading: None,
             shown: None,
             asked: None,
+            saved_epochs: None,
             validated: None,
             is_validating: false,
             measuring: Measuring::new(Arc::clone(&wake)),
@@ -187,9 +195,9 @@ impl OwnDataView {
             return;
         }
         let Some(planned) = self.planned() else { return };
-        self.asked = Some(self.settings);
         self.checkpoint = None;
-        self.begin(Task::Train(Box::new(planned.plan.clone()), self.settings));
+        let plan = Box::new(planned.plan.clone());
+        self.begin(Task::Train(plan, self.settings), Some(self.settings));
     }
 
     /// Begins a cross-validation.
@@ -199,16 +207,15 @@ impl OwnDataView {
         }
         if let Some(planned) = self.planned() {
             self.is_validating = true;
-            // The thread that could go on is gone.
-            self.asked = None;
             let plan = Box::new(planned.plan.clone());
-            self.begin(Task::Validate(plan, self.settings, self.validation));
+            self.begin(Task::Validate(plan, self.settings, self.validation), None);
         }
     }
 
-    pub(super) fn begin(&mut self, task: Task) {
+    /// Begins a task; with these settings, if it is a training.
+    pub(super) fn begin(&mut self, task: Task, settings: Option<RunSettings>) {
         self.reading = None;
-        self.is_beginning = true;
+        self.beginning = settings;
         self.phase = Phase::Preparing;
         self.trainer.start(task);
     }
@@ -227,6 +234,7 @@ impl OwnDataView {
         if self.phase == Phase::Preparing {
             self.trainer.cancel();
             self.is_validating = false;
+            self.beginning = None;
             self.phase = self.phase_at_rest();
         } else {
             self.trainer.command(Command::Stop);
@@ -253,10 +261,16 @@ impl OwnDataView {
 
     /// Goes on from the present weights.
     pub(super) fn go_on(&mut self) {
-        if self.can_continue() {
-            self.asked = Some(self.settings);
-            self.trainer.command(Command::Continue(self.settings.training));
+        if !self.can_continue() {
+            return;
         }
+        if self.trainer.is_there() {
+            self.asked = Some(self.settings);
+        } else if let Some(file) = self.shown.as_ref().and_then(|shown| shown.checkpoint.clone()) {
+            // Another task has taken the place of its thread since.
+            self.begin(Task::TakeUp(file), Some(self.settings));
+        }
+        self.trainer.command(Command::Continue(self.settings.training));
     }
 
     /// The plan of the import, if it is complete.
@@ -294,16 +308,17 @@ impl OwnDataView {
                 let trained = trained.clone();
                 self.take_settings(trained.file.settings.into());
                 self.opening.start(ToOpen::Plan(Box::new(trained.file.plan.clone())));
-                self.show(trained, None);
+                self.show(trained);
                 self.tab = Tab::Results;
             }
         }
     }
 
-    pub(super) fn show(&mut self, trained: Trained, asked: Option<RunSettings>) {
+    pub(super) fn show(&mut self, trained: Trained) {
         self.trainer.cancel();
         self.phase = trained.phase;
-        self.asked = asked;
+        self.asked = Some(trained.file.settings.into());
+        self.saved_epochs = None;
         self.chart.fit(&trained);
         self.put_on_show(trained);
     }
@@ -318,6 +333,42 @@ impl OwnDataView {
     pub(super) fn take_settings(&mut self, settings: RunSettings) {
         self.rows = settings.source.row_model();
         self.settings = settings;
+    }
+
+    /// The training or cross-validation that closing would lose.
+    pub(super) fn unfinished_work(&self) -> Option<Unfinished> {
+        let training = |progress, saving| Unfinished {
+            work: "Training",
+            progress,
+            saving,
+            is_kept: self.keeping.folder.is_some(),
+        };
+        match (self.phase, &self.shown) {
+            (Phase::Preparing, _) if self.is_validating => {
+                let progress = counted(self.validation.folds, "fold");
+                Some(Unfinished::discarded("Cross-validation", progress))
+            }
+            (Phase::Preparing, _) => Some(training("the files are being read".to_owned(), None)),
+            (Phase::Paused, Some(shown)) if self.saved_epochs == Some(shown.epochs_run) => None,
+            (Phase::Training | Phase::Paused, Some(shown)) => {
+                let epochs = shown.file.settings.training.stopping.epochs;
+                Some(training(
+                    format!("epoch {} of {epochs}", shown.epochs_run),
+                    self.checkpoint_task(),
+                ))
+            }
+            _ => None,
+        }
+    }
+
+    /// Task of saving the training that the thread has.
+    pub(super) fn checkpoint_task(&self) -> Option<FileTask> {
+        let contents = self.trainer.checkpoint()?;
+        Some(FileTask::save(
+            CHECKPOINT,
+            &format!("{}-training", self.stem()),
+            contents,
+        ))
     }
 
     /// Name of the recording, for names of files.

@@ -15,7 +15,7 @@ use super::{
     tools,
 };
 use crate::app::{
-    shared::{Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, Shared, View},
+    shared::{Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, Shared, Unfinished, View},
     theme::space,
     widgets::{card_ui, tabs_ui},
 };
@@ -38,8 +38,9 @@ impl View for OwnDataView {
         self.measuring.is_under_way() || matches!(self.phase, Phase::Preparing | Phase::Training)
     }
 
-    fn has_unfinished(&self) -> bool {
-        matches!(self.phase, Phase::Training | Phase::Paused)
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        let measuring = self.measuring.unfinished();
+        self.unfinished_work().into_iter().chain(measuring).collect()
     }
 
     fn take_files(&mut self, paths: &[PathBuf], effects: &mut Vec<Effect>) -> bool {

@@ -9,12 +9,13 @@ use super::{
 use crate::{
     app::{
         plotting::legend_ui,
-        shared::{Effect, Export, Matter, Notice, Offers, Shared, View},
+        shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, dim_ui, invitation_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_duration,
     figure::trade_off_figure,
+    sensor::counted,
 };
 
 impl View for TradeOffView {
@@ -40,6 +41,15 @@ impl View for TradeOffView {
 
     fn is_working(&self) -> bool {
         self.running.is_some()
+    }
+
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        let outcome = self.outcome.iter().filter(|_| self.running.is_some());
+        let unfinished = outcome.map(|outcome| {
+            let (done, all) = outcome.points();
+            Unfinished::discarded("Measurement", format!("{done} of {} measured", counted(all, "point")))
+        });
+        unfinished.collect()
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// A saved training to go on from.
-pub const CHECKPOINT: FileWords = FileWords {
+const CHECKPOINT: FileWords = FileWords {
     kind: "checkpoint",
     description: "The training as it stands, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
                   --resume), it gives bit-identical results.",
@@ -26,7 +26,7 @@ const OPENED: FileWords = FileWords {
 };
 
 /// Task of saving the checkpoint of `run`.
-pub fn checkpoint_task(run: &RunView) -> FileTask {
+pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
     FileTask::save_run(CHECKPOINT, &file_stem("training", &run.settings), run.id, |run| {
         let file = CheckpointFile::from_run(run).map_err(|error| error.to_string())?;
         Ok(Contents::new(move |path| file.save(path)))

@@ -19,5 +19,4 @@ mod workbench;
 
 pub use bottom_tab::BottomTab;
 pub use decoders::DecoderResult;
-pub use exports::{CHECKPOINT, checkpoint_task};
 pub use state::TrainView;

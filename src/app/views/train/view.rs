@@ -3,14 +3,17 @@ use eframe::egui::{Context, Key, Modifiers, Ui};
 use super::{
     TrainView,
     configuration::configuration_ui,
-    exports::train_exports,
+    exports::{checkpoint_task, train_exports},
     report,
     workbench::{WorkbenchLayout, workbench_ui},
 };
-use crate::app::{
-    shared::{Columns, Effect, Export, Offers, Phase, RunWish, Shared, View, run_buttons_ui},
-    theme::space,
-    widgets::snapshot_ui,
+use crate::{
+    app::{
+        shared::{Columns, Effect, Export, Offers, Phase, RunWish, Shared, Unfinished, View, run_buttons_ui},
+        theme::space,
+        widgets::snapshot_ui,
+    },
+    sensor::counted,
 };
 
 impl View for TrainView {
@@ -20,6 +23,17 @@ impl View for TrainView {
 
     fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
         self.measuring.follow(shared, &mut self.decoders);
+    }
+
+    fn unfinished(&self, shared: &Shared) -> Vec<Unfinished> {
+        let mut unfinished = Vec::from_iter(unfinished_training(shared));
+        if self.decoders.is_measuring() {
+            let results = self.decoders.measured.as_deref().unwrap_or_default();
+            let measured = results.iter().filter(|result| result.report.is_some()).count();
+            let progress = format!("{measured} of {} measured", counted(results.len(), "decoder"));
+            unfinished.push(Unfinished::discarded("More decoders", progress));
+        }
+        unfinished
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -118,5 +132,29 @@ impl View for TrainView {
             effects.push(Effect::Watch(self.snapshot));
         }
         workbench_ui(ui, self, shared, effects);
+    }
+}
+
+/// The training that is being prepared, or has epochs that are nowhere saved.
+fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
+    let training = |progress, saving| Unfinished {
+        work: "Training",
+        progress,
+        saving,
+        is_kept: shared.runs.path.is_some(),
+    };
+    let run = shared.run.as_ref();
+    match shared.phase {
+        Phase::Preparing => Some(training("its samples are being drawn".to_owned(), None)),
+        Phase::Training | Phase::Paused => {
+            let run = run.filter(|run| !run.is_saved)?;
+            let epochs = run.settings.training.stopping.epochs;
+            let epoch = run.latest().map_or(0, |latest| latest.epoch);
+            Some(training(
+                format!("epoch {epoch} of {epochs}"),
+                Some(checkpoint_task(run)),
+            ))
+        }
+        Phase::Idle | Phase::Ended(_) | Phase::Died => None,
     }
 }

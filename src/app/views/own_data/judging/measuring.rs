@@ -2,14 +2,21 @@ use std::sync::Arc;
 
 use super::thread::{Decoders, News, Task, Told, work};
 use crate::{
-    app::job::{Job, Wake},
+    app::{
+        job::{Job, Wake},
+        shared::Unfinished,
+    },
     evaluation::{
-        RunSettings,
+        DecoderSet, RunSettings,
         recorded::{FittedModel, Stage},
     },
     export::MeasuredNetworkFile,
     import::{Plan, Progress},
+    sensor::counted,
 };
+
+/// Name of the work on findings.
+const FINDINGS: &str = "Findings";
 
 /// The window's end of the thread, and what it has measured.
 #[derive(Debug)]
@@ -52,6 +59,23 @@ impl Measuring {
 
     pub fn is_under_way(&self) -> bool {
         self.under_way.is_some()
+    }
+
+    /// The measurement under way.
+    pub fn unfinished(&self) -> Option<Unfinished> {
+        Some(match self.under_way? {
+            UnderWay::Findings(None) => Unfinished::discarded(FINDINGS, "the files are being read".to_owned()),
+            UnderWay::Findings(Some(stage)) => Unfinished::discarded(FINDINGS, stage.to_string()),
+            UnderWay::Decoders => {
+                let measured = self.decoders.as_ref();
+                let done = measured.map_or(0, |decoders| decoders.reports.len() + decoders.refused.len());
+                let progress = format!(
+                    "{done} of {} measured",
+                    counted(DecoderSet::of_targets().count(), "decoder")
+                );
+                Unfinished::discarded("Decoders", progress)
+            }
+        })
     }
 
     pub(super) fn find(&mut self, plan: Plan, settings: RunSettings, folds: usize) {

@@ -1,4 +1,7 @@
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    sync::{Arc, mpsc::Sender},
+};
 
 use crate::{
     app::views::own_data::model::{Trained, Validated},
@@ -15,6 +18,8 @@ pub enum Task {
     Train(Box<Plan>, RunSettings),
     /// Go on from this checkpoint, of the file at this path, once that is asked for.
     Resume(PathBuf, Box<MeasuredCheckpointFile>),
+    /// As [`Self::Resume`], from a checkpoint that was made in this window.
+    TakeUp(Arc<MeasuredCheckpointFile>),
     /// Test on every sample by cross-validation.
     Validate(Box<Plan>, RunSettings, ValidationChoice),
 }
@@ -29,7 +34,7 @@ pub struct ValidationChoice {
 }
 
 /// Wishes while it trains.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Command {
     /// Hold the training.
     Pause,
@@ -39,6 +44,8 @@ pub enum Command {
     Stop,
     /// Go on from the present weights with these settings.
     Continue(TrainingSettings),
+    /// Hand over its checkpoint.
+    Save(Sender<Result<MeasuredCheckpointFile, String>>),
 }
 
 /// News from the thread.

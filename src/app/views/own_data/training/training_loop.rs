@@ -43,25 +43,37 @@ pub(super) fn run(task: Task, commands: &Receiver<Command>, report: &Report<Trai
             Training::new(run, about, false, report).train(commands);
         }
         Task::Resume(path, file) => {
-            let plan = file.plan.clone();
-            let sets = sets(&plan, file.settings.seed, report)?;
-            let about = About::new(plan, &sets);
             let refused = |reason: String| format!("'{}': {reason}", path.display());
-            if about.samples_crc32 != file.samples_crc32 {
-                return Err(refused(format!(
-                    "'{}' has other samples than when the checkpoint was saved; use the files of that time, or train anew",
-                    about.plan.import.data.display()
-                )));
-            }
-            let run = file.resume(sets).map_err(|error| refused(error.to_string()))?;
-            Training::new(run, about, true, report).train(commands);
+            take_up(*file, commands, report, &refused)?;
         }
+        Task::TakeUp(file) => take_up((*file).clone(), commands, report, &|reason| reason)?,
         Task::Validate(plan, settings, choice) => {
             if let Some(validated) = validate(&plan, &settings, choice, report)? {
                 report.send(TrainingEvent::Validated(Box::new(validated)));
             }
         }
     }
+    Ok(())
+}
+
+/// Reads the samples of a checkpoint again, and holds its training. `refused` says of what it is told that it cannot go on.
+fn take_up(
+    file: MeasuredCheckpointFile,
+    commands: &Receiver<Command>,
+    report: &Report<TrainingEvent>,
+    refused: &dyn Fn(String) -> String,
+) -> Result<(), String> {
+    let plan = file.plan.clone();
+    let sets = sets(&plan, file.settings.seed, report)?;
+    let about = About::new(plan, &sets);
+    if about.samples_crc32 != file.samples_crc32 {
+        return Err(refused(format!(
+            "'{}' has other samples than when the checkpoint was saved; use the files of that time, or train again",
+            about.plan.import.data.display()
+        )));
+    }
+    let run = file.resume(sets).map_err(|error| refused(error.to_string()))?;
+    Training::new(run, about, true, report).train(commands);
     Ok(())
 }
 
@@ -151,12 +163,24 @@ impl<'a> Training<'a> {
                 Ok(()) => self.is_paused = false,
                 Err(reason) => self.report.send(TrainingEvent::Refused(reason)),
             },
+            Command::Save(send) => {
+                // Who asked waits for it.
+                let _ = send.send(self.checkpoint());
+                return;
+            }
         }
         self.tell();
     }
 
     fn go_on(&mut self, training: TrainingSettings) -> Result<(), String> {
         continue_run(&mut self.run, training).map_err(|error| error.to_string())
+    }
+
+    fn checkpoint(&self) -> Result<MeasuredCheckpointFile, String> {
+        let About {
+            plan, samples_crc32, ..
+        } = &self.about;
+        MeasuredCheckpointFile::from_run(&self.run, plan, samples_crc32).map_err(|error| error.to_string())
     }
 
     /// Tells how the training stands.
@@ -179,7 +203,7 @@ impl<'a> Training<'a> {
             None => Phase::Training,
         };
         let is_standing = phase != Phase::Training;
-        let saved = is_standing.then(|| MeasuredCheckpointFile::from_run(&self.run, plan, &self.about.samples_crc32));
+        let saved = is_standing.then(|| self.checkpoint());
         let answers = self.run.decouple_test();
         let tested = Tested::new(Arc::clone(self.run.test()), answers.clone(), positions.clone(), targets);
         let trained = Trained {

@@ -157,8 +157,12 @@ impl Comparing {
                     // Those fitted meanwhile stand behind.
                     let newer = std::mem::replace(&mut self.decoders, decoders);
                     self.decoders.extend(newer);
-                    for (kind, answer) in answers {
+                    for (kind, mut answer) in answers {
                         if let Some(row) = self.rows.iter_mut().find(|row| row.kind == kind) {
+                            // A touch that was left too soon for a time leaves that of the one before.
+                            if let (Ok(answer), Some(Ok(before))) = (&mut answer, &row.answer) {
+                                answer.time = answer.time.or(before.time);
+                            }
                             (row.answer, row.is_present) = (Some(answer), true);
                         }
                     }

@@ -51,7 +51,7 @@ const COLUMNS: [Column; 3] = [
     },
     Column {
         heading: "µs",
-        meaning: "Time to decode this frame (all rows) on one thread, in µs: the median of a few.",
+        meaning: "Time to decode this frame (all rows) on one thread, in µs: the shortest of several.",
     },
 ];
 
@@ -214,12 +214,11 @@ fn cells_of(answer: Option<&Result<PressedAnswer, String>>) -> (Vec<String>, Opt
 }
 
 /// The time with two digits, which is as many as hold from frame to frame.
-fn microseconds(time: Duration) -> String {
-    let us = 1e6 * time.as_secs_f64();
-    if us < 10.0 {
-        format!("{us:.1}")
-    } else {
-        format!("{us:.0}")
+fn microseconds(time: Option<Duration>) -> String {
+    match time.map(|time| 1e6 * time.as_secs_f64()) {
+        None => format_number(None),
+        Some(us) if us < 10.0 => format!("{us:.1}"),
+        Some(us) => format!("{us:.0}"),
     }
 }
 
@@ -264,7 +263,7 @@ impl Shown {
     /// Time that the network took to decode.
     pub fn network_time(&self) -> Option<String> {
         let answer = self.answer.as_ref()?.as_ref().ok()?;
-        Some(format!("{} µs", microseconds(answer.time)))
+        answer.time.map(|time| format!("{} µs", microseconds(Some(time))))
     }
 }
 
