@@ -307,12 +307,12 @@ mod tests {
         middle.unwrap().0
     }
 
-    /// Errors of the medians of 60 000 deformations drawn by the scene itself, weighed by the density of the readings as
+    /// Errors of the medians of 20 000 deformations drawn by the scene itself, weighed by the density of the readings as
     /// the documentation of [`Noise`] defines it; the gain, if it drifts, is integrated by the midpoint rule.
     fn by_plain_weighing(model: &SensorModel, scene: &Scene, test: &Dataset) -> f64 {
         let sampler = scene.sampler(model);
         let mut rng = Seed(77).rng(Stream::Expectation);
-        let draws: Vec<_> = (0..60_000).map(|_| sampler.draw(&mut rng)).collect();
+        let draws: Vec<_> = (0..20_000).map(|_| sampler.draw(&mut rng)).collect();
         let Noise {
             relative,
             additive_ohm,
