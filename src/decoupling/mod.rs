@@ -52,6 +52,7 @@ pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
 pub use kind::{ColourKey, DecoderKind, DecoderKindError, Precision};
 pub use newton::Newton;
 pub use newton_report::{LARGEST_ERROR, NewtonReport, NewtonRules, NewtonStop, Solution};
+pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
 pub use residual::resistance_residual;

@@ -16,7 +16,7 @@ pub struct Baselines {
     pub mean: Errors,
     /// Errors of the best affine map on resistance, one for each row-wire where rows are known.
     pub linear: Errors,
-    /// Errors of the Bayesian reference, the limit set by the noise and by the mean and covariance of the loading:
+    /// Errors of the Bayesian reference, the limit set by the noise and by the distribution of the loading:
     /// [`reference_errors`](super::reference_errors). Absent from older files.
     #[serde(default)]
     pub reference: Option<Errors>,

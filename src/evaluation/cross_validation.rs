@@ -83,9 +83,20 @@ impl CrossValidation {
         repeat: usize,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<CrossValidated>, RunError> {
+        self.run_with_tested(settings, (set, set), repeat, is_cancelled)
+    }
+
+    /// As [`Self::run`], on folds of `set` tested by the same samples of `tested`, whose readings may have other noise.
+    pub(super) fn run_with_tested(
+        &self,
+        settings: &RunSettings,
+        (set, tested): (&Dataset, &Dataset),
+        repeat: usize,
+        is_cancelled: impl Fn() -> bool,
+    ) -> Result<Option<CrossValidated>, RunError> {
         let seed = nth_seed(settings.seed, repeat);
         let folds = Folds::deal(set, self.folds, self.unit, &mut seed.rng(Stream::Split))?;
-        CrossValidated::on_folds(&RunSettings { seed, ..*settings }, set, folds, is_cancelled)
+        CrossValidated::of_sets(&RunSettings { seed, ..*settings }, (set, tested), folds, is_cancelled)
     }
 }
 
@@ -101,13 +112,23 @@ impl CrossValidated {
         folds: Folds,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
+        Self::of_sets(settings, (set, set), folds, is_cancelled)
+    }
+
+    /// Trains on folds of `set` and tests by the same samples of `tested`.
+    fn of_sets(
+        settings: &RunSettings,
+        (set, tested): (&Dataset, &Dataset),
+        folds: Folds,
+        is_cancelled: impl Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
         let is_measured = settings.source.simulation().is_none();
         let holds_out = !is_measured || settings.training.method.needs_validation();
         let mut effort = Effort::default();
         let empty = || Array2::zeros(set.targets().dim());
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
         for fold in 0..folds.count() {
-            let (samples, test) = (folds.test(fold), set.select(folds.test(fold)));
+            let (samples, test) = (folds.test(fold), tested.select(folds.test(fold)));
             let split = split(set, &folds, fold, holds_out);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
             scatter(&mut mean, samples, &decode_set(&mut of_mean, &test)?);
@@ -116,7 +137,7 @@ impl CrossValidated {
                 seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
-            let mut run = Run::on_sets(settings, split, test)?;
+            let mut run = Run::of_networks_on_sets(settings, split, test)?;
             let Some(of_fold) = Effort::train(&mut run, &is_cancelled) else {
                 return Ok(None);
             };

@@ -147,6 +147,31 @@ impl Run {
         if is_cancelled() {
             return Ok(None);
         }
+        let run = Self::of_networks(settings, (split, further), test, is_cancelled, begin)?;
+        Ok(run.map(|run| Self {
+            target_baselines: target_baselines.to_vec(),
+            baselines,
+            ..run
+        }))
+    }
+
+    /// Prepares a run whose networks are all that is asked of it: without baselines and reference, such as that of a fold.
+    pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        whole(Self::of_networks(settings, (split, None), test, &|| false, |tasks| {
+            begin(settings, tasks)
+        }))
+    }
+
+    /// As [`Self::with_sets`], without baselines and reference.
+    fn of_networks(
+        settings: RunSettings,
+        (split, further): (Split, Option<Arc<FurtherSamples>>),
+        test: Dataset,
+        is_cancelled: &dyn Fn() -> bool,
+        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
+    ) -> Result<Option<Self>, RunError> {
+        settings.check_network()?;
+        check_sets(&settings, &split, &test)?;
         let tasks = tasks(&settings, &split, further.as_ref(), &test)?;
         // The tasks hold the samples scaled; large sets need not be held twice.
         drop(split);
@@ -166,8 +191,8 @@ impl Run {
             test: Arc::new(test),
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
-            target_baselines,
-            baselines,
+            target_baselines: Vec::new(),
+            baselines: None,
         }))
     }
 }

@@ -35,10 +35,17 @@ impl fmt::Display for ReferenceNote {
                  rounding decides what can be known. Raise the compression or the height, or let nodes move along z only; \
                  with noise of 1e-12 or more there is one."
             }
+            Self::Missing(NoReference::Sampling) => {
+                "There is no Bayesian reference: too few of the deformations sampled from the loading explain the readings \
+                 to estimate their posterior. Raise the noise, or let nodes move along z only."
+            }
+            Self::Missing(NoReference::TooLarge) => {
+                "There is no Bayesian reference: sampling the posteriors of so many or such large rows would take many \
+                 minutes. Lower the number of test samples, or the size of the array."
+            }
             Self::AboveMean => {
-                "The Bayesian reference is no bound here, for it is above the training mean: the readings tell next to \
-                 nothing, or the mean and covariance of this loading say little of its shape. Lower the noise, or draw more \
-                 test samples."
+                "The Bayesian reference is no bound here, for it is above the training mean: the readings determine next \
+                 to nothing, and both differ by chance. Lower the noise, or draw more test samples."
             }
         })
     }

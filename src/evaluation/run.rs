@@ -28,8 +28,8 @@ pub struct Run {
     pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
     pub(super) wall_time: Option<Duration>,
-    /// Errors of the training mean and of the linear map, target by target.
-    pub(super) target_baselines: [TargetRow; 2],
+    /// Errors of the training mean and of the linear map, target by target; empty if only the networks count.
+    pub(super) target_baselines: Vec<TargetRow>,
     /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
     pub(super) baselines: Option<Baselines>,
 }
@@ -212,7 +212,7 @@ impl Run {
 
     /// Returns the errors of the baselines and of [`Self::network`] on each target of the test set, of any meaning.
     pub fn target_table(&self) -> Vec<TargetRow> {
-        let mut rows = self.target_baselines.to_vec();
+        let mut rows = self.target_baselines.clone();
         rows.push(TargetRow {
             name: "network",
             targets: TargetErrors::measure(self.test.targets(), self.decouple_test().view()),

@@ -78,6 +78,19 @@ impl SimulatedSettings {
         Ok(set)
     }
 
+    /// Draws the samples of `set`, drawn by [`Self::draw_training`], with the noise of the test set; `None` if that is the
+    /// same.
+    pub(super) fn draw_tested_folds(&self, set: &Dataset) -> Result<Option<Dataset>, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        let noise = scene.noise.in_test();
+        if noise == scene.noise.in_training() {
+            return Ok(None);
+        }
+        let mut tested = Dataset::simulate(sensor, scene, set.samples(), &mut self.seed.rng(Stream::Training))?;
+        tested.disturb(sensor, &noise, &mut self.seed.rng(Stream::TestNoise))?;
+        Ok(Some(tested))
+    }
+
     /// Draws the test set of these settings, which the window shows before anything is trained.
     ///
     /// # Errors

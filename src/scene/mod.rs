@@ -14,6 +14,7 @@ mod touch;
 
 pub use deformation::Deformation;
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
+pub(crate) use loading::LatentRow;
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub use movement::Movement;
 pub use noise::{Noise, NoisySets};

@@ -7,7 +7,7 @@ use decoupler::{
         experiments::{Axis, Experiment, ExperimentError, ExperimentResults, run_experiments},
         reference_errors,
     },
-    scene::{Noise, Rows, Scene},
+    scene::{Noise, NoisySets, Rows, Scene},
     sensor::SensorModel,
 };
 
@@ -150,4 +150,22 @@ fn the_worst_node_is_named_by_its_row_wire() {
     decoupled[[3, 5]] += 0.5;
     let worst = Errors::measure(&set, &decoupled, 1.0).worst_node;
     assert_eq!((worst.snapshot, worst.row, worst.node), (3, 2, 1));
+}
+
+/// The noise of the test set is in the held-out folds, and that of the training set in the others.
+#[test]
+fn folds_are_tested_with_the_noise_of_the_test_set() {
+    let z_mm = |sets, relative| {
+        let mut experiment = experiment(Rows::All, 4, FoldUnit::Snapshot);
+        experiment.base.source.scene.noise = Noise {
+            sets,
+            ..Noise::relative(relative)
+        };
+        finished(experiment).cells[0].trials[0].errors.z_mm
+    };
+    let clean = z_mm(NoisySets::Both, 0.0);
+    assert!(z_mm(NoisySets::Test, 0.2) > 1.5 * clean);
+    // Training and testing differ, so that this is neither of the two with noise in both or in none.
+    let [both, training] = [NoisySets::Both, NoisySets::Training].map(|sets| z_mm(sets, 0.2));
+    assert!(both != training && training != clean, "{both} {training} {clean}");
 }

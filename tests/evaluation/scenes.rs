@@ -167,7 +167,8 @@ fn files_of_older_programs_still_load() {
     assert!((ours.worst_mm / theirs.worst_mm - 1.0).abs() < 1e-10);
 }
 
-/// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it.
+/// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it. Of a smooth field
+/// it knows mean and covariance only.
 #[test]
 fn with_noise_newton_comes_close_to_the_reference() {
     let mut settings = small();
@@ -188,7 +189,8 @@ fn with_noise_newton_comes_close_to_the_reference() {
         let limit = run.baselines().unwrap().reference.unwrap().z_percent.unwrap();
         for kind in [DecoderKind::Newton, DecoderKind::Polish] {
             let ratio = z_percent(&run, kind, Precision::Double) / limit;
-            assert!((0.9..1.1).contains(&ratio), "{kind} {loading}: {ratio}");
+            let most = if loading == Loading::RandomNodes { 1.1 } else { 1.4 };
+            assert!((0.95..most).contains(&ratio), "{kind} {loading}: {ratio}");
         }
         assert!(z_percent(&run, DecoderKind::Network, Precision::Double) > 0.95 * limit);
     }

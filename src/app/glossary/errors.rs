@@ -24,9 +24,8 @@ terms! { ERROR_TERMS:
         "Best affine map from the resistances to the coordinates. A network that is not better is not worth its training.",
         "coordinates = A · R + b";
     REFERENCE = "Reference",
-        "Bayesian reference: the error that remains given the noise and the loading of the scene, with Eq. (2) linearised \
-         at the actual deformation. On average, no decoder that knows only the range of the loading, or its mean and \
-         covariance, does better. Without noise, only the rounding of the readings is left.";
+        "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
+         row's own readings does better. Without noise, only the rounding of the readings is left.";
     PUBLISHED = "Published",
         "What the paper reports for this array, hidden nodes and samples.";
     RESIDUAL = "Residual",

@@ -64,16 +64,77 @@ impl Likelihood {
 
     /// The most likely η of readings whose resistances the evaluated `problem` has.
     pub(super) fn likeliest_drift(&self, problem: &RowProblem) -> f64 {
+        let pairs =
+            (0..problem.equations()).map(|reading| (problem.reading_ohm(reading), problem.resistance_ohm(reading)));
+        self.likeliest_drift_of(pairs)
+    }
+
+    /// As [`Self::likeliest_drift`], of pairs of readings and resistances.
+    pub(super) fn likeliest_drift_of(&self, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let drift = self.noise.drift();
         let (mut precision, mut linear) = (1.0, 0.0);
-        for reading in 0..problem.equations() {
-            let ohm = problem.resistance_ohm(reading);
+        for (reading_ohm, ohm) in pairs {
             // Noise as at gain 1; all readings see the same gain.
-            let slope = drift * ohm / self.deviation_ohm(ohm);
+            let deviation_ohm = self.deviation_ohm(ohm);
+            let slope = drift * ohm / deviation_ohm;
             precision += slope * slope;
-            linear += slope * (problem.reading_ohm(reading) - ohm) / self.deviation_ohm(ohm);
+            linear += slope * (reading_ohm - ohm) / deviation_ohm;
         }
         (linear / precision).max(-(1.0 - SMALLEST_GAIN) / drift)
+    }
+
+    /// ln p(readings | resistances, η), of pairs of readings and resistances, without approximation; −∞ at gains of 0 and
+    /// less.
+    pub(super) fn log_density(&self, drift: f64, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+        let gain = 1.0 + self.noise.drift() * drift;
+        if gain <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        let of_pair = |(reading_ohm, ohm): (f64, f64)| {
+            let predicted_ohm = gain * ohm;
+            let deviation_ohm = self.deviation_ohm(predicted_ohm);
+            let density = match self.noise.rounded_from_ohm(reading_ohm) {
+                None => {
+                    let misfit = (reading_ohm - predicted_ohm) / deviation_ohm;
+                    -0.5 * misfit * misfit - deviation_ohm.ln()
+                }
+                Some((lowest_ohm, highest_ohm)) => log_probability(
+                    (lowest_ohm - predicted_ohm) / deviation_ohm,
+                    (highest_ohm - predicted_ohm) / deviation_ohm,
+                ),
+            };
+            // Beyond, Φ is 1 in double precision.
+            if predicted_ohm > 9.0 * deviation_ohm {
+                density
+            } else {
+                density - normal_cdf(predicted_ohm / deviation_ohm).ln()
+            }
+        };
+        let sum: f64 = pairs.map(of_pair).sum();
+        if sum.is_nan() { f64::NEG_INFINITY } else { sum }
+    }
+
+    /// w of every reading, and −∂w/∂ ln P, to shape proposals: the width of a step of a converter counts as noise.
+    pub(super) fn misfits_and_scales(&self, problem: &RowProblem, drift: f64) -> (Vec<f64>, Vec<f64>) {
+        let gain = self.gain(drift);
+        let of_reading = |reading| {
+            let (read_ohm, predicted_ohm) = (problem.reading_ohm(reading), gain * problem.resistance_ohm(reading));
+            let step_ohm = match self.noise.rounded_from_ohm(read_ohm) {
+                Some((lowest, highest)) if highest.is_finite() => (highest - lowest) / 12.0_f64.sqrt(),
+                _ => 0.0,
+            };
+            let deviation_ohm = libm::hypot(self.deviation_ohm(predicted_ohm), step_ohm);
+            let of_additive = self.noise.additive_ohm().hypot(step_ohm) / deviation_ohm;
+            let relative = (1.0 - of_additive * of_additive).max(0.0);
+            let misfit = (read_ohm - predicted_ohm) / deviation_ohm;
+            (misfit, predicted_ohm / deviation_ohm + relative * misfit)
+        };
+        (0..problem.equations()).map(of_reading).unzip()
+    }
+
+    /// ∂ ln(gain)/∂η.
+    pub(super) fn log_gain_slope(&self, drift: f64) -> f64 {
+        self.noise.drift() / self.gain(drift)
     }
 
     fn deviation_ohm(&self, predicted_ohm: f64) -> f64 {
@@ -217,6 +278,17 @@ fn narrowness(half_width: f64) -> f64 {
     } else {
         (edges / probability).min(1.0)
     }
+}
+
+/// Logarithm of the probability that a standard normal value lies between two.
+fn log_probability(lowest: f64, highest: f64) -> f64 {
+    // Of the two tails the one that does not cancel.
+    let probability = if lowest > 0.0 {
+        normal_cdf(-lowest) - normal_cdf(-highest)
+    } else {
+        normal_cdf(highest) - normal_cdf(lowest)
+    };
+    probability.ln()
 }
 
 /// φ(x)/Φ(x) for x of 0 or more.

@@ -10,14 +10,17 @@ mod limit;
 mod linear_model;
 mod linearised;
 mod marginal;
+mod mixture;
 mod pack;
 mod products;
 mod report;
 mod row_prior;
+mod sampled;
 mod site;
 mod truncated;
 
 pub use report::PosteriorReport;
+pub(crate) use sampled::SampledPosterior;
 
 use rand::Rng;
 

@@ -91,7 +91,9 @@ impl Trial {
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
         let set = settings.draw_training(settings.source.samples)?;
-        let Some(validated) = validation.run(&settings.into(), &set, repeat, is_cancelled)? else {
+        let tested = settings.draw_tested_folds(&set)?;
+        let sets = (&set, tested.as_ref().unwrap_or(&set));
+        let Some(validated) = validation.run_with_tested(&settings.into(), sets, repeat, is_cancelled)? else {
             return Ok(None);
         };
         let bottleneck = bottleneck_answers(&set, &validated, settings.hidden)?;

@@ -266,7 +266,7 @@ fn squared_errors(
             decode_set(&mut ridge, test)?
         }
         FittedModel::Network => {
-            let mut run = Run::on_sets(RunSettings { seed, ..*settings }, split, test.clone())?;
+            let mut run = Run::of_networks_on_sets(RunSettings { seed, ..*settings }, split, test.clone())?;
             while run.step().is_none() {
                 if is_cancelled() {
                     return Ok(None);

@@ -63,12 +63,6 @@ pub struct Span {
     pub largest: f64,
 }
 
-impl Span {
-    fn draw(self, rng: &mut impl Rng) -> f64 {
-        self.smallest + (self.largest - self.smallest) * rng.random::<f64>()
-    }
-}
-
 impl Default for Indenter {
     /// Balls of 2 to 6 mm radius; the surface comes back within 2 mm, the node pitch.
     fn default() -> Self {
@@ -156,27 +150,54 @@ impl Indenter {
 
     /// Draws one press: its place uniform over the nodes, its depth uniform up to the stroke.
     pub(super) fn draw(&self, model: &SensorModel, stroke_mm: f64, rng: &mut impl Rng) -> Press {
+        self.press_of(model, stroke_mm, || rng.random::<f64>())
+    }
+
+    /// Number of uniform values that [`Self::press_of`] takes.
+    pub(super) fn uniforms(&self) -> usize {
+        match self.shape {
+            IndenterShape::Sphere { .. } | IndenterShape::Edge { .. } => 5,
+            IndenterShape::FlatPunch { .. } | IndenterShape::Cylinder { .. } => 6,
+        }
+    }
+
+    /// Index of the uniform value that becomes the direction, a full turn from 0 to 1.
+    pub(super) const DIRECTION: usize = 3;
+
+    /// Returns the press determined by values that are uniform in [0, 1).
+    pub(super) fn press_of(&self, model: &SensorModel, stroke_mm: f64, mut uniform: impl FnMut() -> f64) -> Press {
         let scale = model.scale;
         let first = model.geometry.row_node_mm(scale, 0, 0);
         let last = model
             .geometry
             .row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1);
-        let mut between = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+        let mut between = |low: f64, high: f64| low + (high - low) * uniform();
         let place = DVec2::new(between(first.x, last.x), between(first.y, last.y));
         let depth_mm = between(0.0, stroke_mm);
         let direction = DVec2::from_angle(between(0.0, std::f64::consts::TAU));
-        let mut slope = |largest_degrees: f64| between(0.0, largest_degrees).to_radians().tan();
+        let mut slope_and_radius = |largest_degrees: f64, span: Option<Span>| {
+            let slope = between(0.0, largest_degrees).to_radians().tan();
+            (slope, span.map_or(0.0, |span| between(span.smallest, span.largest)))
+        };
         let (slope, body) = match self.shape {
-            IndenterShape::Sphere { radius_mm } => (0.0, Body::Sphere(radius_mm.draw(rng))),
+            IndenterShape::Sphere { radius_mm } => (0.0, Body::Sphere(between(radius_mm.smallest, radius_mm.largest))),
             IndenterShape::FlatPunch {
                 radius_mm,
                 largest_tilt_degrees,
-            } => (slope(largest_tilt_degrees), Body::FlatPunch(radius_mm.draw(rng))),
+            } => {
+                let (slope, radius) = slope_and_radius(largest_tilt_degrees, Some(radius_mm));
+                (slope, Body::FlatPunch(radius))
+            }
             IndenterShape::Cylinder {
                 radius_mm,
                 largest_tilt_degrees,
-            } => (slope(largest_tilt_degrees), Body::Cylinder(radius_mm.draw(rng))),
-            IndenterShape::Edge { largest_tilt_degrees } => (slope(largest_tilt_degrees), Body::Edge),
+            } => {
+                let (slope, radius) = slope_and_radius(largest_tilt_degrees, Some(radius_mm));
+                (slope, Body::Cylinder(radius))
+            }
+            IndenterShape::Edge { largest_tilt_degrees } => {
+                (slope_and_radius(largest_tilt_degrees, None).0, Body::Edge)
+            }
         };
         Press::new(body, place, depth_mm, direction, slope, self.spread_mm)
     }

@@ -29,6 +29,17 @@ impl SmoothField {
         }
     }
 
+    /// Returns a square root of the covariance of the nodes of one row-wire, row by row, and its number of columns. Patterns
+    /// whose standard deviation is below 1e-9 are left out.
+    pub(super) fn root_of_row(&self) -> (Vec<f64>, usize) {
+        const SMALLEST_DEVIATION: f64 = 1e-9;
+        let root = &self.along_y;
+        let seen = |&column: &usize| root.col(column).norm_max() >= SMALLEST_DEVIATION;
+        let columns: Vec<usize> = (0..root.ncols()).filter(seen).collect();
+        let entries = (0..root.nrows()).flat_map(|node| columns.iter().map(move |&column| root[(node, column)]));
+        (entries.collect(), columns.len())
+    }
+
     /// Draws the field: row-wires × nodes, in [0, 1].
     pub(super) fn draw(&self, rng: &mut impl Rng) -> Mat<f64> {
         let mut white = Mat::zeros(self.along_x.ncols(), self.along_y.ncols());

@@ -23,8 +23,8 @@ const COLUMNS: [Column; 4] = [
     },
     Column {
         heading: TIMES_LIMIT,
-        meaning: "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders that know only \
-                  the range of the loading, or its mean and covariance.",
+        meaning: "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a \
+                  row's own readings in this scene.",
     },
     Column {
         heading: "residual",
