@@ -36,6 +36,9 @@ failures = []
 
 def limit_of(network, precision, report):
     usual = LIMITS.get(precision, report["limit"])
+    if precision == "f32":
+        # The golden readings are in double precision, and rounding them to single precision changes the answers.
+        usual += max(report["change_by_rounding_readings"].values())
     return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
 
 
@@ -44,6 +47,10 @@ def run(*command, **options):
     if done.returncode:
         raise RuntimeError(f"{' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
     return done.stdout
+
+
+class Refused(RuntimeError):
+    """The network cannot leave in this precision."""
 
 
 def show(network, bundle, reader, deviation, limit, note=""):
@@ -57,7 +64,12 @@ def show(network, bundle, reader, deviation, limit, note=""):
 def export(network, form, precision):
     folder = HOME / network / f"{form}_{precision}"
     command = [PROGRAM, "export", "--network", HOME / network / "network.json", "--format", form]
-    report = json.loads(run(*command, "--precision", precision, "--out", folder, "--json"))
+    try:
+        report = json.loads(run(*command, "--precision", precision, "--out", folder, "--json"))
+    except RuntimeError as error:
+        if "cannot resolve the readings" not in str(error):
+            raise
+        raise Refused(str(error).splitlines()[-1])
     return folder, report
 
 
@@ -241,8 +253,11 @@ for network, arguments in [*NETWORKS.items(), (OWN, None)]:
         run(PROGRAM, "train", *arguments.split(), "--out", HOME / network / "network.json", "--json")
         run(PROGRAM, "simulate", "--samples", 100, "--seed", 9, "--out", HOME / network / "readings.csv")
     for precision in ["f64", "f32"]:
-        check_onnx(network, precision)
-        check_numpy(network, precision)
+        for check, form in [(check_onnx, "onnx"), (check_numpy, "numpy")]:
+            try:
+                check(network, precision)
+            except Refused as error:
+                print(f"{network:<6} {form} {precision}  refused: {error}", flush=True)
     for precision in ["f64", "f32", "fixed16"]:
         check_c(network, precision)
     check_octave(network)

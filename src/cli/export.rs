@@ -26,8 +26,10 @@ use crate::export::{
 /// What was written is read back, evaluated, and compared with the network on readings of its scene and on the extremes of
 /// its training range: the largest deviation is shown, relative to the widest range of a coordinate in training. A bundle
 /// that deviates by more than 1e-12 (f64) or 1e-5 (f32), or in fixed16 by more than its proven bound, is not written,
-/// unless the network itself magnifies rounding errors further, which is then said. The bundle is a folder (for json a
-/// file) with golden vectors and a README.txt that shows how to call it.
+/// unless the network itself magnifies rounding errors further, which is then reported. A bundle in f32 also takes its
+/// readings in single precision: the change by rounding them to it is reported too, and a bundle that it changes by more
+/// than 1 % is not written. The bundle is a folder (for json a file) with golden vectors and a README.txt that shows how to
+/// call it.
 #[derive(Args)]
 pub(super) struct Export {
     /// Network saved by train --out or by the window

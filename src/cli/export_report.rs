@@ -21,6 +21,9 @@ struct Report<'a> {
     /// Largest of all checks; like these relative to `output_range_mm`, or for own data to the range of each target.
     deviation: f64,
     limit: f64,
+    /// Of `f32`: by rounding the readings alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    change_by_rounding_readings: Option<Rounding>,
     #[serde(skip_serializing_if = "Option::is_none")]
     output_range_mm: Option<f64>,
     deviation_of_decode: f64,
@@ -50,6 +53,14 @@ struct Bound<'a> {
 struct Check {
     evaluator: &'static str,
     deviation: f64,
+    /// Without the rounding of the readings.
+    deviation_of_arithmetic: f64,
+}
+
+#[derive(Serialize)]
+struct Rounding {
+    largest: f64,
+    bound: f64,
 }
 
 /// Prints one JSON object.
@@ -58,6 +69,7 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
     let checks = report.checks.iter().map(|check| Check {
         evaluator: check.evaluator,
         deviation: check.deviation,
+        deviation_of_arithmetic: check.of_arithmetic,
     });
     let bounds = report.bounds.iter().map(|(output, bound)| Bound {
         name: &output.name,
@@ -75,6 +87,10 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
         checks: checks.collect(),
         deviation: report.deviation(),
         limit: report.limit,
+        change_by_rounding_readings: report.rounding.map(|rounding| Rounding {
+            largest: rounding.largest,
+            bound: rounding.bound,
+        }),
         output_range_mm: report.output_range_mm,
         deviation_of_decode: report.program_deviation,
         error_bound_mm: report.bounds.first().filter(|_| is_array).map(|(_, bound)| *bound),
@@ -113,6 +129,9 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
     }
     if report.vectors.verified > 0 {
         text += &format!("  decode of this program: {:.1e}\n", report.program_deviation);
+        if let Some(rounding) = report.describe_rounding() {
+            text += &format!("  {rounding}\n");
+        }
         text += &format!("  limit: {:.1e}\n", report.limit);
     }
     if let Some(bounds) = report.describe_bounds() {

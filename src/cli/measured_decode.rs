@@ -10,7 +10,7 @@ use crate::{
     dataset::{CsvFields, number},
     decoupling::{CompiledNetworks, Decoder},
     export::{AtomicFile, MeasuredNetworkFile, WriteError},
-    import::{InputColumns, InputError},
+    import::{InputColumns, InputError, clean_name::inert},
     network::DecouplingNetwork,
 };
 
@@ -83,7 +83,7 @@ fn outside(network: &DecouplingNetwork, readings: &[f64], answer: &[f64]) -> (us
 }
 
 fn write_heading(file: &MeasuredNetworkFile, out: &mut impl Write) -> io::Result<()> {
-    let titles = file.targets.iter().map(crate::import::Channel::title);
+    let titles = file.targets.iter().map(|target| inert(&target.title()));
     let names = titles.chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(names).map_err(io::Error::other)?;

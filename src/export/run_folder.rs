@@ -11,7 +11,7 @@ use super::{
     kept_files::{ids, name_path, pinned_path, read, run_path, write},
     old_run_list::OldRunList,
 };
-use crate::{dataset::system_cause, evaluation::SimulatedSettings};
+use crate::{dataset::system_cause, evaluation::SimulatedSettings, import::clean_name::clean_name};
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -117,8 +117,8 @@ impl RunFolder {
             }
         }
         for run in &mut self.kept.runs {
-            match read(&name_path(path, run.id)) {
-                Ok(Some(name)) => run.name = name,
+            match read::<String>(&name_path(path, run.id)) {
+                Ok(Some(name)) => run.name = clean_name(&name),
                 Ok(None) => {}
                 Err(flaw) => problems.push(format!(
                     "the name of a run cannot be read: {flaw}; rename '{}'",

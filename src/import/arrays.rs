@@ -2,6 +2,7 @@ use std::path::Path;
 
 use super::{
     Cells, Column, Fault, Format, Table, TableError,
+    clean_name::clean_name,
     column::Labels,
     csv_table::Reading,
     element::Array,
@@ -17,7 +18,10 @@ pub(super) fn table(
     left_out: Vec<String>,
     reading: &Reading<'_>,
 ) -> Result<Table, TableError> {
-    let mut notes: Vec<String> = left_out.into_iter().map(|what| format!("left out: {what}")).collect();
+    let mut notes: Vec<String> = left_out
+        .into_iter()
+        .map(|what| format!("left out: {}", clean_name(&what)))
+        .collect();
     let Some(rows) = arrays.iter().map(|array| array.rows).max() else {
         let found = if notes.is_empty() {
             "nothing is in it".to_owned()
@@ -27,7 +31,8 @@ pub(super) fn table(
         return Err(TableError::array("there is no array of numbers", found));
     };
     let mut columns = Vec::new();
-    for array in arrays {
+    for mut array in arrays {
+        array.name = clean_name(&array.name);
         if array.rows != rows {
             notes.push(format!("left out: {} has {} rows, not {rows}", array.name, array.rows));
             continue;

@@ -1,5 +1,7 @@
 use std::collections::HashMap;
 
+use super::clean_name::clean_name;
+
 /// A column of a table.
 #[derive(Clone, Debug, Default)]
 pub struct Column {
@@ -117,7 +119,7 @@ impl Labels {
         let number = label.map(|(text, value)| {
             self.known.get(text).copied().unwrap_or_else(|| {
                 let number = self.texts.len() as u32;
-                self.texts.push((text.to_owned(), value.unwrap_or(f64::NAN)));
+                self.texts.push((clean_name(text), value.unwrap_or(f64::NAN)));
                 self.known.insert(text.to_owned(), number);
                 number
             })

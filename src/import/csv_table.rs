@@ -6,6 +6,7 @@ use std::{
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
+    clean_name::clean_name,
     column::{Labels, name_and_unit},
     detection::{BEGINNING, detect},
     number::{Cell, parse},
@@ -231,8 +232,8 @@ impl<'a> Builder<'a> {
 pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     for index in 0..width {
-        let header = headers.get(index).map_or("", String::as_str);
-        let (name, unit) = name_and_unit(header);
+        let header = clean_name(headers.get(index).map_or("", String::as_str));
+        let (name, unit) = name_and_unit(&header);
         let wanted = if name.is_empty() {
             format!("c{}", index + 1)
         } else {

@@ -5,6 +5,7 @@
 //! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files.
 
 mod arrays;
+pub(crate) mod clean_name;
 mod column;
 mod condition;
 mod csv_table;

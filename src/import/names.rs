@@ -1,4 +1,4 @@
-use super::{Column, ImportError, Table};
+use super::{Column, ImportError, Table, clean_name::clean_name};
 
 /// A column of one of the files of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,7 +47,7 @@ impl Names {
 
     /// Finds a column by its full name, with or without the unit that the header gives.
     pub(super) fn find(&self, given: &str) -> Result<ColumnId, ImportError> {
-        let name = given.trim();
+        let name = &clean_name(given.trim());
         let bare = super::column::name_and_unit(name).0;
         let with = |name: &str| -> Vec<ColumnId> {
             let found = self.names.iter().filter(|(other, _)| other == name);

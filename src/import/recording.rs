@@ -2,7 +2,10 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Excess, Format, TargetPosition};
+use super::{
+    Excess, Format, TargetPosition,
+    clean_name::{cleaned, cleaned_if_any},
+};
 use crate::dataset::Dataset;
 
 /// Measured samples with the meaning of their columns.
@@ -38,9 +41,14 @@ pub struct Recording {
 #[serde(deny_unknown_fields)]
 pub struct Channel {
     /// Full name of the column.
+    #[serde(deserialize_with = "cleaned")]
     pub name: String,
     /// Unit, if it is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "cleaned_if_any"
+    )]
     pub unit: Option<String>,
 }
 

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use super::{Column, Dialect};
+use super::{Column, Dialect, clean_name::clean_name};
 
 /// A file as columns of equal lengths.
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ impl Table {
 /// Name of a file without its folder and ending.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem()
-        .map_or_else(|| "data".to_owned(), |stem| stem.to_string_lossy().into_owned())
+        .map_or_else(|| "data".to_owned(), |stem| clean_name(&stem.to_string_lossy()))
 }
 
 #[cfg(test)]

@@ -1,4 +1,8 @@
-use super::{Damping, normal_equations::PerClass, setting::settings};
+use super::{
+    Damping,
+    normal_equations::PerClass,
+    setting::{WHOLE, settings},
+};
 
 settings! {
     /// Settings of Bayesian regularisation: the damping mu, as in [`Damping`], and the correlation of errors.
@@ -12,10 +16,10 @@ settings! {
             "Factor on mu after a step that does not lower the error.";
         mu_max: "largest mu" = 1e10, in 1e-20..=1e300,
             "Training ends when mu exceeds this: no step lowers the error any more.";
-        correlation_epoch: "correlation epoch" = 0.0, in 0.0..=1e6,
+        correlation_epoch [WHOLE]: "correlation epoch" = 0.0, in 0.0..=1e6,
             "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
              errors count as independent, and weights are smaller. 0: never.";
-        groups: "groups of weights" = 1.0, in 1.0..=4.0,
+        groups [WHOLE]: "groups of weights" = 1.0, in 1.0..=4.0,
             "Groups of weights, each with its own strength of regularisation. 1: all. 2: hidden layer and output layer. 3: \
              the hidden layer's biases apart too. 4: all biases apart. From 2 on, output biases are drawn towards the means \
              of the targets, not towards 0.";

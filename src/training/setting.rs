@@ -17,6 +17,8 @@ pub struct Setting<'a> {
     pub default: f64,
     /// Allowed values.
     pub range: RangeInclusive<f64>,
+    /// True for a number that counts.
+    pub is_whole: bool,
     /// The present value.
     pub value: &'a mut f64,
 }
@@ -27,13 +29,16 @@ pub(super) trait Settings: Default {
     fn list(&mut self, default: Self) -> Vec<Setting<'_>>;
 }
 
-/// Defines the settings of a method: for each number its field, its name, the field's usual default, the allowed values,
+/// Marks a setting that is a whole number.
+pub(super) const WHOLE: bool = true;
+
+/// Defines the settings of a method: for each number its field, [WHOLE] if it counts, its name, the field's usual default, the allowed values,
 /// and its meaning.
 macro_rules! settings {
     (
         $(#[$doc:meta])*
         pub struct $Settings:ident {
-            $($field:ident: $name:literal = $default:expr, in $range:expr, $meaning:literal;)*
+            $($field:ident $([$whole:ident])?: $name:literal = $default:expr, in $range:expr, $meaning:literal;)*
         }
     ) => {
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -56,6 +61,7 @@ macro_rules! settings {
                     meaning: $meaning,
                     default: default.$field,
                     range: $range,
+                    is_whole: false $(|| $whole)?,
                     value: &mut self.$field,
                 },)*]
             }
@@ -77,6 +83,14 @@ pub enum SettingError {
         value: f64,
         /// Allowed values.
         range: RangeInclusive<f64>,
+    },
+    /// A number that counts has a fraction.
+    #[error("{name} is {}: it must be a whole number", short(*.value))]
+    NotWhole {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
     },
     /// A first value is above the largest that the method may reach.
     #[error(
@@ -102,7 +116,14 @@ impl Setting<'_> {
     /// The value is out of range.
     pub fn check(&self) -> Result<(), SettingError> {
         if self.range.contains(self.value) {
-            return Ok(());
+            return if self.is_whole && self.value.fract() != 0.0 {
+                Err(SettingError::NotWhole {
+                    name: self.name,
+                    value: *self.value,
+                })
+            } else {
+                Ok(())
+            };
         }
         Err(SettingError::Range {
             name: self.name,
@@ -129,4 +150,37 @@ pub(super) fn check_limit(
         limit_name,
         limit,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::training::{Method, RegularizationSettings};
+
+    #[test]
+    fn numbers_that_count_have_no_fraction() {
+        for (groups, correlation_epoch, is_sound) in [
+            (2.0, 0.0, true),
+            (2.5, 0.0, false),
+            (4.0, 100.0, true),
+            (4.0, 0.5, false),
+            (f64::NAN, 0.0, false),
+        ] {
+            let settings = RegularizationSettings {
+                groups,
+                correlation_epoch,
+                ..RegularizationSettings::default()
+            };
+            let checked = Method::BayesianRegularization(settings).check();
+            assert_eq!(checked.is_ok(), is_sound, "{groups} {correlation_epoch}: {checked:?}");
+        }
+        let settings = RegularizationSettings {
+            groups: 2.5,
+            ..RegularizationSettings::default()
+        };
+        let message = Method::BayesianRegularization(settings)
+            .check()
+            .unwrap_err()
+            .to_string();
+        assert_eq!(message, "groups of weights is 2.5: it must be a whole number");
+    }
 }

@@ -165,3 +165,63 @@ fn whole_numbers_have_units_of_their_own_for_each_column() {
         assert!(!header.contains("ohm") && !header.contains("nm"), "{header}");
     }
 }
+
+/// Readings that vary by a billionth of their size lose everything when they are rounded to single precision.
+#[test]
+fn offsets_that_single_precision_cannot_hold_are_refused_with_cause_and_cure() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let draws: Vec<[f64; 2]> = (0..120)
+        .map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+        .collect();
+    for (offset, range, is_written) in [
+        (0.0, 1.0, true),
+        (1.0, 1e-3, true),
+        (1.0, 1e-9, false),
+        (1e6, 1.0, false),
+    ] {
+        let lines = draws.iter().map(|[x, y]| {
+            let [a, b] = [x, y].map(|value| offset + range * value);
+            format!("{a},{b},{}\n", x + 0.3 * y)
+        });
+        fs::write(
+            path.join("own.csv"),
+            format!("a,b,force\n{}", lines.collect::<String>()),
+        )
+        .unwrap();
+        let train = "train --data own.csv --inputs a,b --targets force --hidden 3 --epochs 15 --out n.json";
+        assert!(decoupler(train, path).status.success());
+        for (format, precision) in [("numpy", "f32"), ("onnx", "f32"), ("c99", "f32"), ("numpy", "f64")] {
+            let command = format!("export --network n.json --format {format} --precision {precision} --out b --json");
+            let output = decoupler(&command, path);
+            let message = String::from_utf8(output.stderr).unwrap();
+            let expected = is_written || precision == "f64";
+            assert_eq!(
+                output.status.success(),
+                expected,
+                "{offset} {range} {command}: {message}"
+            );
+            if !expected {
+                for words in [
+                    "single precision cannot resolve",
+                    "--precision f64",
+                    "subtract a constant",
+                ] {
+                    assert!(message.contains(words), "{message}");
+                }
+                assert!(!path.join("b").exists());
+                continue;
+            }
+            let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+            let change = &report["change_by_rounding_readings"]["largest"];
+            assert_eq!(change.is_null(), precision == "f64", "{report}");
+            // 1e-3 of a size of 1 has some 14 bits.
+            if let Some(change) = change.as_f64() {
+                let wanted = if range == 1.0 { 0.0..1e-6 } else { 1e-6..1e-4 };
+                assert!(wanted.contains(&change), "{offset} {range}: {report}");
+            }
+            fs::remove_dir_all(path.join("b")).unwrap();
+        }
+    }
+}

@@ -41,6 +41,9 @@ pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, 
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         let limits = usually(setting.default, setting.range);
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
+        if setting.is_whole {
+            *setting.value = setting.value.round();
+        }
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {

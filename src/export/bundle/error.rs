@@ -35,6 +35,26 @@ pub enum BundleError {
     /// The network file cannot be written or read back.
     #[error(transparent)]
     NetworkFile(#[from] DocumentError),
+    /// A reading that is 0 or infinite in the numbers of the bundle.
+    #[error(
+        "a reading of {reading:.1e} ({channel}) is beyond the range of the numbers in which the bundle takes it: give --precision f64"
+    )]
+    ReadingBeyond {
+        /// Name of the channel.
+        channel: String,
+        /// The reading.
+        reading: f64,
+    },
+    /// Single precision has too few digits for the readings.
+    #[error(
+        "single precision cannot resolve the readings: rounding them to it changes the answers by up to {change}; {cure}"
+    )]
+    Unresolved {
+        /// The change, with its unit.
+        change: String,
+        /// What to do.
+        cure: String,
+    },
     /// The numbers do not fit 16 bits.
     #[error(transparent)]
     FixedPoint(#[from] FixedPointError),

@@ -1,3 +1,5 @@
+use ndarray::ArrayView1;
+
 use super::{
     portable::{Portable, PortableNetwork},
     twofold::Twofold,
@@ -11,6 +13,8 @@ pub(super) struct Exact {
     pub(super) answers: Vec<f64>,
     /// Sums of magnitudes by which rounding errors grow.
     pub(super) growth: Growth,
+    /// Slope of each hidden node's activation with respect to its sum.
+    slopes: Vec<f64>,
 }
 
 /// Largest changes of an output relative to its scale, to first order, per relative error of each number that is added up.
@@ -50,7 +54,7 @@ pub(super) fn decode_exactly(portable: &Portable, network: &PortableNetwork, rea
             magnitude += product.to_f64().abs();
         }
         let activation = sum.tanh();
-        let slope = (1.0 - activation.to_f64()) * (1.0 + activation.to_f64());
+        let slope = slope(activation);
         let own = activation.to_f64().abs() + slope * sum.to_f64().abs();
         hidden.push((activation, slope * magnitude, own));
     }
@@ -70,7 +74,58 @@ pub(super) fn decode_exactly(portable: &Portable, network: &PortableNetwork, rea
         });
         answers.push(sum.to_f64());
     }
-    Exact { answers, growth }
+    Exact {
+        answers,
+        growth,
+        slopes: hidden.iter().map(|&(activation, ..)| slope(activation)).collect(),
+    }
+}
+
+/// Slope of the hyperbolic tangent where it has this value.
+fn slope(activation: Twofold) -> f64 {
+    (1.0 - activation.to_f64()) * (1.0 + activation.to_f64())
+}
+
+impl Exact {
+    /// Bound on the change of an output relative to its scale, to first order, when each of the `readings` answered may be
+    /// wrong by up to `errors`.
+    pub(super) fn change_by(
+        &self,
+        portable: &Portable,
+        network: &PortableNetwork,
+        readings: &[f64],
+        errors: &[f64],
+    ) -> f64 {
+        let steps = readings.iter().zip(errors).zip(&network.centre);
+        let steps: Vec<f64> = steps
+            .map(|((&ohm, &error), &centre)| slope_of_change(portable.quantity, ohm, centre) * error)
+            .collect();
+        let mut largest = 0.0_f64;
+        for output in 0..portable.outputs {
+            let of_nodes = network.output_weights.column(output);
+            let of_nodes: Vec<f64> = of_nodes
+                .iter()
+                .zip(&self.slopes)
+                .map(|(v, slope)| v.to_f64() * slope)
+                .collect();
+            let of_reading = |(step, weights): (&f64, ArrayView1<'_, Twofold>)| {
+                let sum: f64 = weights.iter().zip(&of_nodes).map(|(w, v)| w.to_f64() * v).sum();
+                (sum * step).abs()
+            };
+            let sum: f64 = steps.iter().zip(network.hidden_weights.rows()).map(of_reading).sum();
+            largest = largest.max(sum / portable.scales[output]);
+        }
+        largest
+    }
+}
+
+/// Derivative of the change of a reading with respect to the reading.
+fn slope_of_change(quantity: Quantity, ohm: f64, centre: f64) -> f64 {
+    match quantity {
+        Quantity::Resistance | Quantity::Raw => 1.0,
+        Quantity::Conductance => -centre / ohm / ohm,
+        Quantity::LogResistance => 1.0 / ohm,
+    }
 }
 
 fn change(quantity: Quantity, ohm: f64, centre: f64) -> Twofold {

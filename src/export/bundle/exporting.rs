@@ -13,9 +13,10 @@ use super::{
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
+    taking::{ReadingRounding, Taking},
     tolerance::Tolerance,
-    vectors::Vectors,
-    weights::{Arithmetic, Digits, Weights},
+    vectors::{Deviation, Vectors},
+    weights::{Arithmetic, Weights},
 };
 
 /// Writes a network as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
@@ -37,7 +38,7 @@ pub fn export_bundle<'a>(
     }
     let folder = AtomicFolder::create(path)?;
     let portable = Portable::of(exported)?;
-    let bundle = Bundle {
+    let mut bundle = Bundle {
         exported,
         name: identifier(path),
         format,
@@ -45,15 +46,17 @@ pub fn export_bundle<'a>(
         metadata: exported.metadata(&portable, precision),
         portable,
         folder,
+        remarks: Vec::new(),
     };
     match precision {
         BundlePrecision::Fixed16 => bundle.export_fixed(path),
         BundlePrecision::Double => {
-            let vectors = bundle.vectors(|_, reading| reading)?;
+            let vectors = bundle.vectors(Taking::Double)?;
             bundle.export_floating(path, Arithmetic::DOUBLE, &vectors)
         }
         BundlePrecision::Single => {
-            let vectors = bundle.vectors(|_, reading| Digits::Single.round(reading))?;
+            let vectors = bundle.vectors(Taking::Single)?;
+            bundle.admit(&vectors)?;
             let arithmetic = single_arithmetic(&bundle.portable, &vectors);
             bundle.export_floating(path, arithmetic, &vectors)
         }
@@ -86,8 +89,10 @@ fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<Bun
         checks: vec![BundleCheck {
             evaluator: "network file, read back",
             deviation: 0.0,
+            of_arithmetic: 0.0,
         }],
         limit: 0.0,
+        rounding: None,
         output_range_mm: portable.output_range_mm(),
         program_deviation: 0.0,
         bounds: Vec::new(),
@@ -100,8 +105,8 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     /// Part of the limit that single precision may use in this evaluation: others add up in another order.
     const PART: f64 = 0.2;
     let single = Weights::of(portable, Arithmetic::SINGLE);
-    let deviation = vectors.deviation(|vector| single.decode(vector.network, &vector.readings));
-    if deviation <= PART * Tolerance::SINGLE {
+    let deviation = vectors.deviation(|vector| single.decode(vector.network, &vector.taken));
+    if deviation.of_arithmetic <= PART * Tolerance::SINGLE {
         Arithmetic::SINGLE
     } else {
         Arithmetic::MIXED
@@ -117,30 +122,65 @@ struct Bundle<'a> {
     metadata: Metadata,
     portable: Portable,
     folder: AtomicFolder,
+    /// Remarks for the user, with cause and cure.
+    remarks: Vec<String>,
 }
 
 impl Bundle<'_> {
-    fn vectors(&self, representable: impl Fn(usize, f64) -> f64) -> Result<Vectors, BundleError> {
-        Vectors::of(self.exported, &self.portable, representable)
+    fn vectors(&self, taking: Taking<'_>) -> Result<Vectors, BundleError> {
+        Vectors::of(self.exported, &self.portable, taking)
+    }
+
+    /// Notes what rounding the readings to single precision changes.
+    ///
+    /// # Errors
+    /// It changes too much.
+    fn admit(&mut self, vectors: &Vectors) -> Result<(), BundleError> {
+        let (portable, rounding) = (&self.portable, vectors.rounding);
+        let worst = rounding.worst();
+        if worst.is_nan() || rounding.largest > ReadingRounding::LARGEST {
+            return Err(BundleError::Unresolved {
+                change: portable.in_words(rounding.largest),
+                cure: vectors.cure(portable),
+            });
+        }
+        let figures = serde_json::json!({ "largest": rounding.largest, "bound": rounding.bound });
+        self.metadata.insert("change_by_rounding_readings".to_owned(), figures);
+        if worst > Tolerance::SINGLE {
+            self.remarks.push(format!(
+                "rounding the readings to single precision changes a {output} by up to {largest} in the verification and by                  at most {bound}; if that is too much, {cure}",
+                output = portable.meaning.output(),
+                largest = portable.in_words(rounding.largest),
+                bound = portable.in_words(rounding.worst()),
+                cure = vectors.cure(portable),
+            ));
+        }
+        Ok(())
     }
 
     fn export_floating(
-        self,
+        mut self,
         path: &Path,
         arithmetic: Arithmetic,
         vectors: &Vectors,
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
-        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights));
-        let mut remarks = tolerance.remarks(arithmetic, portable);
+        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.taken));
+        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights).of_arithmetic);
+        self.remarks.extend(tolerance.remarks(arithmetic, portable));
+        let limits = Deviation {
+            total: tolerance.limit + vectors.rounding.worst(),
+            of_arithmetic: tolerance.limit,
+        };
         let mut checks = Vec::new();
-        let mut check = |evaluator, deviation| checks.push(BundleCheck { evaluator, deviation });
+        let mut check = |evaluator, deviation| checks.push(BundleCheck::of(evaluator, deviation));
         match self.format {
             BundleFormat::Onnx => {
-                self.folder
-                    .write("network.onnx", onnx::write(portable, &weights, &self.metadata))?;
+                self.folder.write(
+                    "network.onnx",
+                    onnx::write(portable, &weights, &self.metadata, &self.remarks),
+                )?;
                 let damaged = |reason| read_back("network.onnx", reason);
                 let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
                 let answers = graph.decode(vectors.all()).map_err(damaged)?.answers;
@@ -168,26 +208,25 @@ impl Bundle<'_> {
                 check("MATLAB matrices, read back and evaluated", model(&read));
             }
             BundleFormat::C99 | BundleFormat::Json => {
-                let limit = tolerance.limit;
-                let files = c99::write_floating(&self.name, portable, &weights, vectors.golden(), limit);
+                let notes = &self.remarks;
+                let files = c99::write_floating(&self.name, portable, &weights, vectors.golden(), limits, notes);
                 for (name, text) in files {
                     self.folder.write(&name, text)?;
                 }
                 check("model of the C source", model(&weights));
                 match run_self_test(self.folder.path(), &self.name)? {
                     Compiled::Ran { deviation } => check("C source, compiled and run", deviation),
-                    Compiled::NoCompiler(why) => remarks.push(format!("the C source was not compiled: {why}")),
+                    Compiled::NoCompiler(why) => self.remarks.push(format!("the C source was not compiled: {why}")),
                 }
             }
         }
-        self.finish(path, vectors, checks, tolerance.limit, None, remarks)
+        self.finish(path, vectors, checks, limits, None)
     }
 
-    fn export_fixed(self, path: &Path) -> Result<BundleReport, BundleError> {
+    fn export_fixed(mut self, path: &Path) -> Result<BundleReport, BundleError> {
         let fixed = FixedNetworks::of(&self.portable)?;
-        let vectors = self.vectors(|channel, reading| fixed.representable(channel, reading))?;
         // The bound holds for these.
-        let vectors = vectors.inside(&self.portable);
+        let vectors = self.vectors(Taking::Whole(&fixed))?.inside(&self.portable);
         let limit = fixed.relative_bound;
         let files = c99::write_fixed(&self.name, &self.portable, &fixed, vectors.golden(), limit);
         for (name, text) in files {
@@ -195,12 +234,10 @@ impl Bundle<'_> {
         }
         let deviation = vectors.deviation(|vector| {
             let outputs = fixed.decode(vector.network, &vector.readings);
+            // Readings that it cannot take were refused when they were drawn.
             outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
-        let mut checks = vec![BundleCheck {
-            evaluator: "bit-exact model in whole numbers",
-            deviation,
-        }];
+        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", deviation)];
         let mut remarks = Vec::new();
         if fixed.hidden_width == HiddenWidth::TwentyFour {
             let remark = "the hidden weights have 24 bits, because their large products nearly cancel; the rest has 16";
@@ -215,13 +252,18 @@ impl Bundle<'_> {
             ));
         }
         match run_self_test(self.folder.path(), &self.name)? {
-            Compiled::Ran { deviation } => checks.push(BundleCheck {
-                evaluator: "C source, compiled and run, equal to the model bit for bit",
+            Compiled::Ran { deviation } => checks.push(BundleCheck::of(
+                "C source, compiled and run, equal to the model bit for bit",
                 deviation,
-            }),
+            )),
             Compiled::NoCompiler(why) => remarks.push(format!("the C source was not compiled: {why}")),
         }
-        self.finish(path, &vectors, checks, limit, Some(&fixed), remarks)
+        self.remarks.extend(remarks);
+        let limits = Deviation {
+            total: limit,
+            of_arithmetic: limit,
+        };
+        self.finish(path, &vectors, checks, limits, Some(&fixed))
     }
 
     fn read(&self, name: &str) -> Result<Vec<u8>, BundleError> {
@@ -234,19 +276,22 @@ impl Bundle<'_> {
         path: &Path,
         vectors: &Vectors,
         checks: Vec<BundleCheck>,
-        limit: f64,
+        limits: Deviation,
         fixed: Option<&FixedNetworks>,
-        remarks: Vec<String>,
     ) -> Result<BundleReport, BundleError> {
-        let worst = checks
-            .iter()
-            .find(|check| check.deviation.is_nan() || check.deviation > limit);
-        if let Some(&BundleCheck { evaluator, deviation }) = worst {
-            return Err(BundleError::Deviation {
-                evaluator: evaluator.to_owned(),
-                deviation,
-                limit,
-            });
+        for check in &checks {
+            for (deviation, limit) in [
+                (check.of_arithmetic, limits.of_arithmetic),
+                (check.deviation, limits.total),
+            ] {
+                if deviation.is_nan() || deviation > limit {
+                    return Err(BundleError::Deviation {
+                        evaluator: check.evaluator.to_owned(),
+                        deviation,
+                        limit,
+                    });
+                }
+            }
         }
         let portable = &self.portable;
         let mut report = BundleReport {
@@ -259,16 +304,22 @@ impl Bundle<'_> {
                 golden: vectors.golden().len(),
             },
             checks,
-            limit,
+            limit: limits.total,
+            rounding: (self.precision == BundlePrecision::Single).then_some(vectors.rounding),
             output_range_mm: portable.output_range_mm(),
             program_deviation: vectors.program_deviation,
             bounds: fixed.map_or_else(Vec::new, |fixed| portable.meaning.named(&fixed.bounds)),
-            remarks,
+            remarks: self.remarks,
         };
         self.folder
             .write("golden.csv", golden_csv(portable, vectors.golden()))?;
-        let metadata = serde_json::to_string_pretty(&self.metadata)
-            .map_err(|error| read_back("metadata.json", error.to_string()))?;
+        let mut metadata = self.metadata;
+        let verified = serde_json::json!({
+            "deviation": report.deviation(), "limit": report.limit, "remarks": report.remarks,
+        });
+        metadata.insert("verification".to_owned(), verified);
+        let metadata =
+            serde_json::to_string_pretty(&metadata).map_err(|error| read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
         self.folder
             .write("README.txt", readme(&self.name, portable, fixed, &report))?;

@@ -1,4 +1,5 @@
 use super::{portable::Portable, vectors::Vector};
+use crate::import::clean_name::inert;
 
 /// Writes the golden vectors as CSV: the row from 1 where it is an argument, readings, outputs.
 pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
@@ -9,7 +10,7 @@ pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
             .inputs()
             .into_iter()
             .chain(meaning.targets())
-            .map(|channel| channel.name),
+            .map(|channel| inert(&channel.name)),
     );
     // The names of users may have commas.
     let mut writer = csv::Writer::from_writer(Vec::new());

@@ -1,4 +1,7 @@
-use crate::{import::Channel, sensor::ArrayScale};
+use crate::{
+    import::{Channel, clean_name::is_unprintable},
+    sensor::ArrayScale,
+};
 
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,12 +139,7 @@ fn named(name: String, unit: &str) -> Channel {
 
 /// The text of a user without what would end a comment, or what compilers warn of in one.
 pub(super) fn comment(text: &str) -> String {
-    let is_bidirectional =
-        |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{2028}' | '\u{2029}');
-    let plain: String = text
-        .chars()
-        .map(|c| if c.is_control() || is_bidirectional(c) { ' ' } else { c })
-        .collect();
+    let plain = text.replace(is_unprintable, " ");
     plain
         .replace("*/", "* /")
         .replace("/*", "/ *")
@@ -149,7 +147,8 @@ pub(super) fn comment(text: &str) -> String {
         .replace("??", "? ?")
 }
 
-fn wrapped(text: &str) -> Vec<String> {
+/// Lines of at most 100 characters with these words.
+pub(super) fn wrapped(text: &str) -> Vec<String> {
     const WIDTH: usize = 100;
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {

@@ -22,6 +22,7 @@ mod onnx;
 mod portable;
 mod readme;
 mod report;
+mod taking;
 mod tolerance;
 mod twofold;
 mod vectors;
@@ -38,4 +39,5 @@ pub use self::{
     fixed_point::FixedPointError,
     portable::FoldError,
     report::{BundleCheck, BundleReport, VectorCounts},
+    taking::ReadingRounding,
 };

@@ -2,6 +2,7 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{exported_network::ExportedNetwork, meaning::Meaning, twofold::Twofold};
+use crate::export::format_number;
 use crate::network::{DecouplingNetwork, InputScaling, Quantity};
 
 /// Everything that a network computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
@@ -117,6 +118,14 @@ impl Portable {
         match self.meaning {
             Meaning::Array(_) => self.scales.first().copied(),
             Meaning::Own { .. } => None,
+        }
+    }
+
+    /// A deviation relative to [`Self::scales`], in mm for an array, and in per cent of the range of a target of own data.
+    pub(super) fn in_words(&self, relative: f64) -> String {
+        match self.output_range_mm() {
+            Some(range_mm) => format!("{} mm", format_number(relative * range_mm)),
+            None => format!("{} % of its range in training", format_number(100.0 * relative)),
         }
     }
 

@@ -60,6 +60,9 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
                 .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)))
         );
     }
+    if let Some(rounding) = report.describe_rounding() {
+        let _ = writeln!(text, "{rounding}.");
+    }
     if let Some(bounds) = report.describe_bounds() {
         let _ = writeln!(text, "{bounds}.");
     }
@@ -71,7 +74,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         Meaning::Own { .. } => "names and units",
     };
     text + &format!(
-        "\ngolden.csv has readings with the {output}s that the network gives to them, for a test of your own.\n\
+        "\ngolden.csv has readings in double precision with the {output}s that the network gives to them, for a test of your\n\
+         own: convert the readings as you would your own.\n\
          metadata.json has {subject}, the errors of the network, the range of the readings in training,\n\
          the seed and the version of the program.\n",
         output = meaning.output()

@@ -1,6 +1,10 @@
 use std::path::PathBuf;
 
-use super::choice::{BundleFormat, BundlePrecision};
+use super::{
+    choice::{BundleFormat, BundlePrecision},
+    taking::ReadingRounding,
+    vectors::Deviation,
+};
 use crate::{export::format_number, import::Channel};
 
 /// Files that an export wrote, and how far they are from the network.
@@ -21,6 +25,8 @@ pub struct BundleReport {
     pub checks: Vec<BundleCheck>,
     /// Largest deviation allowed, relative to [`Self::output_range_mm`], or to the range of each target of own data.
     pub limit: f64,
+    /// Changes of the outputs by rounding the readings to single precision; `None` for other precisions.
+    pub rounding: Option<ReadingRounding>,
     /// Widest range of a coordinate in training, in mm; `None` for own data.
     pub output_range_mm: Option<f64>,
     /// Deviation of `decode` of this program from the same exact answers, relative as [`Self::limit`].
@@ -45,8 +51,21 @@ pub struct VectorCounts {
 pub struct BundleCheck {
     /// Name of the program that evaluated it.
     pub evaluator: &'static str,
-    /// Largest deviation from the network, relative as [`BundleReport::limit`].
+    /// Largest deviation from the network, which takes the readings in double precision, where the bundle takes them as its
+    /// callers must round them; relative as [`BundleReport::limit`].
     pub deviation: f64,
+    /// The part of it that is not the rounding of the readings.
+    pub of_arithmetic: f64,
+}
+
+impl BundleCheck {
+    pub(super) fn of(evaluator: &'static str, deviation: Deviation) -> Self {
+        Self {
+            evaluator,
+            deviation: deviation.total,
+            of_arithmetic: deviation.of_arithmetic,
+        }
+    }
 }
 
 impl BundleReport {
@@ -61,6 +80,17 @@ impl BundleReport {
             format!(
                 "Proven bound on the error of the whole numbers, for readings that are not out of range: {}",
                 bounds.join(", ")
+            )
+        })
+    }
+
+    /// The sentence on [`Self::rounding`], if there is one.
+    pub fn describe_rounding(&self) -> Option<String> {
+        self.rounding.map(|rounding| {
+            format!(
+                "Rounding the readings to single precision alone: {:.1e}, at most {:.1e}",
+                rounding.largest,
+                rounding.worst()
             )
         })
     }

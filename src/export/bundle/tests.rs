@@ -5,7 +5,7 @@ use std::fs;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
-    BundleError, BundleFormat, BundlePrecision, FoldError,
+    BundleError, BundleFormat, BundlePrecision, FoldError, c99,
     exact::decode_exactly,
     export_bundle,
     exported_network::ExportedNetwork,
@@ -14,7 +14,8 @@ use super::{
     meaning::Meaning,
     numpy, onnx,
     portable::Portable,
-    vectors::Vectors,
+    taking::Taking,
+    vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };
 use crate::{
@@ -27,6 +28,10 @@ use crate::{
 
 /// A network of a small array, hardly trained.
 fn trained(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -> NetworkFile {
+    run_of(trained_settings(rows, quantity, scaling, noise))
+}
+
+fn trained_settings(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -> SimulatedSettings {
     let mut settings = SimulatedSettings::default();
     settings.source.sensor = crate::sensor::SensorModel::new("3x2_2x6".parse().unwrap());
     settings.source.samples = 90;
@@ -37,6 +42,10 @@ fn trained(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -
     settings.inputs = InputChoice { quantity, scaling };
     settings.hidden = 4;
     settings.training.stopping.epochs = 4;
+    settings
+}
+
+fn run_of(settings: SimulatedSettings) -> NetworkFile {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     NetworkFile::from_run(&run).unwrap()
@@ -64,7 +73,7 @@ fn networks() -> Vec<(String, NetworkFile)> {
 fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
     for (name, file) in networks() {
         let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, |_, ohm| Arithmetic::SINGLE.rest.round(ohm)).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, Taking::Single).unwrap();
         assert!(
             vectors.program_deviation < 1e-11,
             "{name}: {}",
@@ -76,7 +85,9 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
             (Arithmetic::SINGLE, 2e-3),
         ] {
             let weights = Weights::of(&portable, arithmetic);
-            let deviation = vectors.deviation(|vector| weights.decode(vector.network, &vector.readings));
+            let deviation = vectors
+                .deviation(|vector| weights.decode(vector.network, &vector.taken))
+                .of_arithmetic;
             assert!(deviation < limit, "{name}, {arithmetic:?}: {deviation}");
         }
         assert_eq!(portable.takes_row(), name.ends_with("known"), "{name}");
@@ -87,7 +98,7 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
 fn coordinates_that_did_not_vary_come_out_exactly() {
     for (name, file) in networks() {
         let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, |_, ohm| ohm).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, Taking::Double).unwrap();
         for vector in vectors.all() {
             let outputs = file.network.at(vector.network).outputs();
             for coordinate in 0..portable.outputs {
@@ -102,16 +113,16 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
 fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invalid() {
     for (name, file) in networks() {
         let portable = Portable::of((&file).into()).unwrap();
-        for (precision, arithmetic, limit) in [
-            (BundlePrecision::Double, Arithmetic::DOUBLE, 1e-12),
-            (BundlePrecision::Single, Arithmetic::MIXED, 2e-5),
+        for (precision, arithmetic, taking, limit) in [
+            (BundlePrecision::Double, Arithmetic::DOUBLE, Taking::Double, 1e-12),
+            (BundlePrecision::Single, Arithmetic::MIXED, Taking::Single, 2e-5),
         ] {
-            let vectors = Vectors::of((&file).into(), &portable, |_, ohm| arithmetic.rest.round(ohm)).unwrap();
+            let vectors = Vectors::of((&file).into(), &portable, taking).unwrap();
             let metadata = ExportedNetwork::from(&file).metadata(&portable, precision);
-            let bytes = onnx::write(&portable, &Weights::of(&portable, arithmetic), &metadata);
+            let bytes = onnx::write(&portable, &Weights::of(&portable, arithmetic), &metadata, &[]);
             let graph = onnx::OnnxGraph::read(&bytes).unwrap();
             let mut answers = graph.decode(vectors.all()).unwrap().answers.into_iter();
-            let deviation = vectors.deviation(|_| answers.next().unwrap());
+            let deviation = vectors.deviation(|_| answers.next().unwrap()).of_arithmetic;
             assert!(deviation < limit, "{name}, {precision}: {deviation}");
 
             let mut odd = vectors.golden()[..4].to_vec();
@@ -326,4 +337,173 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name());
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
+}
+
+/// The truth is `decode` of this program on readings in double precision, which no caller of a bundle in single precision
+/// can give to it.
+#[test]
+fn single_precision_is_judged_by_the_readings_that_a_caller_has() {
+    let home = tempfile::tempdir().unwrap();
+    let mut refused = 0;
+    for (index, noise) in [0.0, 1e-6, 1e-4, 1e-2].into_iter().enumerate() {
+        let file = trained(Rows::Known, Quantity::Conductance, ScalingChoice::Whitening, noise);
+        let portable = Portable::of((&file).into()).unwrap();
+        let vectors = Vectors::of((&file).into(), &portable, Taking::Single).unwrap();
+        let weights = Weights::of(&portable, Arithmetic::MIXED);
+        let mut largest = 0.0_f64;
+        for vector in vectors.all() {
+            let readings = ndarray::ArrayView2::from_shape((1, vector.readings.len()), &vector.readings).unwrap();
+            assert!(vector.readings.iter().any(|&ohm| f64::from(ohm as f32) != ohm));
+            let truth = file.network.at(vector.network).decouple(readings);
+            let rounded: Vec<f64> = vector.readings.iter().map(|&ohm| f64::from(ohm as f32)).collect();
+            let answers = weights.decode(vector.network, &rounded);
+            for ((answer, truth), scale) in answers.iter().zip(&truth).zip(&portable.scales) {
+                largest = largest.max((answer - truth).abs() / scale);
+            }
+        }
+        let path = home.path().join(format!("bundle {index}"));
+        match export_bundle(&file, BundleFormat::Onnx, BundlePrecision::Single, &path) {
+            Ok(report) => {
+                assert!(
+                    (report.deviation() / largest - 1.0).abs() < 0.5,
+                    "{noise}: {report:?} {largest}"
+                );
+                assert!(
+                    report.limit >= largest && largest < 0.011,
+                    "{noise}: {report:?} {largest}"
+                );
+                let is_noted = report
+                    .remarks
+                    .iter()
+                    .any(|remark| remark.contains("rounding the readings"));
+                let readme = fs::read_to_string(path.join("README.txt")).unwrap();
+                let readme = readme.split_whitespace().collect::<Vec<_>>().join(" ");
+                assert!(is_noted || largest < 1e-5, "{noise}: {report:?}");
+                assert_eq!(readme.contains("Note: rounding the readings"), is_noted);
+                let metadata = fs::read_to_string(path.join("metadata.json")).unwrap();
+                let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+                let found = metadata["change_by_rounding_readings"]["largest"].as_f64().unwrap();
+                assert!(found > 0.0 && found <= report.limit, "{metadata}");
+                // Golden vectors are readings that a caller has.
+                let golden = fs::read_to_string(path.join("golden.csv")).unwrap();
+                let last = golden.lines().last().unwrap();
+                let ohm: f64 = last.split(',').nth(1).unwrap().parse().unwrap();
+                assert!(f64::from(ohm as f32) != ohm, "{last}");
+            }
+            Err(error) => {
+                refused += 1;
+                let message = error.to_string();
+                assert!(
+                    matches!(error, BundleError::Unresolved { .. }) && largest > 0.009,
+                    "{message} {largest}"
+                );
+                assert!(
+                    message.contains(" mm") && message.contains("--precision f64"),
+                    "{message}"
+                );
+                assert!(!path.exists());
+            }
+        }
+    }
+    assert!((1..4).contains(&refused), "{refused}");
+}
+
+/// A converter of 2 bits leaves channels that never vary: no whole number of a fine unit is within their limits.
+#[test]
+fn channels_that_never_varied_leave_in_whole_numbers() {
+    let home = tempfile::tempdir().unwrap();
+    let mut settings = trained_settings(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 0.0);
+    settings.source.scene.noise.converter_bits = Some(2);
+    let file = run_of(settings);
+    let report = export_bundle(
+        &file,
+        BundleFormat::C99,
+        BundlePrecision::Fixed16,
+        &home.path().join("bundle"),
+    )
+    .unwrap();
+    assert!(report.vectors.golden >= 3, "{report:?}");
+    assert!(report.deviation() <= report.limit, "{report:?}");
+}
+
+/// Answers of a bundle in C to readings, or `None` for a status that is not 0. `None` of all without a compiler.
+fn answers_in_c(folder: &std::path::Path, name: &str, readings: &[Vec<f64>]) -> Option<Vec<Option<Vec<f64>>>> {
+    let upper = name.to_uppercase();
+    let lines: Vec<String> = readings
+        .iter()
+        .map(|row| row.iter().map(|reading| format!("{reading:e},")).collect())
+        .map(|row: String| format!("{{{row}}},"))
+        .collect();
+    let main = format!(
+        "#include \"{name}_decode.h\"\n#include <stdio.h>\nstatic const double readings[{count}][{upper}_CHANNELS] = {{{rows}}};\n\
+         int main(void)\n{{\n    for (int v = 0; v < {count}; ++v) {{\n        float taken[{upper}_CHANNELS], out[{upper}_OUTPUTS];\n\
+         for (int i = 0; i < {upper}_CHANNELS; ++i) taken[i] = (float)readings[v][i];\n\
+         int status = {name}_decode(taken, out);\n printf(\"%d\", status);\n\
+         for (int k = 0; k < {upper}_OUTPUTS && status == 0; ++k) printf(\" %.9g\", (double)out[k]);\n puts(\"\");\n    }}\n\
+         return 0;\n}}\n",
+        count = readings.len(),
+        rows = lines.concat(),
+    );
+    fs::write(folder.join("main.c"), main).unwrap();
+    let compiled = std::process::Command::new("cc")
+        .args(["-std=c99", "-O2", "-o", "main", "main.c"])
+        .args([&format!("{name}_decode.c"), "-lm"])
+        .current_dir(folder)
+        .output()
+        .ok()?;
+    assert!(
+        compiled.status.success(),
+        "{}",
+        String::from_utf8_lossy(&compiled.stderr)
+    );
+    let output = std::process::Command::new(folder.join("main")).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let answer = |line: &str| {
+        let mut words = line.split(' ');
+        (words.next() == Some("0")).then(|| words.map(|word| word.parse().unwrap()).collect())
+    };
+    Some(text.lines().map(answer).collect())
+}
+
+#[test]
+fn c_answers_extreme_readings_with_numbers_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3);
+    let mut own = own_data(&Portable::of((&file).into()).unwrap());
+    // Limits beyond the largest number of single precision.
+    for limits in &mut own.networks[0].range.as_mut().unwrap().limits {
+        *limits = (-3.9e38, 3.9e38);
+    }
+    let vectors = Vectors::of((&file).into(), &own, Taking::Single).unwrap();
+    let limits = Deviation {
+        total: 1.0,
+        of_arithmetic: 1.0,
+    };
+    let weights = Weights::of(&own, Arithmetic::SINGLE);
+    for (name, text) in c99::write_floating("odd", &own, &weights, vectors.golden(), limits, &[]) {
+        assert!(!text.contains("inf"), "{name}");
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let sizes = [1e38, -1e38, 3.4e38, -3.4e38, 0.0, 1.0, f64::from(f32::MIN_POSITIVE)];
+    let readings: Vec<Vec<f64>> = (0..400)
+        .map(|_| {
+            (0..own.channels)
+                .map(|_| sizes[rng.random_range(0..sizes.len())])
+                .collect()
+        })
+        .collect();
+    let Some(answers) = answers_in_c(folder.path(), "odd", &readings) else {
+        return;
+    };
+    let decoded: Vec<_> = answers.iter().flatten().collect();
+    assert!(
+        decoded.iter().all(|row| row.iter().all(|answer| answer.is_finite())),
+        "{decoded:?}"
+    );
+    assert!(
+        !decoded.is_empty() && decoded.len() < answers.len(),
+        "{}",
+        decoded.len()
+    );
 }

@@ -2,7 +2,9 @@ use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
     exported_network::ExportedNetwork,
+    meaning::Meaning,
     portable::Portable,
+    taking::{ReadingRounding, Taking},
 };
 
 /// Readings with the answers that the network gives to them.
@@ -14,6 +16,10 @@ pub(super) struct Vectors {
     golden: usize,
     /// Growth of rounding errors in the worst of them.
     pub(super) growth: Growth,
+    /// Changes of the answers by rounding the readings to the form that the bundle takes.
+    pub(super) rounding: ReadingRounding,
+    /// The bound of [`Self::rounding`] if a constant in the middle of each channel had been subtracted from the readings.
+    centred_bound: f64,
     /// Largest deviation of `decode` of this program from the exact answers.
     pub(super) program_deviation: f64,
     /// [`Portable::scales`].
@@ -25,19 +31,34 @@ pub(super) struct Vectors {
 pub(super) struct Vector {
     /// Index of the network, and so of the row-wire where that is an argument.
     pub(super) network: usize,
+    /// As a caller has them, in double precision.
     pub(super) readings: Vec<f64>,
+    /// The readings in the form that the bundle takes.
+    pub(super) taken: Vec<f64>,
+    /// Exact answers to the readings.
     pub(super) answers: Vec<f64>,
+    /// Exact answers to the readings as taken.
+    pub(super) answers_to_taken: Vec<f64>,
+}
+
+/// Largest differences of an evaluation, relative to the scales of the outputs. NaN if an answer is NaN.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Deviation {
+    /// From the answers of the network to the readings that a caller has.
+    pub(super) total: f64,
+    /// From the answers of the network to the readings as taken: by the arithmetic alone.
+    pub(super) of_arithmetic: f64,
 }
 
 impl Vectors {
-    /// Draws readings and answers them. `representable` gives the nearest reading of a channel that the bundle can take.
+    /// Draws readings and answers them.
     ///
     /// # Errors
-    /// No readings could be drawn.
+    /// No readings could be drawn, or the bundle cannot take one of them.
     pub(super) fn of(
         exported: ExportedNetwork<'_>,
         portable: &Portable,
-        representable: impl Fn(usize, f64) -> f64,
+        taking: Taking<'_>,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
         for (index, network) in portable.networks.iter().enumerate() {
@@ -48,42 +69,73 @@ impl Vectors {
             }
         }
         let (golden, drawn) = exported.draw(portable)?;
-        let golden = readings.len() + golden;
+        let mut vectors = Self {
+            all: Vec::new(),
+            golden: readings.len() + golden,
+            growth: Growth::default(),
+            rounding: ReadingRounding::default(),
+            centred_bound: 0.0,
+            program_deviation: 0.0,
+            scales: portable.scales.clone(),
+        };
         readings.extend(drawn);
-        let mut growth = Growth::default();
-        let mut program_deviation = 0.0_f64;
-        let mut all = Vec::new();
-        for (network, readings) in readings {
-            let readings = readings.into_iter().enumerate();
-            let readings: Vec<f64> = readings
-                .map(|(channel, reading)| representable(channel, reading))
+        for (index, readings) in readings {
+            let channels = readings.iter().enumerate();
+            let taken: Vec<f64> = (channels.clone())
+                .map(|(channel, &reading)| taking.rounded(channel, reading))
                 .collect();
-            let exact = decode_exactly(portable, &portable.networks[network], &readings);
-            growth = growth.largest(exact.growth);
+            let refused = taken.iter().position(|&reading| !portable.quantity.accepts(reading));
+            if let Some(channel) = refused {
+                let (channel, reading) = (portable.meaning.inputs()[channel].name.clone(), readings[channel]);
+                return Err(BundleError::ReadingBeyond { channel, reading });
+            }
+            let errors: Vec<f64> = channels
+                .map(|(channel, &reading)| taking.error(channel, reading))
+                .collect();
+            let network = &portable.networks[index];
+            let exact = decode_exactly(portable, network, &readings);
+            let of_taken = if taken == readings {
+                exact.clone()
+            } else {
+                decode_exactly(portable, network, &taken)
+            };
+            vectors.growth = vectors.growth.largest(of_taken.growth);
+            let bound = exact.change_by(portable, network, &readings, &errors);
+            if let Some(range) = &network.range {
+                let errors: Vec<f64> = (range.limits.iter().enumerate())
+                    .map(|(channel, &(low, high))| taking.error(channel, 0.5 * (high - low)))
+                    .collect();
+                let bound = exact.change_by(portable, network, &readings, &errors);
+                vectors.centred_bound = larger(vectors.centred_bound, bound);
+            } else {
+                vectors.centred_bound = f64::INFINITY;
+            }
             let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);
             let of_program = exported
                 .networks()
-                .at(network)
+                .at(index)
                 .decouple(row.expect("one row of readings"));
-            let of_program = relative(
-                &of_program.into_raw_vec_and_offset().0,
-                &exact.answers,
-                &portable.scales,
+            let of_program = of_program.into_raw_vec_and_offset().0;
+            vectors.rounding = ReadingRounding {
+                largest: larger(
+                    vectors.rounding.largest,
+                    relative(&of_taken.answers, &exact.answers, &vectors.scales),
+                ),
+                bound: larger(vectors.rounding.bound, bound),
+            };
+            vectors.program_deviation = larger(
+                vectors.program_deviation,
+                relative(&of_program, &exact.answers, &vectors.scales),
             );
-            program_deviation = program_deviation.max(of_program);
-            all.push(Vector {
-                network,
+            vectors.all.push(Vector {
+                network: index,
                 readings,
+                taken,
                 answers: exact.answers,
+                answers_to_taken: of_taken.answers,
             });
         }
-        Ok(Self {
-            all,
-            golden,
-            growth,
-            program_deviation,
-            scales: portable.scales.clone(),
-        })
+        Ok(vectors)
     }
 
     /// Leaves out the vectors with a reading that counts as outside the range of training.
@@ -102,6 +154,26 @@ impl Vectors {
         self
     }
 
+    /// Advice for a bundle in single precision that changes too much by rounding readings to it.
+    pub(super) fn cure(&self, portable: &Portable) -> String {
+        /// Part of the change that may be left.
+        const WORTHWHILE: f64 = 0.1;
+        let subtracted = match portable.meaning {
+            Meaning::Own { .. } => self.centred_bound < WORTHWHILE * self.rounding.bound,
+            Meaning::Array(_) => false,
+        };
+        if subtracted {
+            "give --precision f64, or subtract a constant from each input before training, because the readings vary little \
+             in proportion to their size"
+                .to_owned()
+        } else {
+            format!(
+                "give --precision f64, or {} for a network that amplifies less",
+                portable.meaning.smaller_weights()
+            )
+        }
+    }
+
     pub(super) fn all(&self) -> &[Vector] {
         &self.all
     }
@@ -111,17 +183,22 @@ impl Vectors {
         &self.all[..self.golden]
     }
 
-    /// Largest difference of `decode` from the answers, relative to the scale of the output. NaN if an answer is none.
-    pub(super) fn deviation(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> f64 {
-        let deviations = self
-            .all
-            .iter()
-            .map(|vector| relative(&decode(vector), &vector.answers, &self.scales));
-        deviations.fold(0.0, larger)
+    /// Largest differences of `decode`, which is to decode the readings as taken.
+    pub(super) fn deviation(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> Deviation {
+        self.all.iter().fold(Deviation::default(), |largest, vector| {
+            let answers = decode(vector);
+            Deviation {
+                total: larger(largest.total, relative(&answers, &vector.answers, &self.scales)),
+                of_arithmetic: larger(
+                    largest.of_arithmetic,
+                    relative(&answers, &vector.answers_to_taken, &self.scales),
+                ),
+            }
+        })
     }
 }
 
-/// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is none.
+/// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is NaN.
 fn relative(answers: &[f64], expected: &[f64], scales: &[f64]) -> f64 {
     assert_eq!(answers.len(), expected.len());
     let pairs = answers.iter().zip(expected).zip(scales);

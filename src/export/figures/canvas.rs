@@ -6,6 +6,7 @@ use super::{
     colours::{INK, Rgb},
     picture::Picture,
 };
+use crate::import::clean_name::is_unprintable;
 
 /// Size of all text, in points.
 pub(super) const TEXT: f64 = 8.0;
@@ -279,5 +280,7 @@ fn stroke_style(stroke: Stroke) -> String {
 }
 
 pub(super) fn escaped(text: &str) -> String {
+    // XML has no control characters, not even escaped.
+    let text = text.replace(is_unprintable, " ");
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

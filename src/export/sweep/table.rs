@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::merging::MergedSweep;
+use crate::import::clean_name::inert;
 
 /// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +46,7 @@ fn write_csv(merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
     table.write_record(columns.iter().map(|column| column.heading()))?;
     for cells in &rows {
         let cell = |column| cells.get(column).map_or("", String::as_str);
-        table.write_record(columns.iter().map(|&column| cell(column)))?;
+        table.write_record(columns.iter().map(|&column| inert(cell(column))))?;
     }
     table.flush()
 }

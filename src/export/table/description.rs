@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use crate::export::format_number;
+use crate::{export::format_number, import::clean_name::inert};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -69,6 +69,14 @@ impl Cell {
         }
     }
 
+    /// Returns [`Self::exact`], so that no spreadsheet takes words for a formula.
+    pub(super) fn for_spreadsheet(&self) -> String {
+        match self {
+            Self::Text(text) => inert(text),
+            Self::Count(_) | Self::Number(_) => self.exact(),
+        }
+    }
+
     /// Returns the cell with every digit, empty where there is no number.
     pub fn exact(&self) -> String {
         match self {
@@ -133,10 +141,10 @@ impl Table {
     /// # Errors
     /// Any error of `writer`.
     pub fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let fields = self.columns.iter().map(|column| quoted(&column.field));
+        let fields = self.columns.iter().map(|column| quoted(&inert(&column.field)));
         writeln!(writer, "{}", fields.collect::<Vec<_>>().join(","))?;
         for row in &self.rows {
-            let cells = row.iter().map(|cell| quoted(&cell.exact()));
+            let cells = row.iter().map(|cell| quoted(&cell.for_spreadsheet()));
             writeln!(writer, "{}", cells.collect::<Vec<_>>().join(","))?;
         }
         Ok(())

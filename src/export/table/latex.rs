@@ -1,6 +1,7 @@
 //! Tables in LaTeX, with the rules of `booktabs` and the numeric columns of `siunitx`.
 
 use super::{Cell, Table};
+use crate::import::clean_name::begins_formula;
 
 pub(super) fn latex(table: &Table) -> String {
     let columns = 0..table.columns.len();
@@ -82,6 +83,10 @@ impl NumberWidth {
 /// Escapes what LaTeX would take for a command.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
+    // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
+    if text.starts_with(['[', '*']) || begins_formula(text) {
+        escaped += "{}";
+    }
     for letter in text.chars() {
         match letter {
             '\\' => escaped += "\\textbackslash{}",

@@ -1,6 +1,7 @@
 use std::fmt;
 
 use super::{Cell, Table, latex::latex};
+use crate::import::clean_name::inert;
 
 /// Form in which a table is copied into other documents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,9 +54,14 @@ impl Table {
         // A tab or line break inside a cell would begin another.
         let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
         let line = |cells: Vec<String>| cells.join("\t") + "\n";
-        let mut text = line(self.columns.iter().map(|column| plain(column.title())).collect());
+        let mut text = line(
+            self.columns
+                .iter()
+                .map(|column| plain(inert(&column.title())))
+                .collect(),
+        );
         for row in &self.rows {
-            text += &line(row.iter().map(|cell: &Cell| plain(cell.exact())).collect());
+            text += &line(row.iter().map(|cell: &Cell| plain(cell.for_spreadsheet())).collect());
         }
         text
     }
@@ -133,5 +139,30 @@ mod tests {
                         \\bottomrule\n\
                         \\end{tabular}\n";
         assert_eq!(table().text(TableForm::Latex), expected);
+    }
+
+    /// Read back as a spreadsheet reads them.
+    #[test]
+    fn names_are_no_formulas_and_numbers_stay_numbers() {
+        let names = ["=1+2", "+a", "-b", "@c", "-0.5", "plain"];
+        let table = Table {
+            columns: vec![TableColumn::new("=x", "=x", ""), TableColumn::new("z", "Z", "")],
+            rows: names.iter().map(|&name| vec![name.into(), Cell::from(-0.5)]).collect(),
+        };
+        let mut written = Vec::new();
+        table.write_csv(&mut written).unwrap();
+        let tabbed = table.text(TableForm::TabSeparated);
+        for (separator, text) in [(b',', written.as_slice()), (b'\t', tabbed.as_bytes())] {
+            let mut reader = csv::ReaderBuilder::new().delimiter(separator).from_reader(text);
+            assert_eq!(&reader.headers().unwrap()[0], "'=x");
+            let read: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+            for (record, name) in read.iter().zip(names) {
+                let is_plain = matches!(name, "plain" | "-0.5");
+                let expected = if is_plain { name.to_owned() } else { format!("'{name}") };
+                assert_eq!((&record[0], &record[1]), (expected.as_str(), "-0.5"));
+            }
+        }
+        let latex = table.text(TableForm::Latex);
+        assert!(latex.contains("\n{}=1+2 & ") && latex.contains("& -0.5"), "{latex}");
     }
 }

@@ -4,7 +4,7 @@ use std::{
     process::{Command, Output},
 };
 
-use crate::export::bundle::error::BundleError;
+use crate::export::bundle::{error::BundleError, vectors::Deviation};
 
 const COMPILER: &str = "cc";
 /// The flags under which the source has no warning.
@@ -21,8 +21,8 @@ const FLAGS: [&str; 7] = [
 /// Outcome of compiling and running a self-test.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::export::bundle) enum Compiled {
-    /// Largest deviation of the golden vectors, relative to the range of the outputs.
-    Ran { deviation: f64 },
+    /// Largest deviations of the golden vectors, relative to the range of the outputs.
+    Ran { deviation: Deviation },
     /// Not compiled, and why.
     NoCompiler(&'static str),
 }
@@ -58,10 +58,15 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
     let output = Command::new(&program).output();
     let output = output.map_err(|error| failed("the self-test of the C source", error.to_string()))?;
     let text = first_lines(&output.stdout);
-    let deviation = text
-        .split("largest deviation: ")
-        .nth(1)
-        .and_then(|rest| rest.split(' ').next()?.parse().ok());
+    let printed = |name: &str| -> Option<f64> {
+        let (_, rest) = text.split_once(name)?;
+        rest.split([' ', ',']).next()?.parse().ok()
+    };
+    let total = printed("largest deviation: ");
+    let deviation = total.map(|total| Deviation {
+        total,
+        of_arithmetic: printed("by arithmetic: ").unwrap_or(total),
+    });
     match deviation {
         Some(deviation) if output.status.success() => Ok(Compiled::Ran { deviation }),
         _ => Err(failed("the self-test of the C source", text)),

@@ -27,6 +27,7 @@ pub(super) fn header<'a>(
         coordinates: outputs(portable),
         units,
         definitions,
+        notes: &[],
     }
 }
 

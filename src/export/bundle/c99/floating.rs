@@ -12,7 +12,12 @@ use crate::{
 };
 
 /// Declarations of the interface in floating point.
-pub(super) fn header<'a>(name: &'a str, portable: &'a Portable, arithmetic: Arithmetic) -> Header<'a> {
+pub(super) fn header<'a>(
+    name: &'a str,
+    portable: &'a Portable,
+    arithmetic: Arithmetic,
+    notes: &'a [String],
+) -> Header<'a> {
     Header {
         name,
         portable,
@@ -25,6 +30,7 @@ pub(super) fn header<'a>(name: &'a str, portable: &'a Portable, arithmetic: Arit
             Meaning::Own { .. } => "",
         },
         definitions: "",
+        notes,
     }
 }
 
@@ -118,6 +124,11 @@ fn push_decode(text: &mut String, header: &Header<'_>, Arithmetic { hidden, rest
          const {wide} change = {change};\n        \
          for (int j = 0; j < HIDDEN; ++j) {{\n            \
          sums[j] += change * hidden_weights[network][i][j];\n        \
+         }}\n    \
+         }}\n    \
+         for (int j = 0; j < HIDDEN; ++j) {{\n        \
+         if (isnan(sums[j])) {{\n            \
+         return {upper}_BAD_READING;\n        \
          }}\n    \
          }}\n    \
          for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        \

@@ -1,7 +1,10 @@
 use std::fmt::Write;
 
 use super::literal::push_array;
-use crate::export::bundle::{meaning::Meaning, portable::Portable};
+use crate::export::bundle::{
+    meaning::{Meaning, comment, wrapped},
+    portable::Portable,
+};
 
 /// Names and types that the header, source and self-test of a bundle in C have in common.
 pub(super) struct Header<'a> {
@@ -18,6 +21,8 @@ pub(super) struct Header<'a> {
     pub(super) units: &'a str,
     /// Definitions of units.
     pub(super) definitions: &'a str,
+    /// Remarks on the precision.
+    pub(super) notes: &'a [String],
 }
 
 impl Header<'_> {
@@ -74,19 +79,26 @@ impl Header<'_> {
         )
     }
 
+    fn note_lines(&self) -> impl Iterator<Item = String> {
+        let note = |note: &String| wrapped(&comment(&format!("Note: {note}.")));
+        self.notes.iter().flat_map(note)
+    }
+
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
         let (upper, portable) = (self.upper(), self.portable);
         let mut text = match &portable.meaning {
             Meaning::Array(_) => format!(
                 "/* Decodes the readings of one row-wire of a tactile array into the coordinates of its nodes.\n   \
-                 {units} Channels are r_1 to r_{channels}; outputs are x_1, y_1, z_1, x_2, ... */\n",
+                 {units} Channels are r_1 to r_{channels}; outputs are x_1, y_1, z_1, x_2, ...{notes} */\n",
                 units = self.units,
                 channels = portable.channels,
+                notes = self.note_lines().map(|line| format!("\n   {line}")).collect::<String>(),
             ),
             own @ Meaning::Own { .. } => {
                 let mut lines = own.legend();
                 lines.extend(self.units.lines().map(|line| line.trim_start().to_owned()));
+                lines.extend(self.note_lines());
                 format!("/* Decodes readings into targets.\n   {} */\n", lines.join("\n   "))
             }
         };
@@ -115,10 +127,16 @@ impl Header<'_> {
         let _ = write!(
             text,
             "/* Decodes {one}.{row} Returns {upper}_OK, or leaves the {coordinates} as they are and returns\n   \
-             what is wrong. */\n{};\n\n",
+             what is wrong.{overflow} */\n{};\n\n",
             self.decode_signature(),
             one = portable.meaning.sample(),
             coordinates = portable.meaning.output().to_owned() + "s",
+            overflow = match self.reading {
+                "int32_t" => String::new(),
+                _ => format!(
+                    " Readings so extreme that the sums overflow and leave no answer\n   give {upper}_BAD_READING."
+                ),
+            },
         );
         if portable.ranges().is_some() {
             let _ = write!(

@@ -10,11 +10,11 @@ pub(super) fn type_name(digits: Digits) -> &'static str {
     }
 }
 
-/// A number as C reads it back to the same bits.
+/// A number as C reads it back to the same bits; one beyond the largest that `digits` can have is this.
 pub(super) fn number(digits: Digits, value: f64) -> String {
     match digits {
-        Digits::Single => format!("{:e}f", value as f32),
-        Digits::Double => format!("{value:e}"),
+        Digits::Single => format!("{:e}f", (value as f32).clamp(f32::MIN, f32::MAX)),
+        Digits::Double => format!("{:e}", value.clamp(f64::MIN, f64::MAX)),
     }
 }
 
@@ -77,6 +77,8 @@ mod tests {
             (number(Digits::Double, 0.1), "1e-1"),
             (number(Digits::Double, -1.0 / 3.0), "-3.333333333333333e-1"),
             (number(Digits::Single, f64::from(0.1_f32)), "1e-1f"),
+            (number(Digits::Single, -1e39), "-3.4028235e38f"),
+            (number(Digits::Double, f64::INFINITY), "1.7976931348623157e308"),
             (long(-5), "INT64_C(-5)"),
         ];
         for (literal, expected) in cases {

@@ -7,8 +7,16 @@ mod header;
 mod literal;
 mod selftest;
 
-use self::{header::Header, selftest::SelfTest};
-use super::{fixed_point::FixedNetworks, portable::Portable, vectors::Vector, weights::Weights};
+use self::{
+    header::Header,
+    selftest::{SelfTest, WholeNumbers},
+};
+use super::{
+    fixed_point::FixedNetworks,
+    portable::Portable,
+    vectors::{Deviation, Vector},
+    weights::Weights,
+};
 
 pub(super) use self::{
     compiler::{Compiled, run_self_test},
@@ -24,22 +32,17 @@ pub(super) fn write_floating(
     portable: &Portable,
     weights: &Weights,
     vectors: &[Vector],
-    limit: f64,
+    limits: Deviation,
+    notes: &[String],
 ) -> Files {
-    let header = floating::header(name, portable, weights.arithmetic);
-    let digits = weights.arithmetic.rest;
+    let header = floating::header(name, portable, weights.arithmetic, notes);
     let self_test = SelfTest {
         header: &header,
         vectors,
-        units: Vec::new(),
-        limit,
-        bits: None,
+        limits,
+        whole: None,
     };
-    files(
-        &header,
-        floating::source(&header, weights),
-        self_test.text(|_, reading| literal::number(digits, reading)),
-    )
+    files(&header, floating::source(&header, weights), self_test.text())
 }
 
 /// Writes header, source and self-test in whole numbers.
@@ -56,15 +59,19 @@ pub(super) fn write_fixed(
     let self_test = SelfTest {
         header: &header,
         vectors,
-        units: networks.outputs.all().collect(),
-        limit,
-        bits: Some(vectors.iter().flat_map(|vector| bits_of(networks, vector)).collect()),
+        limits: Deviation {
+            total: limit,
+            of_arithmetic: limit,
+        },
+        whole: Some(WholeNumbers {
+            readings_per_one: (0..portable.channels)
+                .map(|channel| networks.readings.per_one(channel))
+                .collect(),
+            units: networks.outputs.all().collect(),
+            bits: vectors.iter().flat_map(|vector| bits_of(networks, vector)).collect(),
+        }),
     };
-    files(
-        &header,
-        fixed::source(&header, networks),
-        self_test.text(|channel, reading| networks.readings.whole(channel, reading).to_string()),
-    )
+    files(&header, fixed::source(&header, networks), self_test.text())
 }
 
 fn bits_of(networks: &FixedNetworks, vector: &Vector) -> Vec<i32> {

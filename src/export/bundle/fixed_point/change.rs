@@ -33,13 +33,18 @@ pub(super) struct Change {
     pub(super) offset: Twofold,
     /// Largest |d| within the limits, at least ½.
     pub(super) span: f64,
-    /// Largest error of d.
+    /// Largest error of d, with that of rounding the reading to a unit.
     error: f64,
 }
 
+/// Largest rounding error of a reading, in units.
+const HALF: f64 = 0.5;
+
 impl Change {
     pub(super) fn of(quantity: Quantity, units: f64, (low, high): (f64, f64), centre_ohm: f64) -> Self {
-        let (low, high) = (low * units, high * units);
+        // Rounding to units takes readings at the limits so much further; of resistances, 1 is the smallest number.
+        let lowest = if quantity == Quantity::Raw { f64::MIN } else { 1.0 };
+        let (low, high) = ((low * units - HALF).max(lowest), high * units + HALF);
         let origin = Twofold::from(centre_ohm) * Twofold::from(units);
         let wide = |centre: f64| (high - centre).max(centre - low).max(0.5);
         match quantity {
@@ -51,7 +56,7 @@ impl Change {
                     slope: unit,
                     offset: (Twofold::from(centre) - origin) * unit,
                     span: wide(centre),
-                    error: 0.0,
+                    error: HALF,
                 }
             }
             Quantity::Conductance => {
@@ -65,7 +70,7 @@ impl Change {
                     offset: ratio - Twofold::from(1.0),
                     span: (span * one).max(0.5),
                     // Division truncates.
-                    error: 1.0,
+                    error: 1.0 + HALF * one * centre / low / low,
                 }
             }
             Quantity::LogResistance => {
@@ -76,7 +81,7 @@ impl Change {
                     slope: Twofold::from(1.0) / Twofold::from(one),
                     offset: Twofold::from(centre / one) - origin.ln(),
                     span: (high.ln() * one - centre).max(centre - low.ln() * one).max(0.5),
-                    error: LogTable::ERROR * one,
+                    error: LogTable::ERROR * one + HALF * one / low,
                 }
             }
         }

@@ -28,7 +28,8 @@ pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
     pub(in crate::export::bundle) tangent: TangentTable,
     pub(in crate::export::bundle) logarithm: LogTable,
-    /// Bound on the error of each output within the limits of the readings, as the network has the output.
+    /// Bound on the error of each output within the limits of the readings, with that of rounding the readings to units,
+    /// as the network has the output.
     pub(in crate::export::bundle) bounds: Vec<f64>,
     /// The largest of them, in proportion to the scale of the output.
     pub(in crate::export::bundle) relative_bound: f64,
@@ -94,7 +95,8 @@ impl FixedNetworks {
             fixed.limits = (range.limits.iter().enumerate())
                 .map(|(channel, &(low, high))| {
                     let units = readings.per_one(channel);
-                    ((low * units).ceil() as i32, (high * units).floor() as i32)
+                    // Rounded as readings are, so that none within the limits is outside.
+                    ((low * units).round() as i32, (high * units).round() as i32)
                 })
                 .collect();
             let of_network = fixed.round(network, &changes, &outputs, hidden_width, tangent_error);

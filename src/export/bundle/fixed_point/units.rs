@@ -58,7 +58,7 @@ impl Units {
     }
 
     /// Number of units in 1.
-    pub(super) fn per_one(&self, index: usize) -> f64 {
+    pub(in crate::export::bundle) fn per_one(&self, index: usize) -> f64 {
         ten_to(self.decimals[index])
     }
 

@@ -40,7 +40,8 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
     if let Some(ranges) = portable.ranges() {
         let limit = |name: &str, pick: fn(&(f64, f64)) -> f64| NamedArray {
             name: name.to_owned(),
-            digits: Digits::Double,
+            // Rounded as readings are, so that none within the limits is outside.
+            digits: rest,
             shape: vec![ranges.len(), channels],
             values: ranges.iter().flat_map(|range| range.limits.iter().map(pick)).collect(),
         };

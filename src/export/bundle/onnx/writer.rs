@@ -21,7 +21,12 @@ const OPSET: i64 = 13;
 const IR_VERSION: i64 = 7;
 
 /// Writes the graph of `weights`.
-pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, metadata: &Metadata) -> Vec<u8> {
+pub(in crate::export::bundle) fn write(
+    portable: &Portable,
+    weights: &Weights,
+    metadata: &Metadata,
+    notes: &[String],
+) -> Vec<u8> {
     let properties = metadata.iter().map(|(key, value)| Property {
         key: key.clone(),
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
@@ -31,21 +36,21 @@ pub(in crate::export::bundle) fn write(portable: &Portable, weights: &Weights, m
     } else {
         "the network"
     };
+    let about = match portable.meaning {
+        Meaning::Array(_) => format!(
+            "Decodes the readings of one row-wire in ohm into the coordinates of its nodes in mm with {row}. Answers are \
+             NaN where a reading or the row is invalid."
+        ),
+        Meaning::Own { .. } => {
+            format!("Decodes readings into targets with {row}. Answers are NaN where a reading or the row is invalid.")
+        }
+    };
+    let notes = notes.iter().map(|note| format!(" Note: {note}."));
     let model = Model {
         ir_version: IR_VERSION,
         producer_name: env!("CARGO_PKG_NAME").to_owned(),
         producer_version: env!("CARGO_PKG_VERSION").to_owned(),
-        doc_string: match portable.meaning {
-            Meaning::Array(_) => format!(
-                "Decodes the readings of one row-wire in ohm into the coordinates of its nodes in mm with {row}. Answers are \
-                 NaN where a reading or the row is invalid."
-            ),
-            Meaning::Own { .. } => {
-                format!(
-                    "Decodes readings into targets with {row}. Answers are NaN where a reading or the row is invalid."
-                )
-            }
-        },
+        doc_string: std::iter::once(about).chain(notes).collect(),
         graph: Some(graph(portable, weights)),
         opset_import: vec![OperatorSet {
             domain: String::new(),
