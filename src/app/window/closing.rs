@@ -28,6 +28,8 @@ pub(super) struct Question {
     lines: Vec<Line>,
     /// Number of lines when the question was first shown.
     height: usize,
+    /// True if something could be saved then: saving is what is suggested.
+    suggests_saving: bool,
 }
 
 #[derive(Debug)]
@@ -82,6 +84,7 @@ impl Question {
         }
         if self.height == 0 {
             self.height = self.lines.len();
+            self.suggests_saving = !self.savings().is_empty();
         }
     }
 
@@ -273,6 +276,8 @@ fn question_ui(ui: &Ui, question: &Question) -> Option<Answer> {
     const MOST_LINES: usize = 8;
     /// Least width of the buttons, in points, so that another name changes no place.
     const BUTTON: f32 = space(34);
+    const SAVE: &str = "Save checkpoints and close…";
+    const STAY: &str = "Stay";
     card_ui(ui, "Close while work is in progress?", |ui| {
         let height = LINE * question.height.min(MOST_LINES) as f32;
         let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
@@ -287,18 +292,26 @@ fn question_ui(ui: &Ui, question: &Question) -> Option<Answer> {
         let savings = question.savings().len();
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let mut answer = None;
-            let save = ui.add_enabled(savings > 0, primary_button("Save checkpoints and close…"));
-            let nothing = "Nothing here can be saved as a checkpoint.";
-            if save.on_disabled_hover_text(nothing).clicked() {
-                answer = Some(Answer::Save);
-            }
+            let suggested = if question.suggests_saving { SAVE } else { STAY };
             let name = if loses { "Discard and close" } else { "Close" };
-            let discard = ghost_button(name).min_size(vec2(BUTTON, space(7)));
-            if ui.add(discard).clicked() {
-                answer = Some(Answer::Discard);
-            }
-            if ui.add(ghost_button("Stay").min_size(vec2(BUTTON, space(7)))).clicked() {
-                answer = Some(Answer::Stay);
+            // From right to left.
+            for (name, is_possible, meaning) in [
+                (SAVE, savings > 0, Answer::Save),
+                (name, true, Answer::Discard),
+                (STAY, true, Answer::Stay),
+            ] {
+                let button = ui.add_enabled_ui(is_possible, |ui| {
+                    let size = vec2(BUTTON, space(7));
+                    if name == suggested {
+                        ui.add(primary_button(name).min_size(size))
+                    } else {
+                        ui.add(ghost_button(name).min_size(size))
+                    }
+                });
+                let nothing = "Nothing here can be saved as a checkpoint.";
+                if button.inner.on_disabled_hover_text(nothing).clicked() {
+                    answer = Some(meaning);
+                }
             }
             answer
         })
