@@ -221,7 +221,7 @@ fn each_joined_recording_has_a_test_file_and_no_more_are_taken() {
     let third = file("c.csv", "1,2\n");
     choose_test_file(&mut driver, &third);
     assert!(driver.says("close those files first"), "{:#?}", driver.texts());
-    assert!(driver.has("Test: 30") && !driver.says("c.csv"));
+    assert!(driver.has("Test: 30") && !driver.says("c.csv, for the test"));
 }
 
 #[test]

@@ -24,7 +24,7 @@ const HEADINGS: [(&str, f32); 6] = [
     ("meaning", space(26)),
     ("unit", space(15)),
     ("values", space(22)),
-    ("from – to", space(44)),
+    ("from – to", space(48)),
     ("missing", space(15)),
 ];
 /// Headings of figures, which stand at the right.
