@@ -357,7 +357,7 @@ fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error(
         (format!("{names}\n"), "no line could be decoded"),
         (
             "hello\n1,2\n".to_owned(),
-            "no line could be decoded: line 1: 1 columns where 7",
+            "no line could be decoded: line 1: 1 columns where 6",
         ),
     ] {
         fs::write(folder.path().join("bad.csv"), &text).unwrap();

@@ -207,6 +207,12 @@ fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
             (found, cause) => assert_eq!(found, cause, "{text}"),
         }
         source.set_fault(None).unwrap();
+        // Wires that touch are forgotten once their readings differ, and these two are far from the press at first.
+        if cause == FaultCause::Shorted {
+            let found = events(&mut source, 400);
+            assert!(matches!(found[..], [(_, FaultEvent::Recovered)]), "{text}: {found:?}");
+            continue;
+        }
         let found = events(&mut source, 5);
         assert_eq!(
             found,

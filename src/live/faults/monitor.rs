@@ -156,7 +156,12 @@ impl FaultMonitor {
         }
         if is_explained {
             self.suspicious = 0;
-            let is_shorted = |named: Diagnosis| named.cause == FaultCause::Shorted && self.shorts.are_equal(named.wire);
+            // Eq. (2) may explain rows that touch, but seldom columns.
+            let is_shorted = |named: Diagnosis| {
+                matches!(named.wire, FaultyWire::Rows(_))
+                    && named.cause == FaultCause::Shorted
+                    && self.shorts.are_equal(named.wire)
+            };
             if self.named().is_some_and(is_shorted) {
                 self.sound = 0;
                 return None;
