@@ -18,6 +18,7 @@ use super::{job::Wake, shared::View};
 
 pub use identifiability::{Analysis, Question};
 pub use trade_off::{TradeOffEnding, TradeOffPlan};
+pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult};
 
 use self::{

@@ -11,6 +11,7 @@ use crate::{
         test_view::HeightScale,
         theme,
         training_worker::{Inspection, LOST, Request, Worker},
+        views::CHECKPOINT,
     },
     evaluation::SimulatedSettings,
     figure::SequentialMap,

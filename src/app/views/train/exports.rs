@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// A saved training to go on from.
-const CHECKPOINT: FileWords = FileWords {
+pub const CHECKPOINT: FileWords = FileWords {
     kind: "checkpoint",
     description: "The training as it stands, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
                   --resume), it gives bit-identical results.",

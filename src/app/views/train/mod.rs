@@ -19,4 +19,5 @@ mod workbench;
 
 pub use bottom_tab::BottomTab;
 pub use decoders::DecoderResult;
+pub use exports::CHECKPOINT;
 pub use state::TrainView;
