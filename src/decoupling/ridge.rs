@@ -13,8 +13,8 @@ use crate::network::ScalingError;
 /// without penalty, plus U t Uᵀ(y − ȳ) and Σ t u²: where the map goes through every sample and both vanish, they do so
 /// with all their digits.
 ///
-/// A sample may stand for several with the same inputs, y being their mean output. Its row of A and of y is then multiplied by
-/// the root of their number, and the error is that of leaving out all of them at once.
+/// A sample may stand for several copies. Its row of A and of y is then multiplied by the root of their number, and the error is
+/// that of leaving out all of them at once.
 pub(super) struct Ridge {
     x_mean: Vec<f64>,
     y_mean: Vec<f64>,
