@@ -13,8 +13,8 @@ use crate::network::ScalingError;
 /// without penalty, plus U t Uᵀ(y − ȳ) and Σ t u²: where the map goes through every sample and both vanish, they do so
 /// with all their digits.
 ///
-/// A sample may stand for several with the same inputs, y being their mean output. Its row of A and of y is then multiplied by
-/// the root of their number, and the error is that of leaving out all of them at once.
+/// A sample may stand for several copies. Its row of A and of y is then multiplied by the root of their number, and the error is
+/// that of leaving out all of them at once.
 pub(super) struct Ridge {
     x_mean: Vec<f64>,
     y_mean: Vec<f64>,
@@ -185,17 +185,21 @@ impl Ridge {
             ..
         } = &self.left_out;
         let (kept, outputs) = self.projected.shape();
-        let taken = Mat::from_fn(kept, outputs, |k, t| {
-            let square = self.singular[k] * self.singular[k];
-            penalties[t] / (square + penalties[t])
-        });
-        let residual = residual + samples * Mat::from_fn(kept, outputs, |k, t| taken[(k, t)] * self.projected[(k, t)]);
-        let answered = |k, t| (1.0 - taken[(k, t)]) * self.projected[(k, t)];
-        let answers = noise * Mat::from_fn(kept, outputs, answered);
-        let leverages = squares * &taken;
+        let taken = |penalty: f64, k: usize| penalty / (self.singular[k] * self.singular[k] + penalty);
+        let lost = Mat::from_fn(kept, outputs, |k, t| taken(penalties[t], k) * self.projected[(k, t)]);
+        let residual = residual + samples * &lost;
+        let answers = noise * (&self.projected - &lost);
+        // Leverages depend on the penalty alone.
+        let distinct = if penalties.iter().all(|penalty| *penalty == penalties[0]) {
+            outputs.min(1)
+        } else {
+            outputs
+        };
+        let leverages = squares * Mat::from_fn(kept, distinct, |k, t| taken(penalties[t], k));
         let of_output = |t: usize| {
-            let rows = free.iter().enumerate();
-            let errors = rows.map(|(row, free)| (residual[(row, t)] / (free + leverages[(row, t)])).powi(2));
+            let leverages = leverages.col(t.min(distinct - 1));
+            let rows = free.iter().zip(leverages.iter()).enumerate();
+            let errors = rows.map(|(row, (free, leverage))| (residual[(row, t)] / (free + leverage)).powi(2));
             errors.sum::<f64>() + answers.col(t).squared_norm_l2()
         };
         (0..outputs).map(of_output).collect()

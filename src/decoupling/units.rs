@@ -10,18 +10,18 @@ use crate::{dataset::Dataset, scene::NoiseSource};
 
 /// Training samples gathered into units, each of which is left out as a whole when a fit is validated.
 ///
-/// A unit is a sample with its copies, which all have the same readings: it counts as often as it occurs, but a copy that is
-/// trained on while another is held out would make the validation optimistic. Equal readings are copies
+/// A unit is a sample with its copies, which all have the same readings and targets: it counts as often as it occurs, but a copy
+/// that is trained on while another is held out would make the validation optimistic. Equal samples are copies
 ///
 /// - if they follow each other, as in a recording that holds its values between two conversions;
 /// - wherever they are, if a channel identifies the samples as a measurement with many digits does.
 ///
-/// Equal readings of coarse channels are not copies: that two of a thousand readings of a switch agree is no coincidence, and
-/// each is evidence of its own.
+/// Other equal samples of coarse channels are not copies: that two of a thousand readings of a switch agree is no coincidence,
+/// and each is evidence of its own.
 pub(super) struct Units {
     /// Inputs: units × inputs.
     pub x: Array2<f64>,
-    /// Mean outputs: units × outputs.
+    /// Outputs: units × outputs.
     pub y: Array2<f64>,
     /// Number of samples in each unit.
     pub weights: Vec<f64>,
@@ -45,13 +45,9 @@ impl Units {
             };
         }
         let first: Vec<usize> = members.iter().map(|samples| samples[0]).collect();
-        let mean = |unit: usize, output: usize| {
-            let samples = &members[unit];
-            samples.iter().map(|&sample| y[[sample, output]]).sum::<f64>() / samples.len() as f64
-        };
         Self {
             x: x.select(Axis(0), &first),
-            y: Array2::from_shape_fn((members.len(), y.ncols()), |(unit, output)| mean(unit, output)),
+            y: y.select(Axis(0), &first),
             weights: members.iter().map(|samples| samples.len() as f64).collect(),
         }
     }
@@ -60,16 +56,20 @@ impl Units {
     fn members(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Vec<Vec<usize>> {
         let samples = readings.nrows();
         let singles = || (0..samples).map(|sample| vec![sample]).collect();
-        // The number of the first sample with the same readings, for each.
+        // The number of the first sample that is equal, for each.
         let mut seen = HashMap::new();
-        let first: Vec<usize> = (0..samples)
-            .map(|sample| *seen.entry(bits(readings.row(sample))).or_insert(sample))
+        let pairs = readings.rows().into_iter().zip(targets.rows()).enumerate();
+        let first: Vec<usize> = pairs
+            .map(|(sample, (readings, targets))| {
+                let key = (bits(readings), bits(targets));
+                *seen.entry(key).or_insert(sample)
+            })
             .collect();
         if seen.len() == samples {
             return singles();
         }
         let mut units: Vec<Vec<usize>> = Vec::new();
-        if Self::is_identified(readings, targets) {
+        if seen.len() >= Self::FEWEST && Self::is_identified(readings, seen.len()) {
             let mut unit_of = HashMap::new();
             for (sample, first) in first.into_iter().enumerate() {
                 let unit = *unit_of.entry(first).or_insert(units.len());
@@ -86,13 +86,9 @@ impl Units {
         if units.len() < Self::FEWEST { singles() } else { units }
     }
 
-    /// Returns `true` if a channel has nearly as many distinct values as there are distinct samples.
-    fn is_identified(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> bool {
-        let pairs = readings.rows().into_iter().zip(targets.rows());
-        let distinct: HashSet<_> = pairs
-            .map(|(readings, targets)| (bits(readings), bits(targets)))
-            .collect();
-        let enough = Self::IDENTIFYING * distinct.len() as f64;
+    /// Returns `true` if a channel has nearly as many distinct values as there are `distinct` samples.
+    fn is_identified(readings: ArrayView2<'_, f64>, distinct: usize) -> bool {
+        let enough = Self::IDENTIFYING * distinct as f64;
         let values = |channel: ArrayView1<'_, f64>| bits(channel).into_iter().collect::<HashSet<_>>().len();
         let mut channels = readings.columns().into_iter();
         channels.any(|channel| values(channel) as f64 >= enough)
@@ -232,8 +228,7 @@ mod tests {
     fn sizes(samples: usize, reading: impl Fn(usize) -> [f64; 2], target: impl Fn(usize) -> f64) -> Vec<f64> {
         let readings = Array2::from_shape_fn((samples, 2), |(sample, channel)| reading(sample)[channel]);
         let targets = Array2::from_shape_fn((samples, 1), |(sample, _)| target(sample));
-        let set = Dataset::new(readings.clone(), targets.clone(), None, (0..samples).collect()).unwrap();
-        Units::of(&set, readings, targets).weights
+        Units::of(&set_of(readings.clone(), targets.clone()), readings, targets).weights
     }
 
     fn irrational(sample: usize) -> f64 {
@@ -242,15 +237,14 @@ mod tests {
 
     #[test]
     fn held_readings_and_copies_of_exact_ones_are_units_and_equal_coarse_ones_are_not() {
-        // Held for five frames, whether the target goes on changing or not.
-        for changes in [0.0, 0.1] {
-            let held = sizes(
-                100,
-                |s| [irrational(s / 5), 1.0],
-                |s| irrational(s / 5) + changes * s as f64,
-            );
-            assert_eq!(held, vec![5.0; 20]);
-        }
+        // Held for five frames, also where few values occur.
+        assert_eq!(
+            sizes(100, |s| [irrational(s / 5), 1.0], |s| irrational(s / 5)),
+            vec![5.0; 20]
+        );
+        assert_eq!(sizes(100, |s| [(s / 5 % 2) as f64, 1.0], |_| 3.0), vec![5.0; 20]);
+        // A target that goes on changing is evidence of its own.
+        assert_eq!(sizes(100, |s| [irrational(s / 5), 1.0], |s| s as f64), vec![1.0; 100]);
         // The same 20 samples, 5 times over.
         assert_eq!(
             sizes(100, |s| [irrational(s % 20), 1.0], |s| (s % 20) as f64),
@@ -266,15 +260,14 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_has_the_readings_of_its_samples_and_their_mean_target() {
+    fn a_unit_has_the_readings_and_targets_of_its_samples() {
         let readings = Array2::from_shape_fn((24, 1), |(s, _)| if s / 2 % 2 == 0 { 0.0 } else { 1.0 + s as f64 });
-        let targets = Array2::from_shape_fn((24, 1), |(s, _)| s as f64);
-        let set = Dataset::new(readings.clone(), targets.clone(), None, (0..24).collect()).unwrap();
-        let units = Units::of(&set, readings, targets);
+        let targets = Array2::from_shape_fn((24, 1), |(s, _)| (s / 2) as f64);
+        let units = Units::of(&set_of(readings.clone(), targets.clone()), readings, targets);
         assert_eq!(units.weights[..3], [2.0, 1.0, 1.0]);
         assert_eq!(
             units.y.column(0).iter().take(3).copied().collect::<Vec<_>>(),
-            [0.5, 2.0, 3.0]
+            [0.0, 1.0, 1.0]
         );
         assert_eq!(
             units.x.column(0).iter().take(3).copied().collect::<Vec<_>>(),

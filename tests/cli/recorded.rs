@@ -214,6 +214,41 @@ fn an_interrupted_comparison_leaves_the_training_as_it_is() {
     assert!(folder.path().join("n.json").is_file());
 }
 
+/// A switch that predicts the state with 10 % flips, recorded without and with each row written twice: R² is (1 − 2·0.1)² = 0.64.
+#[test]
+fn repeated_readings_keep_their_frequency() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let rows = |copies: usize, rng: &mut ChaCha8Rng| {
+        let rows = (0..1000).map(|_| {
+            let x = rng.random_bool(0.5);
+            let y = x ^ rng.random_bool(0.1);
+            format!("{},{}\n", u8::from(x), u8::from(y)).repeat(copies)
+        });
+        "x,y\n".to_owned() + &rows.collect::<String>()
+    };
+    for copies in [1, 2] {
+        fs::write(folder.path().join("r.csv"), rows(copies, &mut rng)).unwrap();
+        let report = json(
+            "inspect --data r.csv --inputs x --targets y --model ridge --json",
+            folder.path(),
+        );
+        let target = &report["targets"][0];
+        let value = target["r2"]["value"].as_f64().unwrap();
+        assert!((value - 0.64).abs() < 0.06, "{target}");
+        assert_eq!(target["standing"], "told", "{target}");
+        // The learning curve uses the same fits.
+        let last = target["learning_curve"].as_array().unwrap().last().unwrap();
+        assert!(last["rmse"].as_f64().unwrap() < 0.4, "{last}");
+        let report = json(
+            "train --data r.csv --inputs x --targets y --epochs 5 --hidden 2 --json",
+            folder.path(),
+        );
+        let ridge = &report["baselines"]["ridge"][0];
+        assert!(ridge["r2"].as_f64().unwrap() > 0.5, "{ridge}");
+    }
+}
+
 #[test]
 fn what_needs_targets_is_refused_without_them() {
     let folder = recording();

@@ -21,7 +21,8 @@ terms! { ERROR_TERMS:
         "Largest |error| of z of any node in the test set, in mm.",
         "max(|decoupled z − z|)";
     LINEAR_MAP = "Linear map",
-        "Best affine map from the resistances to the coordinates. A network that is not better is not worth its training.",
+        "Best affine map from the resistances to the coordinates, one for each row-wire where the network is told the row. A \
+         network that is not better is not worth its training.",
         "coordinates = A · R + b";
     REFERENCE = "Reference",
         "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
