@@ -373,9 +373,9 @@ mod tests {
             y[[s, 1]] += x[[s, 7]];
         }
         let (together, penalties) = fit(&x, &y);
-        for t in 0..3 {
+        for (t, together_penalty) in penalties.iter().enumerate() {
             let (alone, penalty) = fit(&x, &y.select(Axis(1), &[t]));
-            assert!((penalties[t] / penalty[0]).ln().abs() < 0.1 || penalties[t] == penalty[0]);
+            assert!((together_penalty / penalty[0]).ln().abs() < 0.1 || *together_penalty == penalty[0]);
             assert!(
                 (&together.column(t) - &alone.column(0))
                     .iter()
