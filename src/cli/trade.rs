@@ -151,7 +151,7 @@ fn measure_levels(
     for &noise in noises {
         let mut points = Vec::new();
         let measured = presets.iter().try_for_each(|&preset| {
-            is_whole &= measure(noise, preset, &mut points).map_err(|cause| (preset, cause))?;
+            is_whole &= measure(noise, preset, &mut points).map_err(|cause| (preset, Box::new(cause)))?;
             Ok(())
         });
         if !points.is_empty() {
@@ -160,9 +160,9 @@ fn measure_levels(
         match measured {
             Ok(()) => {}
             // Nothing is lost that would need words.
-            Err((_, cause)) if levels.is_empty() => return (levels, Err(cause)),
+            Err((_, cause)) if levels.is_empty() => return (levels, Err(*cause)),
             Err((preset, cause)) => {
-                let (place, cause) = (format!("noise {noise}, preset {preset}"), Box::new(cause));
+                let place = format!("noise {noise}, preset {preset}");
                 return (levels, Err(Failure::TradeOff { place, cause }));
             }
         }

@@ -206,7 +206,7 @@ fn a_wrong_array_scale_is_warned_of() {
     let output = decoupler(&format!("calibrate --array 4x4_4x12 {FRAMES}"), folder.path());
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(
-        text.contains("standard deviations from its nominal value") && text.contains("check the array scale"),
+        text.contains("standard deviations from nominal values") && text.contains("check the array scale"),
         "{text}"
     );
     let report = json(&format!("calibrate --array {ARRAY} {FRAMES} --json"), folder.path());

@@ -344,7 +344,7 @@ fn an_answer_without_a_wire_depends_on_no_frame_before() {
     let mut decoder = LeftOutDecoder::new(&sensor, &scene, &rows).unwrap();
     let mut all_ohm = Vec::new();
     frames(&sensor, &scene, None, 6, |frame_ohm, _| {
-        all_ohm.push(frame_ohm.to_vec())
+        all_ohm.push(frame_ohm.to_vec());
     });
     for (wire, cause) in [
         (FaultyWire::Row(4), FaultCause::NoSignal),

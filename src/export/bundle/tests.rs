@@ -15,6 +15,7 @@ use super::{
     numpy, onnx,
     portable::Portable,
     taking::Taking,
+    twofold::Twofold,
     vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };
@@ -475,6 +476,10 @@ fn c_answers_extreme_readings_with_numbers_or_not_at_all() {
         *limits = (-3.9e38, 3.9e38);
     }
     let vectors = Vectors::of((&file).into(), &own, Taking::Single).unwrap();
+    // Weights that take such readings beyond it.
+    own.networks[0]
+        .hidden_weights
+        .mapv_inplace(|weight| weight * Twofold::from(1e3));
     let limits = Deviation {
         total: 1.0,
         of_arithmetic: 1.0,
@@ -486,11 +491,14 @@ fn c_answers_extreme_readings_with_numbers_or_not_at_all() {
     }
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let sizes = [1e38, -1e38, 3.4e38, -3.4e38, 0.0, 1.0, f64::from(f32::MIN_POSITIVE)];
+    // Two extreme readings among usual ones: of infinite terms, some have the same sign and some have not.
     let readings: Vec<Vec<f64>> = (0..400)
         .map(|_| {
-            (0..own.channels)
-                .map(|_| sizes[rng.random_range(0..sizes.len())])
-                .collect()
+            let mut row = vec![1.0; own.channels];
+            for _ in 0..2 {
+                row[rng.random_range(0..own.channels)] = sizes[rng.random_range(0..sizes.len())];
+            }
+            row
         })
         .collect();
     let Some(answers) = answers_in_c(folder.path(), "odd", &readings) else {
