@@ -63,8 +63,12 @@ for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
             failures.append(f"{name} y{target + 1}: {named:.3f} is below scikit-learn's ridge, {limit[target]:.3f}")
         if means["network"] < limit[target] - MARGIN:
             failures.append(f"{name} y{target + 1}: the network has {means['network']:.3f}, scikit-learn's ridge {limit[target]:.3f}")
-        said = [warning for report in reports for warning in report["warnings"] if f" y{target + 1} " in warning]
-        if sum("found little more than a linear map" in warning for warning in said) < SEEDS:
-            failures.append(f"{name} y{target + 1}: not every seed is said to have found little more than a linear map")
+        # Where the readings predict nothing, the network can be better than ridge by chance; then that is said.
+        no_better, nothing = f"no better than ridge for y{target + 1} ", f"do not tell y{target + 1}:"
+        hardly = f"hardly better than ridge for y{target + 1} "
+        is_said = [any(words in report_said for words in [no_better, hardly, nothing])
+                   for report_said in ("\n".join(report["warnings"]) for report in reports)]
+        if not all(is_said):
+            failures.append(f"{name} y{target + 1}: {is_said.count(False)} of {SEEDS} seeds do not say that the network is hardly worth its weights")
 if failures:
     sys.exit("failed: " + "; ".join(failures))

@@ -88,7 +88,7 @@ impl RoundedReading {
     /// ln of the probability that a standard normal value, added to what is expected at x = 0, is within the interval.
     fn log_probability(&self) -> f64 {
         let (low, high) = (self.range.lowest, self.range.highest);
-        log_probability(low.max(-high), high.max(-low))
+        log_probability(low, high)
     }
 
     /// Reciprocal of the variance of the reading: of ε and of its place within the interval, which counts as uniform.
@@ -98,11 +98,13 @@ impl RoundedReading {
     }
 }
 
-/// ln P(low < ε < high) of a standard normal ε, for an interval most of which is above 0.
-fn log_probability(low: f64, high: f64) -> f64 {
+/// ln P(low < ε < high) of a standard normal ε.
+pub(super) fn log_probability(low: f64, high: f64) -> f64 {
     /// Beyond this the tail is known by its asymptote, to a part in 1000.
     const FAR: f64 = 30.0;
     let log_density = |x: f64| -0.5 * x * x - 0.5 * std::f64::consts::TAU.ln();
+    // The mirror image of an interval most of which is below 0: its tail does not cancel.
+    let (low, high) = (low.max(-high), high.max(-low));
     let width = high - low;
     if width * low.abs().max(1.0) < 1e-4 {
         log_density(0.5 * (low + high)) + width.ln()
@@ -126,6 +128,8 @@ mod tests {
             (2.0, f64::INFINITY, -3.783_184_333_7),
             (35.0, f64::INFINITY, -616.975_101_3),
             (1.0, 1.000_01, -12.931_869_0),
+            (f64::NEG_INFINITY, -35.0, -616.975_101_3),
+            (-1.000_01, -1.0, -12.931_869_0),
         ] {
             let found = log_probability(low, high);
             assert!(

@@ -1,4 +1,5 @@
 use super::{
+    evidence::log_probability,
     linear_model::{LinearModel, RoundedReading},
     marginal::Marginal,
 };
@@ -278,17 +279,6 @@ fn narrowness(half_width: f64) -> f64 {
     } else {
         (edges / probability).min(1.0)
     }
-}
-
-/// Logarithm of the probability that a standard normal value lies between two.
-fn log_probability(lowest: f64, highest: f64) -> f64 {
-    // Of the two tails the one that does not cancel.
-    let probability = if lowest > 0.0 {
-        normal_cdf(-lowest) - normal_cdf(-highest)
-    } else {
-        normal_cdf(highest) - normal_cdf(lowest)
-    };
-    probability.ln()
 }
 
 /// φ(x)/Φ(x) for x of 0 or more.
