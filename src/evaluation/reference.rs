@@ -45,7 +45,7 @@ const TRIED_SAMPLES: usize = 100;
 /// The prior of random nodes is uniform, cut at 0 and at the stroke. Eq. (2) is linearised at the true deformation, and
 /// expectation propagation finds the medians; a decoder that has to find where to linearise can come close. Other loadings
 /// have priors of any shape, such as few parameters of a press, and posteriors with several modes and curved valleys:
-/// theirs are sampled without linearisation ([`SampledPosterior`]). There is no reference if the samples are too few to be
+/// theirs are sampled without linearisation (`SampledPosterior`). There is no reference if the samples are too few to be
 /// trusted, or if the true deformations do not look like samples of their posteriors, as they must.
 ///
 /// Without noise the rounding of the readings takes its place. It hides much of what is badly seen; elsewhere the errors
