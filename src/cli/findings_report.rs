@@ -9,12 +9,13 @@ use super::{
     output::{print, print_object},
 };
 use crate::{
+    evaluation::Channel,
     evaluation::{
         RunSettings, TargetErrors,
         recorded::{ChannelImportance, Determination, Findings, FittedModel, Interval, LearningCurve, Standing},
     },
     export::{describe_target, describe_warnings, format_number},
-    import::{Channel, Dropped, Plan, Recording},
+    import::{Dropped, Plan, Recording},
 };
 
 /// The object printed by `inspect --targets --json`.

@@ -7,10 +7,11 @@ use std::{
 
 use super::{failure::Failure, follow_answers::Form, import_arguments::with_bar};
 use crate::{
+    dataset::clean_name::inert,
     dataset::{CsvFields, number},
     decoupling::{CompiledNetworks, Decoder},
     export::{AtomicFile, MeasuredNetworkFile, WriteError},
-    import::{InputColumns, InputError, clean_name::inert},
+    import::{InputColumns, InputError},
     network::DecouplingNetwork,
 };
 

@@ -14,12 +14,13 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
+    evaluation::{Channel, TargetPosition},
     evaluation::{
         CrossValidated, RunFlaw, RunSettings, StartRecord, TargetErrors, TargetRow,
         recorded::{Determination, NonlinearGain, Undetermined},
     },
     export::{MeasuredNetworkFile, describe_positions, describe_standings, describe_worse_than_ridge, format_duration},
-    import::{Channel, Dropped, Plan, PlannedSets, Recording, TargetPosition},
+    import::{Dropped, Plan, PlannedSets, Recording},
     sensor::counted,
     training::StopReason,
 };

@@ -3,12 +3,12 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use crate::{
+    evaluation::Channel,
     evaluation::{
         TargetErrors,
         recorded::{Determination, Undetermined},
     },
     export::format_number,
-    import::Channel,
 };
 
 /// Errors for one target.

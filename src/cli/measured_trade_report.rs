@@ -14,9 +14,9 @@ use super::{
 };
 use crate::{
     dataset::SplitBy,
+    evaluation::Channel,
     evaluation::{TargetErrors, TargetTradeOffPoint, pareto_front},
     export::{format_duration, format_number},
-    import::Channel,
 };
 
 /// Decoders measured on own data.

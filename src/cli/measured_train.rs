@@ -14,12 +14,13 @@ use super::{
 };
 use crate::{
     dataset::{self, Dataset, Division, SplitBy, Stream},
+    evaluation::Channel,
     evaluation::{
         CrossValidated, Run, RunError, RunSettings,
         recorded::{Determination, SplitComparison},
     },
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
-    import::{Channel, Plan, PlannedSets},
+    import::{Plan, PlannedSets},
 };
 
 impl Train {

@@ -5,6 +5,7 @@
 //! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
 //! and [`Folds`] divide a set, [`Frames`] groups it into whole frames, and [`ResistanceReader`] reads resistances from CSV.
 
+pub(crate) mod clean_name;
 mod csv_fields;
 mod division;
 #[cfg(feature = "cli")]

@@ -8,8 +8,9 @@ use super::{
     sealed::Sealed,
 };
 use crate::{
+    evaluation::Channel,
     evaluation::{MeasuredSettings, Run, TargetErrors},
-    import::{Channel, Plan},
+    import::Plan,
     network::Networks,
 };
 

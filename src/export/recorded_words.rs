@@ -1,10 +1,10 @@
 use super::{MeasuredNetworkFile, format_number};
 use crate::{
+    evaluation::{Channel, TargetPosition},
     evaluation::{
         TargetErrors,
         recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
     },
-    import::{Channel, TargetPosition},
     training::Method,
 };
 

@@ -11,7 +11,7 @@ use super::{
     kept_files::{ids, name_path, pinned_path, read, run_path, write},
     old_run_list::OldRunList,
 };
-use crate::{dataset::system_cause, evaluation::SimulatedSettings, import::clean_name::clean_name};
+use crate::{dataset::clean_name::clean_name, dataset::system_cause, evaluation::SimulatedSettings};
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -10,8 +10,8 @@ use super::{
 };
 use crate::{
     decoupling::Precision,
+    evaluation::Channel,
     evaluation::{TargetReport, format::format_number, pareto_front},
-    import::Channel,
 };
 
 /// Error of each decoder for the target at this place against its time to decode `decoded` ("a sample"), with the Pareto

@@ -6,7 +6,7 @@ use super::{
     plot::{Plot, PlotPoint, Series},
     plot_figure::PlotFigure,
 };
-use crate::{evaluation::format::format_number, import::Channel};
+use crate::{evaluation::Channel, evaluation::format::format_number};
 
 /// Most targets whose names have room below the axis.
 const MOST_NAMES: usize = 12;

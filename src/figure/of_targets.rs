@@ -9,7 +9,7 @@ use super::{
     surface::{Quantity, Surface, ViewMode},
 };
 use crate::{
-    import::{Channel, TargetPosition},
+    evaluation::{Channel, TargetPosition},
     surface::{SurfaceError, SurfaceMap},
 };
 

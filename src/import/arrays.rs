@@ -2,12 +2,12 @@ use std::path::Path;
 
 use super::{
     Cells, Column, Fault, Format, Table, TableError,
-    clean_name::clean_name,
     column::Labels,
     csv_table::Reading,
     element::Array,
     table::{Excess, Lines, stem},
 };
+use crate::dataset::clean_name::clean_name;
 
 /// Puts the arrays of one file side by side: those with as many rows as the longest. A single array without a name has the columns
 /// c1, c2, …; the columns of an array X are X.c1, X.c2, …, or X if there is one.

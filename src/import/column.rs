@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use super::clean_name::clean_name;
+use crate::dataset::clean_name::clean_name;
 
 /// A column of a table.
 #[derive(Clone, Debug, Default)]

@@ -6,7 +6,6 @@ use std::{
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
-    clean_name::clean_name,
     column::{Labels, name_and_unit},
     detection::{BEGINNING, detect},
     number::{Cell, parse},
@@ -15,6 +14,7 @@ use super::{
     utf16::Utf16,
     watch::table_error,
 };
+use crate::dataset::clean_name::clean_name;
 
 /// Largest number of rows: those of ten hours at 1 kHz, and more.
 const LARGEST_ROWS: usize = 50_000_000;

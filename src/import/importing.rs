@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Cells, Channel, Cure, ImportError, Joined, Missing, Recipe, Recording, Table, Watch,
+    Cells, Cure, ImportError, Joined, Missing, Recipe, Recording, Table, Watch,
     csv_table::Reading,
     gather::{Source, gather},
     join::{Partners, median_interval, nearest},
@@ -12,6 +12,7 @@ use super::{
     selection::{Rows, not_a_number},
     table::stem,
 };
+use crate::evaluation::Channel;
 use crate::dataset::Dataset;
 
 impl Recipe {

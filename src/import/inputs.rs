@@ -4,8 +4,9 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{
-    Channel, Column, ImportError, Recipe, TableError, Watch, column::name_and_unit, csv_table::named, names::Names,
+    Column, ImportError, Recipe, TableError, Watch, column::name_and_unit, csv_table::named, names::Names,
 };
+use crate::evaluation::Channel;
 
 /// Readings of a file for a network that was trained on others of its kind.
 #[derive(Clone, Debug)]

@@ -5,7 +5,6 @@
 //! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files.
 
 mod arrays;
-pub(crate) mod clean_name;
 mod column;
 mod condition;
 mod csv_table;
@@ -51,10 +50,10 @@ pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
 pub use meaning::Meaning;
 pub use missing::Missing;
 pub use plan::{Plan, PlannedSets, TestFiles};
-pub use positions::{PositionsError, TargetPosition, holds_positions};
+pub use positions::{PositionsError, holds_positions};
 pub use read::read_table;
 pub use recipe::{Joined, Recipe};
-pub use recording::{Channel, Dropped, FileReport, JoinReport, Recording};
+pub use recording::{Dropped, FileReport, JoinReport, Recording};
 pub use suggestion::{suggested_plan, suggested_plan_in_order};
 pub use table::{Excess, Format, Table};
 pub use watch::{Progress, Watch};

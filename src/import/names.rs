@@ -1,4 +1,5 @@
-use super::{Column, ImportError, Table, clean_name::clean_name};
+use super::{Column, ImportError, Table};
+use crate::dataset::clean_name::clean_name;
 
 /// A column of one of the files of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -6,43 +6,15 @@ use std::{
     path::Path,
 };
 
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cells, Channel, Column, DialectChoice, Format, ImportError, Table, TableError, Watch, csv_table::Reading,
-    read::read,
+    Cells, Column, DialectChoice, Format, ImportError, Table, TableError, Watch, csv_table::Reading, read::read,
 };
-use crate::surface::Lattice;
+use crate::evaluation::{Channel, TargetPosition};
 
 /// Columns of the table.
 const COLUMNS: [&str; 3] = ["target", "x", "y"];
-
-/// A target that is measured at a known place of the skin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TargetPosition {
-    /// Index of the target.
-    pub target: usize,
-    /// x in millimetres.
-    pub x_mm: f64,
-    /// y in millimetres.
-    pub y_mm: f64,
-}
-
-impl TargetPosition {
-    /// The lattice whose nodes are these positions; `None` if they are none, or no lattice.
-    pub fn lattice(positions: &[Self]) -> Option<Lattice> {
-        Lattice::of(&Self::places_mm(positions))
-    }
-
-    /// The positions (x, y), in millimetres.
-    pub fn places_mm(positions: &[Self]) -> Vec<[f64; 2]> {
-        positions
-            .iter()
-            .map(|position| [position.x_mm, position.y_mm])
-            .collect()
-    }
-}
 
 /// Defect of a table of positions. Lines are counted from 1.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -1,12 +1,12 @@
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{
-    Excess, Format, TargetPosition,
-    clean_name::{cleaned, cleaned_if_any},
+use super::{Excess, Format};
+use crate::{
+    dataset::Dataset,
+    evaluation::{Channel, TargetPosition},
 };
-use crate::dataset::Dataset;
 
 /// Measured samples with the meaning of their columns.
 #[derive(Clone, Debug)]
@@ -34,22 +34,6 @@ pub struct Recording {
     pub files: Vec<FileReport>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
-}
-
-/// Name and unit of a reading or target.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Channel {
-    /// Full name of the column.
-    #[serde(deserialize_with = "cleaned")]
-    pub name: String,
-    /// Unit, if it is known.
-    #[serde(
-        default,
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "cleaned_if_any"
-    )]
-    pub unit: Option<String>,
 }
 
 /// Rows that are no samples for one reason.
@@ -91,14 +75,4 @@ pub struct JoinReport {
     pub unused: usize,
     /// Median of the time of a row minus that of its partner.
     pub median_offset: Option<f64>,
-}
-
-impl Channel {
-    /// Name, with the unit in brackets if it is known.
-    pub fn title(&self) -> String {
-        match &self.unit {
-            Some(unit) => format!("{} ({unit})", self.name),
-            None => self.name.clone(),
-        }
-    }
 }

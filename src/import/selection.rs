@@ -1,11 +1,12 @@
 use std::{collections::HashMap, path::PathBuf};
 
 use super::{
-    Cells, Channel, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    Cells, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
     join::Partners,
     meanings::Meanings,
     names::{ColumnId, Names},
 };
+use crate::evaluation::Channel;
 
 /// Largest number of a row-wire.
 const LAST_ROW_WIRE: f64 = 10_000.0;

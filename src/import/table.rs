@@ -1,6 +1,7 @@
 use std::path::Path;
 
-use super::{Column, Dialect, clean_name::clean_name};
+use super::{Column, Dialect};
+use crate::dataset::clean_name::clean_name;
 
 /// A file as columns of equal lengths.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler::import::{Cells, DialectChoice, Inspection, Recipe, TargetPosition, holds_positions, read_table};
+use decoupler::evaluation::TargetPosition;
+use decoupler::import::{Cells, DialectChoice, Inspection, Recipe, holds_positions, read_table};
 
 use crate::{
     corpus::replay,

@@ -3,8 +3,9 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler::{
+    evaluation::TargetPosition,
     export::RecipeFile,
-    import::{ImportError, Plan, PositionsError, Recipe, Recording, TargetPosition, holds_positions},
+    import::{ImportError, Plan, PositionsError, Recipe, Recording, holds_positions},
 };
 use tempfile::TempDir;
 

@@ -283,8 +283,9 @@ fn columns_have_names_ranges_units_and_one_meaning() {
     wanted.row_wire = Some("row".into());
     wanted.units = [("y".to_owned(), "V".to_owned())].into();
     let recording = import(&wanted, &folder).unwrap();
-    let titles =
-        |channels: &[decoupler::import::Channel]| channels.iter().map(|channel| channel.title()).collect::<Vec<_>>();
+    let titles = |channels: &[decoupler::evaluation::Channel]| {
+        channels.iter().map(|channel| channel.title()).collect::<Vec<_>>()
+    };
     assert_eq!(titles(&recording.inputs), ["x (mm)", "y (V)"]);
     assert_eq!(titles(&recording.targets), ["z (N)"]);
     assert_eq!(recording.set.groups(), [0, 0, 1]);

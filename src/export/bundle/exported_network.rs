@@ -10,9 +10,9 @@ use super::{
 };
 use crate::{
     dataset::{Seed, Stream},
+    evaluation::Channel,
     evaluation::{SimulatedSettings, TargetErrors},
     export::{DocumentError, MeasuredNetworkFile, NetworkFile},
-    import::Channel,
     network::Networks,
 };
 

@@ -1,5 +1,5 @@
 use super::{portable::Portable, vectors::Vector};
-use crate::import::clean_name::inert;
+use crate::dataset::clean_name::inert;
 
 /// Writes the golden vectors as CSV: the row from 1 where it is an argument, readings, outputs.
 pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {

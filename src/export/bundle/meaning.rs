@@ -1,7 +1,4 @@
-use crate::{
-    import::{Channel, clean_name::is_unprintable},
-    sensor::ArrayScale,
-};
+use crate::{dataset::clean_name::is_unprintable, evaluation::Channel, sensor::ArrayScale};
 
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use super::{
     taking::ReadingRounding,
     vectors::Deviation,
 };
-use crate::{export::format_number, import::Channel};
+use crate::{evaluation::Channel, export::format_number};
 
 /// Files that an export wrote, and how far they are from the network.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,9 +20,9 @@ use super::{
     weights::{Arithmetic, Weights},
 };
 use crate::{
+    evaluation::Channel,
     evaluation::{Run, SimulatedSettings},
     export::NetworkFile,
-    import::Channel,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Noise, Rows},
 };

@@ -6,7 +6,7 @@ use super::{
     colours::{INK, Rgb},
     picture::Picture,
 };
-use crate::import::clean_name::is_unprintable;
+use crate::dataset::clean_name::is_unprintable;
 
 /// Size of all text, in points.
 pub(super) const TEXT: f64 = 8.0;

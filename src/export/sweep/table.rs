@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::merging::MergedSweep;
-use crate::import::clean_name::inert;
+use crate::dataset::clean_name::inert;
 
 /// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]

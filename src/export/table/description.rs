@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use crate::{export::format_number, import::clean_name::inert};
+use crate::{dataset::clean_name::inert, export::format_number};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]

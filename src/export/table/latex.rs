@@ -1,7 +1,7 @@
 //! Tables in LaTeX, with the rules of `booktabs` and the numeric columns of `siunitx`.
 
 use super::{Cell, Table};
-use crate::import::clean_name::begins_formula;
+use crate::dataset::clean_name::begins_formula;
 
 pub(super) fn latex(table: &Table) -> String {
     let columns = 0..table.columns.len();

@@ -1,7 +1,7 @@
 use std::fmt;
 
 use super::{Cell, Table, latex::latex};
-use crate::import::clean_name::inert;
+use crate::dataset::clean_name::inert;
 
 /// Form in which a table is copied into other documents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

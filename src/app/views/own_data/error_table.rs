@@ -5,9 +5,9 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{Column, Row, TableWidths, captioned_table_ui},
     },
+    evaluation::Channel,
     evaluation::TargetErrors,
     export::format_number,
-    import::Channel,
 };
 
 const COLUMNS: [Column; 5] = [

@@ -5,10 +5,11 @@ use ndarray::{Array2, Axis};
 use crate::{
     app::shared::Phase,
     dataset::Dataset,
+    evaluation::Channel,
     evaluation::{TargetErrors, TargetRow},
     export::{MeasuredCheckpointFile, MeasuredNetworkFile},
     figure::{HeatMap, RegressionLine, TargetSurface, position_error_map},
-    import::{Channel, Recording},
+    import::Recording,
     surface::SurfaceError,
 };
 

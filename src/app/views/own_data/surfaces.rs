@@ -17,12 +17,12 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, placeholder_ui, segmented_ui},
     },
+    evaluation::Channel,
     export::format_number,
     figure::{
         TargetSurface,
         surface::{Surface, SurfaceFigure},
     },
-    import::Channel,
 };
 
 /// Choices for the surfaces, and those drawn last.

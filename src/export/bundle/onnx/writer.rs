@@ -6,13 +6,13 @@ use super::{
     tensor::{Tensor, element_type},
 };
 use crate::{
+    evaluation::Channel,
     export::bundle::{
         exported_network::Metadata,
         meaning::{Meaning, comment},
         portable::Portable,
         weights::{Digits, RoundedNetwork, Weights},
     },
-    import::Channel,
     network::Quantity,
 };
 

@@ -12,10 +12,11 @@ use crate::{
             dim_ui, explained_options_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
+    evaluation::Channel,
     evaluation::recorded::{Findings, FittedModel},
     export::{describe_target, describe_warnings, format_duration},
     figure::{PlotFigure, learning_curve_figure},
-    import::{Channel, Meaning},
+    import::Meaning,
 };
 
 /// Height of the learning curve.

@@ -7,12 +7,13 @@ use std::{
 
 use crate::{
     app::{job::Report, views::own_data::remarks::in_window},
+    evaluation::Channel,
     evaluation::{
         DecoderSet, RunSettings, TargetReport, decoded_unit,
         recorded::{Findings, FittedModel, Stage},
     },
     export::MeasuredNetworkFile,
-    import::{Channel, Plan, Progress},
+    import::{Plan, Progress},
 };
 
 /// Work for the thread.

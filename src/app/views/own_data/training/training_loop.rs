@@ -20,12 +20,13 @@ use crate::{
         },
     },
     dataset::{Folds, Seed, SplitBy, Stream},
+    evaluation::Channel,
     evaluation::{
         CrossValidated, Run, RunSettings,
         recorded::{Determination, NonlinearGain, SplitComparison},
     },
     export::{MeasuredCheckpointFile, MeasuredNetworkFile, describe_standings, describe_worse_than_ridge},
-    import::{Channel, Plan, PlannedSets, Progress},
+    import::{Plan, PlannedSets, Progress},
     training::TrainingSettings,
 };
 

@@ -17,6 +17,7 @@ pub fn clean_name(name: &str) -> String {
 
 /// Returns a text for a spreadsheet, which takes a cell that begins with one of `= + - @` for a formula: such a text gets
 /// an apostrophe in front, unless it is a number.
+#[cfg(feature = "files")]
 pub fn inert(text: &str) -> String {
     if begins_formula(text) {
         format!("'{text}")
@@ -37,12 +38,12 @@ pub fn is_unprintable(c: char) -> bool {
 }
 
 /// Reads a name and cleans it.
-pub(super) fn cleaned<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+pub(crate) fn cleaned<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     String::deserialize(deserializer).map(|name| clean_name(&name))
 }
 
 /// Reads a name that may be missing and cleans it.
-pub(super) fn cleaned_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+pub(crate) fn cleaned_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
     Ok(Option::<String>::deserialize(deserializer)?.map(|name| clean_name(&name)))
 }
 
