@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, NoReference, RunError, RunSettings, Source};
+use super::{Errors, NoReference, RunError, RunSettings, Source, TestErrors};
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::{AffineMap, TrainingMean},
@@ -8,28 +8,61 @@ use crate::{
     scene::{NoiseSource, Rows},
 };
 
-/// Errors of the baselines on the nodes, shown beside the network in every error table.
+/// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the targets
+/// are known to be nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Baselines {
+pub struct Baselines<E = TestErrors> {
     /// Errors of always answering the mean of the training set.
-    pub mean: Errors,
-    /// Errors of the best affine map on resistance, one for each row-wire where rows are known.
-    pub linear: Errors,
+    pub mean: E,
+    /// Errors of the best affine map on the readings, one for each row-wire where rows are known; ridge regression for
+    /// recordings.
+    pub linear: E,
     /// Errors of the Bayesian reference, the limit set by the noise and by the distribution of the loading:
-    /// [`reference_errors`](super::reference_errors). Absent from older files.
-    #[serde(default)]
-    pub reference: Option<Errors>,
+    /// [`reference_errors`](super::reference_errors). Recordings have none.
+    pub reference: Option<E>,
     /// Reason for which there is no reference, if one was sought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_reference: Option<NoReference>,
 }
 
-/// Name of the linear baseline in tables.
-pub(super) fn linear_name(source: &Source) -> &'static str {
-    match source {
-        Source::Simulated(_) => "linear map",
-        Source::Measured(_) => "ridge",
+/// Errors of the network and of the baselines on the same test set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scores<E = TestErrors> {
+    /// Errors of the network.
+    pub network: E,
+    /// Errors of the baselines.
+    pub baselines: Baselines<E>,
+}
+
+impl Baselines {
+    /// Returns the errors on the nodes, if the targets are nodes of an array.
+    pub fn nodes(&self) -> Option<Baselines<Errors>> {
+        Some(Baselines {
+            mean: *self.mean.nodes()?,
+            linear: *self.linear.nodes()?,
+            reference: self.reference.as_ref().and_then(TestErrors::nodes).copied(),
+            no_reference: self.no_reference,
+        })
+    }
+
+    /// Name of the linear baseline in tables.
+    pub fn linear_name(&self) -> &'static str {
+        match self.linear {
+            TestErrors::Nodes(_) => "linear map",
+            TestErrors::Targets(_) => "ridge",
+        }
+    }
+}
+
+impl Scores {
+    /// Returns the errors on the nodes, if the targets are nodes of an array.
+    pub fn nodes(&self) -> Option<Scores<Errors>> {
+        Some(Scores {
+            network: *self.network.nodes()?,
+            baselines: self.baselines.nodes()?,
+        })
     }
 }
 

@@ -4,10 +4,7 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Run, RunError, RunSettings, TargetErrors, TargetRow,
-    baselines::{fit_baselines, linear_name},
-};
+use super::{Baselines, Run, RunError, RunSettings, Scores, TestErrors, baselines::fit_baselines};
 use crate::{
     dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
     decoupling::decode_set,
@@ -51,8 +48,6 @@ pub struct CrossValidated {
     pub mean: Array2<f64>,
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
-    /// Name of the linear maps in tables.
-    linear_name: &'static str,
     /// The fold after the test fold is held out for validation.
     holds_out: bool,
     /// Epochs and time of the trainings.
@@ -149,7 +144,6 @@ impl CrossValidated {
             network,
             mean,
             linear,
-            linear_name: linear_name(&settings.source),
             holds_out,
             effort,
         }))
@@ -164,16 +158,17 @@ impl CrossValidated {
     ///
     /// # Panics
     /// If the set has another shape.
-    pub fn target_table(&self, set: &Dataset) -> Vec<TargetRow> {
-        let row = |name, answers: &Array2<f64>| TargetRow {
-            name,
-            targets: TargetErrors::measure(set.targets(), answers.view()),
-        };
-        vec![
-            row("training mean", &self.mean),
-            row(self.linear_name, &self.linear),
-            row("network", &self.network),
-        ]
+    pub fn scores(&self, set: &Dataset) -> Scores {
+        let errors = |answers: &Array2<f64>| TestErrors::of_targets(set, answers.view());
+        Scores {
+            network: errors(&self.network),
+            baselines: Baselines {
+                mean: errors(&self.mean),
+                linear: errors(&self.linear),
+                reference: None,
+                no_reference: None,
+            },
+        }
     }
 }
 

@@ -3,8 +3,8 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    Errors, MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors,
-    frame_time::frame_us, task::unseen_noise,
+    MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TestErrors, frame_time::frame_us,
+    task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},
@@ -18,7 +18,7 @@ use crate::{
     sensor::SensorModel,
 };
 
-/// Errors and cost of a decoder on the nodes of a test set.
+/// Errors and cost of a decoder on a test set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecoderReport {
     /// Kind of decoder.
@@ -26,27 +26,12 @@ pub struct DecoderReport {
     /// Precision of the network; all other decoders compute in double precision.
     pub precision: Precision,
     /// Errors on the test set.
-    pub errors: Errors,
+    pub errors: TestErrors,
     /// Root mean square of m/R − 1 over the readings m of the test set, with R the resistances at the decoded
-    /// coordinates; it needs no ground truth.
-    pub residual: f64,
-    /// Standing of the answers of decoders that solve the equations of the sensor.
+    /// coordinates; it needs no ground truth. `None` without a model of the sensor.
+    pub residual: Option<f64>,
+    /// Rows that decoders that solve the equations of the sensor have solved.
     pub solved: SolvedRows,
-    /// Computing time.
-    pub cost: DecoderCost,
-    /// Remarks on the errors, with cause and cure.
-    pub remarks: Vec<Remark>,
-}
-
-/// Errors and cost of a decoder on targets of any meaning.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TargetReport {
-    /// Kind of decoder.
-    pub kind: DecoderKind,
-    /// Precision of the network; all other decoders compute in double precision.
-    pub precision: Precision,
-    /// Errors on the test set, target by target.
-    pub targets: Vec<TargetErrors>,
     /// Computing time.
     pub cost: DecoderCost,
     /// Remarks on the errors, with cause and cure.
@@ -65,21 +50,10 @@ pub struct DecoderCost {
 impl DecoderReport {
     /// Returns the name in files, such as `network_f32`.
     pub fn name(&self) -> String {
-        name_in_files(self.kind, self.precision)
-    }
-}
-
-impl TargetReport {
-    /// Returns the name in files, such as `network_f32`.
-    pub fn name(&self) -> String {
-        name_in_files(self.kind, self.precision)
-    }
-}
-
-fn name_in_files(kind: DecoderKind, precision: Precision) -> String {
-    match precision {
-        Precision::Double => kind.to_string(),
-        Precision::Single => format!("{kind}_f32"),
+        match self.precision {
+            Precision::Double => self.kind.to_string(),
+            Precision::Single => format!("{}_f32", self.kind),
+        }
     }
 }
 
@@ -177,8 +151,16 @@ impl DecoderSet {
         })
     }
 
-    /// Fits a decoder and measures its speed and its errors on the nodes of `test`. Returns `None` as [`Self::decoder`]
-    /// does, and for a measured source: see [`Self::measure_targets`].
+    /// Decoders that can be measured for this source, with the precisions of each, in the order offered to the user.
+    pub fn kinds(source: &Source) -> impl Iterator<Item = (DecoderKind, Precision)> + use<> {
+        let has_sensor = source.simulation().is_some();
+        let kinds = DecoderKind::ALL
+            .into_iter()
+            .filter(move |kind| has_sensor || !kind.needs_sensor());
+        kinds.flat_map(|kind| kind.precisions().iter().map(move |&precision| (kind, precision)))
+    }
+
+    /// Fits a decoder and measures its speed and its errors on `test`. Returns `None` as [`Self::decoder`] does.
     ///
     /// # Errors
     /// As [`Self::decoder`], or if a reading cannot be decoded.
@@ -188,17 +170,17 @@ impl DecoderSet {
         precision: Precision,
         test: &Dataset,
     ) -> Result<Option<DecoderReport>, RunError> {
-        let Some(simulation) = self.settings.source.simulation() else {
-            return Ok(None);
-        };
         let Some((answers, solved, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
-        let measured = |answers: &Array2<f64>| Errors::measure(test, answers, simulation.stroke_mm());
-        let (errors, mean) = (measured(&answers), measured(&self.mean_answers(test)?));
-        let residual = rms_residual(&simulation.sensor, test, &answers);
+        let source = &self.settings.source;
+        let errors = TestErrors::measure(source, test, &answers);
+        let mean = TestErrors::measure(source, test, &self.mean_answers(test)?);
+        let residual = source
+            .simulation()
+            .map(|simulation| rms_residual(&simulation.sensor, test, &answers));
         let missing = MissingFigures::of(precision, &errors, residual).map(Remark::Missing);
-        let mut remarks = Remark::on_nodes(kind, (&errors, &mean), &self.settings, self.size_of_fits());
+        let mut remarks = Remark::on(kind, (&errors, &mean), &self.settings, self.size_of_fits());
         remarks.extend(missing);
         remarks.extend((!solved.are_reliable()).then_some(Remark::NotAllSolved(solved)));
         Ok(Some(DecoderReport {
@@ -208,40 +190,6 @@ impl DecoderSet {
             remarks,
             residual,
             solved,
-            cost,
-        }))
-    }
-
-    /// Decoders that need no model of the sensor, with the precisions of each, in the order offered to the user.
-    pub fn of_targets() -> impl Iterator<Item = (DecoderKind, Precision)> {
-        let kinds = DecoderKind::ALL.into_iter().filter(|kind| !kind.needs_sensor());
-        kinds.flat_map(|kind| kind.precisions().iter().map(move |&precision| (kind, precision)))
-    }
-
-    /// Fits a decoder and measures its speed and its errors on each target of `test`. Returns `None` as
-    /// [`Self::decoder`] does.
-    ///
-    /// # Errors
-    /// As [`Self::decoder`], or if a reading cannot be decoded.
-    pub fn measure_targets(
-        &self,
-        kind: DecoderKind,
-        precision: Precision,
-        test: &Dataset,
-    ) -> Result<Option<TargetReport>, RunError> {
-        let Some((answers, _, cost)) = self.answer(kind, precision, test)? else {
-            return Ok(None);
-        };
-        let targets = TargetErrors::measure(test.targets(), answers.view());
-        let mean = TargetErrors::measure(test.targets(), self.mean_answers(test)?.view());
-        let mut remarks = Remark::on_targets(kind, (&targets, &mean), &self.settings, self.size_of_fits());
-        let is_complete = targets.iter().all(|target| target.mae.is_finite());
-        remarks.extend((!is_complete).then(|| Remark::Missing(MissingFigures::overflow(precision))));
-        Ok(Some(TargetReport {
-            kind,
-            precision,
-            remarks,
-            targets,
             cost,
         }))
     }

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use super::Errors;
+use super::TestErrors;
 use crate::decoupling::Precision;
 
 /// Reasons for which a decoder has no figures, or no residual.
@@ -22,19 +22,19 @@ pub enum MissingFigures {
 }
 
 impl MissingFigures {
-    /// Tells why figures are missing, given the errors of a decoder and the residual of its answers; `None` if none is.
-    pub(super) fn of(precision: Precision, errors: &Errors, residual: f64) -> Option<Self> {
-        if !(errors.z_mm.is_finite() && errors.worst_mm.is_finite()) {
-            return Some(Self::overflow(precision));
-        }
-        (!residual.is_finite()).then_some(Self::NoResistance)
-    }
-
-    /// Reason why answers in this precision are no numbers.
-    pub(super) fn overflow(precision: Precision) -> Self {
+    /// Returns the reason for which figures are missing, given the errors of a decoder and the residual of its answers, if
+    /// there is a model of the sensor; `None` if none is.
+    pub(super) fn of(precision: Precision, errors: &TestErrors, residual: Option<f64>) -> Option<Self> {
+        let is_complete = match errors {
+            TestErrors::Nodes(errors) => errors.z_mm.is_finite() && errors.worst_mm.is_finite(),
+            TestErrors::Targets(targets) => targets.iter().all(|target| target.mae.is_finite()),
+        };
         match precision {
-            Precision::Single => Self::SinglePrecision,
-            Precision::Double => Self::Overflow,
+            _ if is_complete => residual
+                .is_some_and(|residual| !residual.is_finite())
+                .then_some(Self::NoResistance),
+            Precision::Single => Some(Self::SinglePrecision),
+            Precision::Double => Some(Self::Overflow),
         }
     }
 }

@@ -1,12 +1,10 @@
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, NoReference, Run, RunError, RunSettings, SimulatedSettings, StartTrainer, TargetErrors,
-    TargetRow,
-    baselines::{fit_baselines, linear_name},
-    further_samples::FurtherSamples,
+    Baselines, Errors, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, StartTrainer, TestErrors,
+    baselines::fit_baselines,
     reference_errors,
     sets::check_sets,
     task::{Task, tasks},
@@ -34,35 +32,27 @@ impl Run {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
         Workload::of(&settings)?.check_memory()?;
-        Self::with_drawn_sets(settings, is_cancelled, |tasks| begin(settings.into(), tasks))
-    }
-
-    /// Prepares a run on sets that are drawn, with the trainings of `begin`; `None` once `is_cancelled`.
-    fn with_drawn_sets(
-        settings: SimulatedSettings,
-        is_cancelled: &dyn Fn() -> bool,
-        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
-    ) -> Result<Option<Self>, RunError> {
-        let Some((split, test)) = settings.draw_held_unless(is_cancelled)? else {
-            return Ok(None);
-        };
-        let further = FurtherSamples::of(&settings)?.map(Arc::new);
-        if let Some(further) = &further
-            && !further.check(is_cancelled)?
-        {
-            return Ok(None);
+        match settings.sets_unless(is_cancelled)? {
+            Some(sets) => Self::on_unless(settings.into(), sets, is_cancelled),
+            None => Ok(None),
         }
-        Self::with_sets(settings.into(), (split, further), test, is_cancelled, begin)
     }
 
-    /// Prepares a run on existing sets, measured or from a cross-validation; see [`Self::prepare`].
+    /// Prepares a run on existing sets, recorded or from a cross-validation; see [`Self::prepare`].
     ///
     /// # Errors
     /// If the settings are invalid, or the sets do not belong together.
     pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        whole(Self::with_sets(settings, (split, None), test, &|| false, |tasks| {
-            begin(settings, tasks)
-        }))
+        whole(Self::on_unless(settings, RunSets::new(split, test), &|| false))
+    }
+
+    /// As [`Self::on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub(crate) fn on_unless(
+        settings: RunSettings,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        Self::with_baselines(settings, sets, is_cancelled, |tasks| begin(settings, tasks))
     }
 
     /// Resumes a run of these settings from the states of all its trainings.
@@ -70,28 +60,10 @@ impl Run {
     /// # Errors
     /// If the settings are invalid, or the states are damaged or from another run.
     pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        whole(Self::resume_unless(settings, states, &|| false))
-    }
-
-    /// As [`Self::resume`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
-    pub(crate) fn resume_unless(
-        settings: SimulatedSettings,
-        states: Vec<TrainerState>,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
         settings.check_counts()?;
         check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
-        let run = Self::with_drawn_sets(settings, is_cancelled, |tasks| take_up(settings.into(), states, tasks))?;
-        Ok(run.map(Self::with_time_of_saved))
-    }
-
-    /// Trainings side by side do not know how long they took together.
-    fn with_time_of_saved(mut self) -> Self {
-        self.wall_time = match &self.starts[..] {
-            [only] if only.rows().len() == 1 => Some(only.elapsed()),
-            _ => None,
-        };
-        self
+        let sets = settings.sets_unless(&|| false)?.expect("nothing cancels it");
+        whole(Self::resume_unless(settings.into(), states, sets, &|| false))
     }
 
     /// Resumes a run on the sets it was started on; see [`Self::resume`].
@@ -104,74 +76,93 @@ impl Run {
         split: Split,
         test: Dataset,
     ) -> Result<Self, RunError> {
-        let run = Self::with_sets(settings, (split, None), test, &|| false, |tasks| {
-            take_up(settings, states, tasks)
-        });
-        Ok(whole(run)?.with_time_of_saved())
+        whole(Self::resume_unless(
+            settings,
+            states,
+            RunSets::new(split, test),
+            &|| false,
+        ))
     }
 
-    /// Prepares a run whose trainings are those of `begin`, on a split and on samples that are not held; `None` once
-    /// `is_cancelled`.
-    fn with_sets(
+    /// As [`Self::resume_on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub(crate) fn resume_unless(
         settings: RunSettings,
-        (split, further): (Split, Option<Arc<FurtherSamples>>),
-        test: Dataset,
+        states: Vec<TrainerState>,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let resumed = Self::with_baselines(settings, sets, is_cancelled, |tasks| take_up(settings, states, tasks))?;
+        Ok(resumed.map(|mut run| {
+            // Trainings side by side do not know how long they took together.
+            run.wall_time = match &run.starts[..] {
+                [only] if only.rows().len() == 1 => Some(only.elapsed()),
+                _ => None,
+            };
+            run
+        }))
+    }
+
+    /// Prepares a run whose trainings are those of `begin`; `None` once `is_cancelled`.
+    fn with_baselines(
+        settings: RunSettings,
+        sets: RunSets,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
         settings.check_network()?;
-        check_sets(&settings, &split, &test)?;
-        let (mut mean, mut linear) = fit_baselines(&split.training, &settings)?;
+        check_sets(&settings, &sets.split, &sets.test)?;
+        let test = &sets.test;
+        let (mut mean, mut linear) = fit_baselines(&sets.split.training, &settings)?;
         if is_cancelled() {
             return Ok(None);
         }
-        let (mean, linear) = (decode_set(&mut mean, &test)?, decode_set(&mut linear, &test)?);
-        let baselines = match settings.simulated() {
-            Some(simulated) => {
-                let errors = |answers| Errors::measure(&test, answers, simulated.source.stroke_mm());
-                let reference = reference(&simulated, &test)?;
-                Some(Baselines {
-                    mean: errors(&mean),
-                    linear: errors(&linear),
-                    reference: reference.ok(),
-                    no_reference: reference.err(),
-                })
-            }
+        let errors = |answers| TestErrors::measure(&settings.source, test, &answers);
+        let (mean, linear) = (
+            errors(decode_set(&mut mean, test)?),
+            errors(decode_set(&mut linear, test)?),
+        );
+        let reference = match settings.simulated() {
+            Some(simulated) => Some(reference(&simulated, test)?),
             None => None,
         };
-        let linear_row = (linear_name(&settings.source), &linear);
-        let target_baselines = [("training mean", &mean), linear_row].map(|(name, answers)| TargetRow {
-            name,
-            targets: TargetErrors::measure(test.targets(), answers.view()),
-        });
+        let (reference, no_reference) = match reference {
+            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
+            Some(Err(reason)) => (None, Some(reason)),
+            None => (None, None),
+        };
+        let baselines = Baselines {
+            mean,
+            linear,
+            reference,
+            no_reference,
+        };
         if is_cancelled() {
             return Ok(None);
         }
-        let run = Self::of_networks(settings, (split, further), test, is_cancelled, begin)?;
+        let run = Self::of_networks(settings, sets, is_cancelled, begin)?;
         Ok(run.map(|run| Self {
-            target_baselines: target_baselines.to_vec(),
-            baselines,
+            baselines: Some(baselines),
             ..run
         }))
     }
 
     /// Prepares a run whose networks are all that is asked of it: without baselines and reference, such as that of a fold.
     pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        whole(Self::of_networks(settings, (split, None), test, &|| false, |tasks| {
+        settings.check_network()?;
+        check_sets(&settings, &split, &test)?;
+        let sets = RunSets::new(split, test);
+        whole(Self::of_networks(settings, sets, &|| false, |tasks| {
             begin(settings, tasks)
         }))
     }
 
-    /// As [`Self::with_sets`], without baselines and reference.
+    /// As [`Self::with_baselines`], without baselines and reference, on settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
-        (split, further): (Split, Option<Arc<FurtherSamples>>),
-        test: Dataset,
+        RunSets { split, further, test }: RunSets,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
-        settings.check_network()?;
-        check_sets(&settings, &split, &test)?;
         let tasks = tasks(&settings, &split, further.as_ref(), &test)?;
         // The tasks hold the samples scaled; large sets need not be held twice.
         drop(split);
@@ -188,10 +179,9 @@ impl Run {
         Ok(Some(Self {
             wall_time,
             settings,
-            test: Arc::new(test),
+            test,
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
-            target_baselines: Vec::new(),
             baselines: None,
         }))
     }
@@ -277,8 +267,10 @@ mod tests {
         let whole = Run::prepare(settings).unwrap();
         let (states, answers_mm) = (whole.states(), whole.decouple_test());
         let begun = |is_cancelled: &dyn Fn() -> bool| Run::prepare_unless(settings, is_cancelled).unwrap();
-        let resumed =
-            |is_cancelled: &dyn Fn() -> bool| Run::resume_unless(settings, states.clone(), is_cancelled).unwrap();
+        let resumed = |is_cancelled: &dyn Fn() -> bool| {
+            let sets = settings.sets_unless(is_cancelled).unwrap()?;
+            Run::resume_unless(settings.into(), states.clone(), sets, is_cancelled).unwrap()
+        };
         for prepare in [&begun as &dyn Fn(&dyn Fn() -> bool) -> Option<Run>, &resumed] {
             let (run, parts) = cancelled_at(usize::MAX, prepare);
             assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));

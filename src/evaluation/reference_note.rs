@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Baselines, NoReference};
+use super::{Baselines, NoReference, TestErrors};
 
 /// Reasons for which the Bayesian reference of an error table is no bound for decoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,12 +15,19 @@ pub enum ReferenceNote {
 impl ReferenceNote {
     /// The note on the reference of these baselines; `None` if it is a bound.
     pub fn of(baselines: &Baselines) -> Option<Self> {
-        match baselines.reference {
+        match &baselines.reference {
             None => baselines.no_reference.map(Self::Missing),
-            Some(reference) if reference.z_mm > baselines.mean.z_mm => Some(Self::AboveMean),
+            Some(reference) if is_above(reference, &baselines.mean) => Some(Self::AboveMean),
             Some(_) => None,
         }
     }
+}
+
+fn is_above(reference: &TestErrors, mean: &TestErrors) -> bool {
+    reference
+        .nodes()
+        .zip(mean.nodes())
+        .is_some_and(|(reference, mean)| reference.z_mm > mean.z_mm)
 }
 
 impl fmt::Display for ReferenceNote {
@@ -65,12 +72,15 @@ mod tests {
     fn a_reference_above_the_mean_is_no_bound() {
         let model = SensorModel::new("2x2_2x6".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(0).rng(Stream::Test)).unwrap();
-        let off = |by_mm: f64| Errors::measure(&set, &set.targets().mapv(|value| value + by_mm), 1.0);
-        let baselines = |reference| Baselines {
+        let off = |by_mm: f64| {
+            let answers = set.targets().mapv(|value| value + by_mm);
+            TestErrors::Nodes(Errors::measure(&set, &answers, 1.0))
+        };
+        let baselines = |reference: Option<TestErrors>| Baselines {
             mean: off(0.25),
             linear: off(0.1),
-            reference,
             no_reference: reference.is_none().then_some(NoReference::NotConverged),
+            reference,
         };
         assert_eq!(ReferenceNote::of(&baselines(Some(off(0.2)))), None);
         assert_eq!(

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Baselines, Errors, MissingFigures, RunSettings, SimulatedSettings, TargetErrors};
+use super::{Errors, MissingFigures, RunSettings, Scores, SimulatedSettings, TargetErrors, TestErrors};
 use crate::{
     decoupling::{DecoderKind, Precision, SolvedRows},
     scene::{Noise, NoisySets},
@@ -140,6 +140,39 @@ struct Pair {
 }
 
 impl Pair {
+    fn of_nodes(errors: &Errors, mean: &Errors) -> Vec<Self> {
+        /// Errors in percent that are nothing but rounding.
+        const ROUNDING: f64 = 1e-9;
+        let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
+            Some(Self {
+                target: target.to_owned(),
+                error: error?,
+                of_mean: of_mean?,
+                rounding: ROUNDING,
+            })
+        };
+        let z = (Some(errors.z_full_scale_percent), Some(mean.z_full_scale_percent));
+        let pairs = [
+            percent("z", z.0, z.1),
+            percent("x", errors.x_percent, mean.x_percent),
+            percent("y", errors.y_percent, mean.y_percent),
+        ];
+        pairs.into_iter().flatten().collect()
+    }
+
+    fn of_targets(errors: &[TargetErrors], mean: &[TargetErrors]) -> Vec<Self> {
+        // Nothing can be judged of a target that is constant in the test samples.
+        let pairs = errors.iter().zip(mean).enumerate();
+        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
+        let pair = |(index, (errors, mean)): (usize, (&TargetErrors, &TargetErrors))| Self {
+            target: format!("target {}", index + 1),
+            error: errors.mae,
+            of_mean: mean.mae,
+            rounding: 0.0,
+        };
+        judged.map(pair).collect()
+    }
+
     /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is no number is
     /// [`Remark::Missing`]'s matter.
     fn is_worse(&self) -> bool {
@@ -154,55 +187,28 @@ impl Pair {
 }
 
 impl Remark {
-    /// Remarks on the errors of a decoder of this kind on the nodes, fitted with `settings` to `training`, beside those of
-    /// the mean.
-    pub(super) fn on_nodes(
+    /// Remarks on the errors of a decoder of this kind, fitted with `settings` to `samples` training samples of `readings`
+    /// each, compared with those of the mean.
+    pub(super) fn on(
         kind: DecoderKind,
-        (errors, mean): (&Errors, &Errors),
+        (errors, mean): (&TestErrors, &TestErrors),
         settings: &RunSettings,
         (samples, readings): (usize, usize),
     ) -> Vec<Self> {
-        /// Errors in percent that are nothing but rounding.
-        const ROUNDING: f64 = 1e-9;
-        let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
-            Some(Pair {
-                target: target.to_owned(),
-                error: error?,
-                of_mean: of_mean?,
-                rounding: ROUNDING,
-            })
+        let cause = Cause::of(kind, settings, samples, readings);
+        let pairs = match (errors, mean) {
+            (TestErrors::Nodes(errors), TestErrors::Nodes(mean)) => Pair::of_nodes(errors, mean),
+            _ => Pair::of_targets(errors.targets(), mean.targets()),
         };
-        let z = Pair {
-            target: "z".to_owned(),
-            error: errors.z_full_scale_percent,
-            of_mean: mean.z_full_scale_percent,
-            rounding: ROUNDING,
-        };
-        let others = [
-            percent("x", errors.x_percent, mean.x_percent),
-            percent("y", errors.y_percent, mean.y_percent),
-        ];
-        let pairs = [z].into_iter().chain(others.into_iter().flatten());
-        Self::on(pairs, Cause::of(kind, settings, samples, readings))
-    }
-
-    /// Remarks on the errors on targets of any meaning; see [`Self::on_nodes`].
-    pub(super) fn on_targets(
-        kind: DecoderKind,
-        (errors, mean): (&[TargetErrors], &[TargetErrors]),
-        settings: &RunSettings,
-        (samples, readings): (usize, usize),
-    ) -> Vec<Self> {
-        // Of a target that is constant in the test samples nothing can be judged.
-        let pairs = errors.iter().zip(mean).enumerate();
-        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
-        let pairs = judged.map(|(index, (errors, mean))| Pair {
-            target: format!("target {}", index + 1),
-            error: errors.mae,
-            of_mean: mean.mae,
-            rounding: 0.0,
-        });
-        Self::on(pairs, Cause::of(kind, settings, samples, readings))
+        let worse = pairs
+            .into_iter()
+            .filter(Pair::is_worse)
+            .map(|pair| Self::WorseThanMean {
+                times: pair.times(),
+                target: pair.target,
+                cause,
+            });
+        worse.collect()
     }
 
     /// Names how the training of the network ended as the cause, unless it could not know of the noise.
@@ -213,23 +219,13 @@ impl Remark {
             *cause = Cause::End { reason, method };
         }
     }
-
-    fn on(pairs: impl Iterator<Item = Pair>, cause: Cause) -> Vec<Self> {
-        let worse = pairs.filter(Pair::is_worse).map(|pair| Self::WorseThanMean {
-            times: pair.times(),
-            target: pair.target,
-            cause,
-        });
-        worse.collect()
-    }
 }
 
 /// Remarks on the rows of an error table by their names: on the network, whose training ended for `reason`, and on the
 /// linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
-    network: &Errors,
-    baselines: &Baselines,
+    Scores { network, baselines }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;
@@ -243,12 +239,11 @@ pub fn error_remarks(
         ("network", DecoderKind::Network, network),
     ];
     let of_row = |(name, kind, errors)| {
-        let mut remarks = Remark::on_nodes(kind, (errors, &baselines.mean), &settings, (samples, readings));
+        let mut remarks = Remark::on(kind, (errors, &baselines.mean), &settings, (samples, readings));
         for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
             remark.tell_end(reason, method);
         }
-        // All answers have a residual where figures are all that is asked for.
-        remarks.extend(MissingFigures::of(Precision::Double, errors, 0.0).map(Remark::Missing));
+        remarks.extend(MissingFigures::of(Precision::Double, errors, None).map(Remark::Missing));
         remarks.into_iter().map(move |remark| (name, remark))
     };
     rows.into_iter().flat_map(of_row).collect()
@@ -274,7 +269,8 @@ mod tests {
         let mut settings = SimulatedSettings::default();
         settings.source.scene.noise = noise;
         let mean = errors(0.2, Some(5.0));
-        let remarks = Remark::on_nodes(kind, (ours, &mean), &settings.into(), (samples, 30));
+        let [ours, mean] = [*ours, mean].map(TestErrors::Nodes);
+        let remarks = Remark::on(kind, (&ours, &mean), &settings.into(), (samples, 30));
         remarks.iter().map(ToString::to_string).collect()
     }
 
@@ -314,9 +310,10 @@ mod tests {
             );
             assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
         }
-        let of_exact_mean = Remark::on_nodes(
+        let [ours, exact] = [errors(0.1, Some(0.5)), errors(0.2, Some(1e-14))].map(TestErrors::Nodes);
+        let of_exact_mean = Remark::on(
             DecoderKind::Ridge,
-            (&errors(0.1, Some(0.5)), &errors(0.2, Some(1e-14))),
+            (&ours, &exact),
             &SimulatedSettings::default().into(),
             (500, 30),
         );
@@ -351,7 +348,8 @@ mod tests {
         // Metres, ohm, and a constant.
         let errors = [target(3e-12, Some(-1.0)), target(5.0, Some(0.5)), target(1e-17, None)];
         let mean = [target(2e-12, Some(0.0)), target(7.0, Some(0.0)), target(0.0, None)];
-        let remarks = Remark::on_targets(DecoderKind::Ridge, (&errors, &mean), &settings, (500, 30));
+        let [errors, mean] = [errors, mean].map(|targets| TestErrors::Targets(targets.into()));
+        let remarks = Remark::on(DecoderKind::Ridge, (&errors, &mean), &settings, (500, 30));
         assert_eq!(remarks.len(), 1, "{remarks:?}");
         assert!(
             remarks[0].to_string().contains("in target 1 is 1.500 times"),

@@ -6,10 +6,7 @@ use std::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::{
-    Baselines, Errors, RunError, RunFlaw, RunSettings, StartRecord, StartTrainer, TargetErrors, TargetRow,
-    starts::lowest,
-};
+use super::{Baselines, RunError, RunFlaw, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest};
 use crate::{
     dataset::{Dataset, PerRow},
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
@@ -28,19 +25,8 @@ pub struct Run {
     pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
     pub(super) wall_time: Option<Duration>,
-    /// Errors of the training mean and of the linear map, target by target; empty if only the networks count.
-    pub(super) target_baselines: Vec<TargetRow>,
-    /// Errors of the baselines and the reference on the nodes, if the targets are nodes.
+    /// Errors of the baselines; `None` if only the networks count.
     pub(super) baselines: Option<Baselines>,
-}
-
-/// Errors of networks and baselines on the nodes of a test set.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeScores {
-    /// Errors of the leader's best networks.
-    pub network: Errors,
-    /// Errors of the baselines.
-    pub baselines: Baselines,
 }
 
 impl Run {
@@ -153,6 +139,7 @@ impl Run {
                 validation_mse: best.validation_mse,
                 z_percent: self
                     .errors_of(&self.network_of(trainer).decouple(&self.test))
+                    .nodes()
                     .and_then(|errors| errors.z_percent),
                 epochs: trainer.latest().epoch,
                 best_epoch: trainer.best_epoch(),
@@ -190,33 +177,26 @@ impl Run {
         self.network().decouple(&self.test)
     }
 
-    /// Returns the errors of answers to the test set (samples × 3·M2, mm) on its nodes; `None` for a measured run.
-    pub fn errors_of(&self, answers: &Array2<f64>) -> Option<Errors> {
-        let simulation = self.settings.source.simulation()?;
-        Some(Errors::measure(&self.test, answers, simulation.stroke_mm()))
+    /// Returns the errors of answers to the test set (samples × targets, in the units of the targets).
+    pub fn errors_of(&self, answers: &Array2<f64>) -> TestErrors {
+        TestErrors::measure(&self.settings.source, &self.test, answers)
     }
 
-    /// Returns the errors of [`Self::network`] and the baselines on the nodes of the test set; `None` for a measured
-    /// run, which has [`Self::target_table`].
-    pub fn node_scores(&self) -> Option<NodeScores> {
-        Some(NodeScores {
-            network: self.errors_of(&self.decouple_test())?,
-            baselines: self.baselines?,
-        })
+    /// Returns the errors of [`Self::network`] on the test set.
+    pub fn errors(&self) -> TestErrors {
+        self.errors_of(&self.decouple_test())
     }
 
-    /// Errors of the baselines on the nodes of the test set; `None` for a measured run.
+    /// Errors of the baselines on the test set; `None` for the run of a fold.
     pub fn baselines(&self) -> Option<&Baselines> {
         self.baselines.as_ref()
     }
 
-    /// Returns the errors of the baselines and of [`Self::network`] on each target of the test set, of any meaning.
-    pub fn target_table(&self) -> Vec<TargetRow> {
-        let mut rows = self.target_baselines.clone();
-        rows.push(TargetRow {
-            name: "network",
-            targets: TargetErrors::measure(self.test.targets(), self.decouple_test().view()),
-        });
-        rows
+    /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
+    pub fn scores(&self) -> Option<Scores> {
+        Some(Scores {
+            network: self.errors(),
+            baselines: self.baselines.clone()?,
+        })
     }
 }

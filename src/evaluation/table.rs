@@ -1,88 +1,273 @@
-use super::{Baselines, Errors, PublishedErrors};
+use super::{Channel, Errors, Problem, PublishedErrors, Scores, TargetErrors, TestErrors};
 
-/// A row of an error table, with the same columns in the window, the terminal and files. A figure is `None` if it does
-/// not exist: the paper gives percentages of the coordinate only.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Error table: rows are baselines and decoders, columns follow from the channels. Targets of a recording have a block of
+/// rows each, and all of them together have one if they share a unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorTable {
+    /// Measures of error, one for each column.
+    pub measures: &'static [ErrorMeasure],
+    /// Blocks of rows.
+    pub blocks: Vec<ErrorBlock>,
+}
+
+/// Rows of an error table on the same targets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorBlock {
+    /// Target; `None` for the nodes of an array.
+    pub target: Option<Channel>,
+    /// Rows: baselines, decoders, reference and published figures.
+    pub rows: Vec<ErrorRow>,
+}
+
+/// A row of an error table.
+#[derive(Clone, Debug, PartialEq)]
 pub struct ErrorRow {
     /// Name of the decoder or baseline.
     pub name: &'static str,
+    /// Errors in the order of [`ErrorTable::measures`]; `None` where there is none: the paper gives percentages of the
+    /// coordinate only.
+    pub errors: Vec<Option<f64>>,
+}
+
+/// A measure of error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorMeasure {
     /// AveZerr, in percent.
-    pub z_percent: Option<f64>,
+    ZPercent,
     /// AveXerr, in percent.
-    pub x_percent: Option<f64>,
+    XPercent,
     /// AveYerr, in percent.
-    pub y_percent: Option<f64>,
+    YPercent,
     /// Mean |decoupled z − z|, in millimetres.
-    pub z_mm: Option<f64>,
-    /// [`Self::z_mm`] in percent of the stroke.
-    pub z_full_scale_percent: Option<f64>,
+    ZMm,
+    /// The same in percent of the stroke.
+    ZStrokePercent,
     /// Largest |decoupled z − z|, in millimetres.
-    pub worst_mm: Option<f64>,
+    WorstMm,
+    /// Root mean squared error, in the unit of the target.
+    Rmse,
+    /// Mean absolute error, in the unit of the target.
+    Mae,
+    /// Coefficient of determination R².
+    R2,
+    /// Largest absolute error, in the unit of the target.
+    Worst,
+    /// Mean absolute error in percent of the range of the target.
+    RangePercent,
 }
 
-impl ErrorRow {
-    /// Names of the figures, in the order of [`Self::values`].
-    pub const COLUMNS: [&'static str; 6] = [
-        "z_percent",
-        "x_percent",
-        "y_percent",
-        "z_mm",
-        "z_full_scale_percent",
-        "worst_mm",
+/// Name of the block of all targets.
+const ALL_TARGETS: &str = "all targets";
+
+impl ErrorMeasure {
+    const OF_NODES: [Self; 6] = [
+        Self::ZPercent,
+        Self::XPercent,
+        Self::YPercent,
+        Self::ZMm,
+        Self::ZStrokePercent,
+        Self::WorstMm,
     ];
+    const OF_TARGETS: [Self; 5] = [Self::Rmse, Self::Mae, Self::R2, Self::Worst, Self::RangePercent];
 
-    /// Returns the figures, in the order of [`Self::COLUMNS`].
-    pub fn values(&self) -> [Option<f64>; 6] {
-        let Self {
-            name: _,
-            z_percent,
-            x_percent,
-            y_percent,
-            z_mm,
-            z_full_scale_percent,
-            worst_mm,
-        } = *self;
-        [z_percent, x_percent, y_percent, z_mm, z_full_scale_percent, worst_mm]
-    }
-
-    fn measured(name: &'static str, errors: &Errors) -> Self {
-        Self {
-            name,
-            z_percent: errors.z_percent,
-            x_percent: errors.x_percent,
-            y_percent: errors.y_percent,
-            z_mm: Some(errors.z_mm),
-            z_full_scale_percent: Some(errors.z_full_scale_percent),
-            worst_mm: Some(errors.worst_mm),
+    /// Name in files, such as `z_percent`.
+    pub fn field(self) -> &'static str {
+        match self {
+            Self::ZPercent => "z_percent",
+            Self::XPercent => "x_percent",
+            Self::YPercent => "y_percent",
+            Self::ZMm => "z_mm",
+            Self::ZStrokePercent => "z_full_scale_percent",
+            Self::WorstMm => "worst_mm",
+            Self::Rmse => "rmse",
+            Self::Mae => "mae",
+            Self::R2 => "r2",
+            Self::Worst => "worst",
+            Self::RangePercent => "percent_of_range",
         }
     }
 
-    fn published(published: &PublishedErrors) -> Self {
-        Self {
-            name: "published",
-            z_percent: Some(published.z_percent),
-            x_percent: Some(published.x_percent),
-            y_percent: Some(published.y_percent),
-            z_mm: None,
-            z_full_scale_percent: None,
-            worst_mm: None,
+    /// Heading and fixed unit; the unit is empty where it is that of the target.
+    pub fn heading(self) -> (&'static str, &'static str) {
+        match self {
+            Self::ZPercent => ("Z", "%"),
+            Self::XPercent => ("X", "%"),
+            Self::YPercent => ("Y", "%"),
+            Self::ZMm => ("Z", "mm"),
+            Self::ZStrokePercent => ("Z", "% of the stroke"),
+            Self::WorstMm => ("worst node", "mm"),
+            Self::Rmse => ("RMSE", ""),
+            Self::Mae => ("MAE", ""),
+            Self::R2 => ("R²", ""),
+            Self::Worst => ("worst", ""),
+            Self::RangePercent => ("MAE", "% of range"),
+        }
+    }
+
+    /// Definition in a sentence.
+    pub fn definition(self) -> &'static str {
+        match self {
+            Self::ZPercent => {
+                "Mean |decoupled z − z| / |z| over samples and nodes, in percent of the coordinate (AveZerr)"
+            }
+            Self::XPercent => {
+                "Mean |decoupled x − x| / |x| over samples and nodes, in percent of the coordinate (AveXerr)"
+            }
+            Self::YPercent => {
+                "Mean |decoupled y − y| / |y| over samples and nodes, in percent of the coordinate (AveYerr)"
+            }
+            Self::ZMm => "Mean |decoupled z − z|, in millimetres",
+            Self::ZStrokePercent => "Mean |decoupled z − z|, in percent of the distance a node can travel",
+            Self::WorstMm => "Largest |decoupled z − z| of any node, in millimetres",
+            Self::Rmse => "Root mean squared error, in the unit of the target",
+            Self::Mae => "Mean absolute error, in the unit of the target",
+            Self::R2 => {
+                "Share of the target's variance that the answers explain: 1 is exact, 0 is no better than the mean"
+            }
+            Self::Worst => "Largest absolute error, in the unit of the target",
+            Self::RangePercent => "Mean absolute error in percent of the range of the target",
+        }
+    }
+
+    fn of_nodes(self, errors: &Errors) -> Option<f64> {
+        match self {
+            Self::ZPercent => errors.z_percent,
+            Self::XPercent => errors.x_percent,
+            Self::YPercent => errors.y_percent,
+            Self::ZMm => Some(errors.z_mm),
+            Self::ZStrokePercent => Some(errors.z_full_scale_percent),
+            Self::WorstMm => Some(errors.worst_mm),
+            Self::Rmse | Self::Mae | Self::R2 | Self::Worst | Self::RangePercent => None,
+        }
+    }
+
+    fn of_target(self, errors: &TargetErrors) -> Option<f64> {
+        match self {
+            Self::Rmse => Some(errors.rmse),
+            Self::Mae => Some(errors.mae),
+            Self::R2 => errors.r2,
+            Self::Worst => Some(errors.worst),
+            Self::RangePercent => errors.percent_of_range,
+            Self::ZPercent | Self::XPercent | Self::YPercent | Self::ZMm | Self::ZStrokePercent | Self::WorstMm => None,
+        }
+    }
+
+    /// Published error, if the paper gives this measure.
+    fn published(self, published: &PublishedErrors) -> Option<f64> {
+        match self {
+            Self::ZPercent => Some(published.z_percent),
+            Self::XPercent => Some(published.x_percent),
+            Self::YPercent => Some(published.y_percent),
+            _ => None,
         }
     }
 }
 
-/// Returns the rows of an error table: the baselines, the network, the Bayesian reference as the limit of any decoder,
-/// and the published errors, if there are any.
-pub fn error_rows(network: &Errors, baselines: &Baselines, published: Option<&PublishedErrors>) -> Vec<ErrorRow> {
-    let measured = [
-        ErrorRow::measured("training mean", &baselines.mean),
-        ErrorRow::measured("linear map", &baselines.linear),
-        ErrorRow::measured("network", network),
-    ];
-    let reference = baselines.reference.as_ref();
-    let reference = reference.map(|errors| ErrorRow::measured("reference", errors));
-    measured
-        .into_iter()
-        .chain(reference)
-        .chain(published.map(ErrorRow::published))
-        .collect()
+impl ErrorTable {
+    /// Returns the table of the baselines, the network, the Bayesian reference as the limit of any decoder, and the
+    /// published errors, if there are any.
+    pub fn of_scores(problem: &Problem, scores: &Scores, published: Option<&PublishedErrors>) -> Self {
+        let baselines = &scores.baselines;
+        let mut rows = vec![
+            ("training mean", &baselines.mean),
+            (baselines.linear_name(), &baselines.linear),
+            ("network", &scores.network),
+        ];
+        rows.extend(baselines.reference.as_ref().map(|errors| ("reference", errors)));
+        let mut table = Self::new(problem, &rows);
+        let last = table.blocks.last_mut();
+        if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes)) {
+            block.rows.push(ErrorRow {
+                name: "published",
+                errors: table
+                    .measures
+                    .iter()
+                    .map(|measure| measure.published(published))
+                    .collect(),
+            });
+        }
+        table
+    }
+
+    /// Returns the table of these errors, each with its name.
+    pub fn new(problem: &Problem, rows: &[(&'static str, &TestErrors)]) -> Self {
+        if problem.has_nodes {
+            let measures = &ErrorMeasure::OF_NODES;
+            let row = |(name, errors): &(&'static str, &TestErrors)| {
+                let of = |measure: &ErrorMeasure| errors.nodes().and_then(|errors| measure.of_nodes(errors));
+                ErrorRow {
+                    name,
+                    errors: measures.iter().map(of).collect(),
+                }
+            };
+            let rows = rows.iter().map(row).collect();
+            return Self {
+                measures,
+                blocks: vec![ErrorBlock { target: None, rows }],
+            };
+        }
+        let measures = &ErrorMeasure::OF_TARGETS;
+        let block = |target: Channel, errors: &dyn Fn(&TestErrors) -> Option<TargetErrors>| ErrorBlock {
+            target: Some(target),
+            rows: Vec::from_iter(rows.iter().filter_map(|(name, of_row)| {
+                let errors = errors(of_row)?;
+                Some(ErrorRow {
+                    name,
+                    errors: measures.iter().map(|measure| measure.of_target(&errors)).collect(),
+                })
+            })),
+        };
+        let targets = problem.targets.iter().enumerate();
+        let mut blocks = Vec::from_iter(
+            targets.map(|(index, target)| block(target.clone(), &|errors| errors.targets().get(index).copied())),
+        );
+        if let Some(unit) = problem.shared_unit().filter(|_| problem.targets.len() > 1) {
+            let all = Channel {
+                name: ALL_TARGETS.to_owned(),
+                unit: Some(unit.to_owned()),
+            };
+            blocks.push(block(all, &|errors| TargetErrors::over_all(errors.targets())));
+        }
+        Self { measures, blocks }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    fn problem(units: [&str; 2]) -> Problem {
+        let channel = |(name, unit): (&str, &str)| Channel {
+            name: name.to_owned(),
+            unit: Some(unit.to_owned()),
+        };
+        Problem {
+            targets: ["a", "b"].into_iter().zip(units).map(channel).collect(),
+            ..Problem::default()
+        }
+    }
+
+    #[test]
+    fn targets_of_one_unit_have_errors_over_all_of_them() {
+        // By scikit-learn: mean_squared_error(t, a) ** 0.5, mean_absolute_error, r2_score (uniform average), max.
+        let targets = array![[0.0, 10.0], [1.0, 12.0], [2.0, 14.0], [3.0, 18.0]];
+        let answers = array![[0.5, 10.0], [1.0, 11.0], [2.0, 14.0], [2.0, 20.0]];
+        let errors = TestErrors::Targets(TargetErrors::measure(targets.view(), answers.view()));
+        let table = ErrorTable::new(&problem(["N", "N"]), &[("ridge", &errors)]);
+        assert_eq!(table.blocks.len(), 3);
+        let all = &table.blocks[2];
+        assert_eq!(all.target.as_ref().unwrap().title(), "all targets (N)");
+        let expected = [0.883_883_476_483_184_4, 0.5625, 0.803_571_428_571_428_6, 2.0, 10.937_5];
+        for (found, expected) in all.rows[0].errors.iter().zip(expected) {
+            assert!((found.unwrap() - expected).abs() < 1e-12, "{found:?} {expected}");
+        }
+        assert_eq!(
+            ErrorTable::new(&problem(["N", "mm"]), &[("ridge", &errors)])
+                .blocks
+                .len(),
+            2
+        );
+    }
 }

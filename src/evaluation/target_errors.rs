@@ -20,15 +20,6 @@ pub struct TargetErrors {
     pub percent_of_range: Option<f64>,
 }
 
-/// A row of an error table for targets of any meaning.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TargetRow {
-    /// Name of the decoder or baseline.
-    pub name: &'static str,
-    /// Errors, target by target.
-    pub targets: Vec<TargetErrors>,
-}
-
 impl TargetErrors {
     /// Measures `answers` against `targets` (both samples × outputs), target by target.
     ///
@@ -38,6 +29,25 @@ impl TargetErrors {
         assert_eq!(targets.dim(), answers.dim());
         let pairs = targets.columns().into_iter().zip(answers.columns());
         pairs.map(|(targets, answers)| Self::of_one(targets, answers)).collect()
+    }
+
+    /// Returns the errors over targets in one unit: the root of the mean squared error, the mean absolute error, the mean R²
+    /// (uniform average), the largest error and the mean of the errors in percent of the range. R² and percent are over the
+    /// targets that vary. `None` without targets.
+    pub fn over_all(targets: &[Self]) -> Option<Self> {
+        let worst = targets.iter().max_by(|one, other| one.worst.total_cmp(&other.worst))?;
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+            (count > 0).then(|| sum / f64::from(count))
+        };
+        Some(Self {
+            rmse: mean(&mut targets.iter().map(|errors| errors.rmse * errors.rmse))?.sqrt(),
+            mae: mean(&mut targets.iter().map(|errors| errors.mae))?,
+            r2: mean(&mut targets.iter().filter_map(|errors| errors.r2)),
+            worst: worst.worst,
+            worst_sample: worst.worst_sample,
+            percent_of_range: mean(&mut targets.iter().filter_map(|errors| errors.percent_of_range)),
+        })
     }
 
     fn of_one(targets: ArrayView1<'_, f64>, answers: ArrayView1<'_, f64>) -> Self {

@@ -1,27 +1,25 @@
-use super::{
-    DecoderReport, DecoderSet, Errors, Preset, Run, RunError, SimulatedSettings, Workload, preparation::reference,
-};
-use crate::decoupling::{DecoderKind, Precision};
+use super::{DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, preparation::reference};
+use crate::{decoupling::DecoderKind, training::Method};
 
 /// One decoder on the trade-off between speed and accuracy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffPoint {
-    /// Preset from which the settings were derived.
-    pub preset: Preset,
-    /// Settings of the run; the hidden nodes matter only if the decoder has a network.
-    pub settings: SimulatedSettings,
+    /// Preset from which the settings were derived, if they were.
+    pub preset: Option<Preset>,
+    /// Settings of the run; hidden nodes and method matter only if the decoder has a network.
+    pub settings: RunSettings,
     /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
     /// Training or fitting time in seconds, summed over all rows and starts.
     pub training_seconds: f64,
-    /// Errors of the Bayesian reference in this scene; `None` where a posterior did not converge.
+    /// Errors of the Bayesian reference in this scene; `None` for recordings and where a posterior did not converge.
     pub reference: Option<Errors>,
 }
 
 impl TradeOffPoint {
-    /// Returns AveZerr in percent; infinite if undefined.
-    pub fn z_percent(&self) -> f64 {
-        self.report.errors.z_percent.unwrap_or(f64::INFINITY)
+    /// Returns the [error in percent](TestErrors::percent); infinite if undefined.
+    pub fn percent(&self) -> f64 {
+        self.report.errors.percent().unwrap_or(f64::INFINITY)
     }
 
     /// Number of hidden nodes, if the decoder has a network.
@@ -29,62 +27,76 @@ impl TradeOffPoint {
         self.report.kind.needs_network().then_some(self.settings.hidden)
     }
 
+    /// Training method, if the decoder has a network.
+    pub fn method(&self) -> Option<Method> {
+        let is_trained = self.report.kind.needs_network();
+        is_trained.then_some(self.settings.training.method)
+    }
+
     /// Its error in proportion to the reference: [`Errors::times`]; `None` without a reference.
     pub fn to_reference(&self) -> Option<f64> {
-        self.report.errors.times(self.reference.as_ref()?)
+        self.report.errors.nodes()?.times(self.reference.as_ref()?)
     }
 
-    /// Returns decoding time in microseconds and AveZerr in percent.
+    /// Returns decoding time in microseconds and the error in percent.
     pub fn decoding(&self) -> (f64, f64) {
-        (self.report.cost.frame_us, self.z_percent())
+        (self.report.cost.frame_us, self.percent())
     }
 
-    /// Returns training time in seconds and AveZerr in percent.
+    /// Returns training time in seconds and the error in percent.
     pub fn training(&self) -> (f64, f64) {
-        (self.training_seconds, self.z_percent())
+        (self.training_seconds, self.percent())
     }
 }
 
-/// Measures every decoder of `decoders` in the scene of `settings`, networks with each number of `hidden` nodes, and
-/// passes each point to `on_point` as soon as it is measured. Training uses all threads; decoding is timed on one.
+/// Measures every decoder of `decoders` on the test samples of `sets`, networks with each number of `hidden` nodes, and passes
+/// each point to `on_point` as soon as it is measured, or why a decoder cannot be used with these samples. Decoders that solve
+/// the equations of a sensor are left out where there is no model of one. Training uses all threads; decoding is timed on one.
 /// Returns `false` if cancelled before the end.
 ///
 /// # Errors
-/// If the settings are invalid.
+/// If the settings are invalid, or a network cannot be trained with them on these samples.
 pub fn measure_trade_off(
-    preset: Preset,
-    settings: &SimulatedSettings,
+    settings: &RunSettings,
+    sets: &RunSets,
     hidden: &[usize],
     decoders: &[DecoderKind],
     is_cancelled: impl Fn() -> bool,
-    mut on_point: impl FnMut(TradeOffPoint),
+    mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>),
 ) -> Result<bool, RunError> {
-    Workload::of_trade_off(settings, hidden, decoders)?.check_memory()?;
-    let mut set = DecoderSet::new(settings, None)?;
-    let test = settings.draw_test()?;
-    let reference = reference(settings, &test)?.ok();
-    let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) =
-        decoders.iter().partition(|kind| kind.needs_network());
+    let mut set = DecoderSet::on_set(*settings, sets.split.training.clone(), None);
+    let reference = match settings.simulated() {
+        Some(simulated) => reference(&simulated, &sets.test)?.ok(),
+        None => None,
+    };
+    let offered = decoders
+        .iter()
+        .filter(|kind| settings.source.simulation().is_some() || !kind.needs_sensor());
+    let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) = offered.partition(|kind| kind.needs_network());
+    let point = |settings: RunSettings, report: DecoderReport, training_seconds| TradeOffPoint {
+        preset: None,
+        settings,
+        report,
+        training_seconds,
+        reference,
+    };
     for kind in without {
-        if is_cancelled() {
-            return Ok(false);
+        for &precision in kind.precisions() {
+            if is_cancelled() {
+                return Ok(false);
+            }
+            if let Some(measured) = set.measure(kind, precision, &sets.test).transpose() {
+                let of_report = |report: DecoderReport| {
+                    let fit_seconds = report.cost.fit_seconds;
+                    point(*settings, report, fit_seconds)
+                };
+                on_point(kind, measured.map(of_report));
+            }
         }
-        let report = set.measure(kind, Precision::Double, &test)?;
-        let report = report.expect("it needs no network");
-        on_point(TradeOffPoint {
-            preset,
-            settings: *settings,
-            training_seconds: report.cost.fit_seconds,
-            report,
-            reference,
-        });
     }
-    if with_network.is_empty() {
-        return Ok(true);
-    }
-    for &hidden in hidden {
-        let settings = SimulatedSettings { hidden, ..*settings };
-        let Some(mut run) = Run::prepare_unless(settings, &is_cancelled)? else {
+    for &hidden in hidden.iter().filter(|_| !with_network.is_empty()) {
+        let settings = RunSettings { hidden, ..*settings };
+        let Some(mut run) = Run::on_unless(settings, sets.clone(), &is_cancelled)? else {
             return Ok(false);
         };
         while run.step().is_none() {
@@ -92,17 +104,13 @@ pub fn measure_trade_off(
                 return Ok(false);
             }
         }
+        let training_seconds = run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum();
         set.set_networks(Some(run.network()));
         for &kind in &with_network {
             for &precision in kind.precisions() {
-                let report = set.measure(kind, precision, &test)?.expect("it has its network");
-                on_point(TradeOffPoint {
-                    preset,
-                    settings,
-                    report,
-                    training_seconds: run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum(),
-                    reference,
-                });
+                if let Some(measured) = set.measure(kind, precision, &sets.test).transpose() {
+                    on_point(kind, measured.map(|report| point(settings, report, training_seconds)));
+                }
             }
         }
     }
@@ -121,14 +129,14 @@ pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
 
 /// Returns the point with the least decoding time among those with an error of at most `percent`.
 pub fn fastest_under(points: &[TradeOffPoint], percent: f64) -> Option<&TradeOffPoint> {
-    let good = points.iter().filter(|point| point.z_percent() <= percent);
+    let good = points.iter().filter(|point| point.percent() <= percent);
     good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
 }
 
 /// Returns the point with the least error among those that decode a frame within `microseconds`.
 pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Option<&TradeOffPoint> {
     let quick = points.iter().filter(|point| point.report.cost.frame_us <= microseconds);
-    quick.min_by(|a, b| a.z_percent().total_cmp(&b.z_percent()))
+    quick.min_by(|a, b| a.percent().total_cmp(&b.percent()))
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ impl TradeOffCost {
     /// Both costs, in the order offered to the user.
     pub const ALL: [Self; 2] = [Self::Decoding, Self::Training];
 
-    /// Returns the cost (microseconds of decoding, or seconds of training) and the error of z in percent.
+    /// Returns the cost (microseconds of decoding, or seconds of training) and the error in percent.
     pub fn of(self, point: &TradeOffPoint) -> (f64, f64) {
         match self {
             Self::Decoding => point.decoding(),
@@ -37,7 +37,7 @@ impl TradeOffCost {
 /// Limits of the questions "fastest under" and "most accurate under".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TradeOffLimits {
-    /// Largest Z error, in percent.
+    /// Largest error, in percent.
     pub percent: f64,
     /// Longest time of a frame, in microseconds.
     pub microseconds: f64,
@@ -52,11 +52,11 @@ impl Default for TradeOffLimits {
     }
 }
 
-/// Points of the trade-off at one noise level.
+/// Points of the trade-off at one noise level, or on a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffLevel {
-    /// Relative error of a reading.
-    pub noise: f64,
+    /// Relative error of a reading, if it is simulated.
+    pub noise: Option<f64>,
     /// Points in the order in which they were measured.
     pub points: Vec<TradeOffPoint>,
 }

@@ -12,8 +12,8 @@ use super::{
     selection::{Rows, not_a_number},
     table::stem,
 };
-use crate::evaluation::Channel;
 use crate::dataset::Dataset;
+use crate::evaluation::Channel;
 
 impl Recipe {
     /// Reads the files, relative to `folder`, and makes the samples.

@@ -21,7 +21,7 @@ pub struct Trial {
     /// it.
     pub errors: Errors,
     /// Errors of the baselines on the same samples.
-    pub baselines: Baselines,
+    pub baselines: Baselines<Errors>,
     /// Errors, on the same samples, of the best answer possible with so few hidden nodes: see [`Bottleneck`].
     pub bottleneck: Errors,
     /// Number of networks trained: 1, or one per fold.
@@ -68,7 +68,10 @@ impl Trial {
         let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
             return Ok(None);
         };
-        let scores = run.node_scores().expect("the run is simulated");
+        let scores = run
+            .scores()
+            .and_then(|scores| scores.nodes())
+            .expect("the run is simulated");
         Ok(Some(Self {
             seed: settings.seed,
             repeat: 0,

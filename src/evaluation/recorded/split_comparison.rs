@@ -1,6 +1,6 @@
 use crate::{
     dataset::{Dataset, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, RunError, RunSettings, TargetErrors, TargetRow},
+    evaluation::{CrossValidated, RunError, RunSettings, Scores, TargetErrors},
 };
 
 /// Held-out errors of the same settings on the same samples, once with folds by group (by time without groups), once with
@@ -35,33 +35,27 @@ impl SplitComparison {
         (by, validated): (SplitBy, &CrossValidated),
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let table = |rule: SplitBy| -> Result<Option<Vec<TargetRow>>, RunError> {
+        let scores = |rule: SplitBy| -> Result<Option<Scores>, RunError> {
             if rule == by {
-                return Ok(Some(validated.target_table(set)));
+                return Ok(Some(validated.scores(set)));
             }
             let folds = rule.folds_of(set, folds);
             let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
             let validated = CrossValidated::on_folds(settings, set, folds, is_cancelled)?;
-            Ok(validated.map(|validated| validated.target_table(set)))
+            Ok(validated.map(|validated| validated.scores(set)))
         };
         let honest = SplitBy::honest(set);
-        let Some(of_honest) = table(honest)? else {
+        let Some(of_honest) = scores(honest)? else {
             return Ok(None);
         };
-        let random = table(SplitBy::Random)?;
+        let random = scores(SplitBy::Random)?;
         Ok(random.map(|random| Self::of(honest, [of_honest, random])))
     }
 
-    /// Compares the tables of errors of two runs or cross-validations, by `by` and at random:
-    /// [`Run::target_table`](crate::evaluation::Run::target_table) or [`CrossValidated::target_table`].
-    ///
-    /// # Panics
-    /// If a table does not have the mean, ridge and the network.
-    pub fn of(by: SplitBy, [honest, random]: [Vec<TargetRow>; 2]) -> Self {
-        let errors = |table: Vec<TargetRow>| -> [Vec<TargetErrors>; 2] {
-            let mut rows = table.into_iter().skip(1).map(|row| row.targets);
-            std::array::from_fn(|_| rows.next().expect("the table has ridge and the network"))
-        };
+    /// Compares the errors of two runs or cross-validations, by `by` and at random.
+    pub fn of(by: SplitBy, [honest, random]: [Scores; 2]) -> Self {
+        let errors =
+            |scores: Scores| [&scores.baselines.linear, &scores.network].map(|errors| errors.targets().to_vec());
         let ([ridge, network], [random_ridge, random_network]) = (errors(honest), errors(random));
         Self {
             by,

@@ -1,0 +1,48 @@
+use std::sync::Arc;
+
+use super::{RunError, SimulatedSettings, further_samples::FurtherSamples};
+use crate::dataset::{Dataset, Split};
+
+/// Sets of samples of a run, drawn from a model or recorded.
+#[derive(Clone, Debug)]
+pub struct RunSets {
+    /// Training samples, and those held out for validation.
+    pub split: Split,
+    /// Training samples beyond those held in memory.
+    pub(super) further: Option<Arc<FurtherSamples>>,
+    /// Test samples.
+    pub test: Arc<Dataset>,
+}
+
+impl RunSets {
+    /// Returns the sets of a run whose samples are all in memory.
+    pub fn new(split: Split, test: Dataset) -> Self {
+        Self {
+            split,
+            further: None,
+            test: Arc::new(test),
+        }
+    }
+}
+
+impl SimulatedSettings {
+    /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub(crate) fn sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
+        let Some((split, test)) = self.draw_held_unless(is_cancelled)? else {
+            return Ok(None);
+        };
+        let further = FurtherSamples::of(self)?.map(Arc::new);
+        if let Some(further) = &further
+            && !further.check(is_cancelled)?
+        {
+            return Ok(None);
+        }
+        Ok(Some(RunSets {
+            further,
+            ..RunSets::new(split, test)
+        }))
+    }
+}
