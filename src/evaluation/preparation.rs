@@ -8,7 +8,6 @@ use super::{
     reference_errors,
     sets::check_sets,
     task::{Task, tasks},
-    workload::Workload,
 };
 use crate::{
     dataset::{Dataset, Split, Stream},
@@ -31,8 +30,7 @@ impl Run {
         settings: SimulatedSettings,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        Workload::of(&settings)?.check_memory()?;
-        match settings.sets_unless(is_cancelled)? {
+        match settings.checked_sets_unless(is_cancelled)? {
             Some(sets) => Self::on_unless(settings.into(), sets, is_cancelled),
             None => Ok(None),
         }
@@ -60,8 +58,7 @@ impl Run {
     /// # Errors
     /// If the settings are invalid, or the states are damaged or from another run.
     pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        settings.check_counts()?;
-        check_states(&states, settings.starts * settings.source.model_size()?.networks)?;
+        settings.check_states(&states)?;
         let sets = settings.sets_unless(&|| false)?.expect("nothing cancels it");
         whole(Self::resume_unless(settings.into(), states, sets, &|| false))
     }
@@ -159,7 +156,12 @@ impl Run {
     /// As [`Self::with_baselines`], without baselines and reference, on settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
-        RunSets { split, further, test }: RunSets,
+        RunSets {
+            split,
+            further,
+            test,
+            problem,
+        }: RunSets,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
@@ -180,6 +182,7 @@ impl Run {
             wall_time,
             settings,
             test,
+            problem,
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
@@ -224,6 +227,14 @@ fn take_up(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> 
     let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
     let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
     Ok(starts.collect())
+}
+
+impl SimulatedSettings {
+    /// Checks these settings and the number of saved trainings, before samples are drawn for them.
+    pub(crate) fn check_states(&self, states: &[TrainerState]) -> Result<(), RunError> {
+        self.check_counts()?;
+        check_states(states, self.starts * self.source.model_size()?.networks)
+    }
 }
 
 /// Checks the number of saved trainings.

@@ -50,6 +50,23 @@ pub struct TargetPosition {
 }
 
 impl Problem {
+    /// Returns the description of channels without names: readings `c1`, `c2`, … and targets `t1`, `t2`, ….
+    pub fn unnamed(inputs: usize, targets: usize) -> Self {
+        let channels = |letter: &str, count: usize| {
+            let numbers = 1..=count;
+            let channel = |number| Channel {
+                name: format!("{letter}{number}"),
+                unit: None,
+            };
+            numbers.map(channel).collect()
+        };
+        Self {
+            inputs: channels("c", inputs),
+            targets: channels("t", targets),
+            ..Self::default()
+        }
+    }
+
     /// Returns the unit of all targets, if they share one.
     pub fn shared_unit(&self) -> Option<&str> {
         let first = self.targets.first()?.unit.as_deref()?;

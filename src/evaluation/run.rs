@@ -6,7 +6,9 @@ use std::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::{Baselines, RunError, RunFlaw, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest};
+use super::{
+    Baselines, Problem, RunError, RunFlaw, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+};
 use crate::{
     dataset::{Dataset, PerRow},
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
@@ -21,6 +23,7 @@ use crate::{
 pub struct Run {
     pub(super) settings: RunSettings,
     pub(super) test: Arc<Dataset>,
+    pub(super) problem: Arc<Problem>,
     pub(super) scalings: PerRow<(Inputs, MinMax)>,
     pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
@@ -157,6 +160,11 @@ impl Run {
     /// The test set.
     pub fn test(&self) -> &Arc<Dataset> {
         &self.test
+    }
+
+    /// Description of the readings and targets.
+    pub fn problem(&self) -> &Arc<Problem> {
+        &self.problem
     }
 
     /// Returns the leader's best networks so far, ready to decode readings.

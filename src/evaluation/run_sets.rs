@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use super::{RunError, SimulatedSettings, further_samples::FurtherSamples};
+use super::{Problem, RunError, SimulatedSettings, Workload, further_samples::FurtherSamples};
 use crate::dataset::{Dataset, Split};
 
 /// Sets of samples of a run, drawn from a model or recorded.
@@ -12,20 +12,38 @@ pub struct RunSets {
     pub(super) further: Option<Arc<FurtherSamples>>,
     /// Test samples.
     pub test: Arc<Dataset>,
+    /// Description of the readings and targets.
+    pub problem: Arc<Problem>,
 }
 
 impl RunSets {
     /// Returns the sets of a run whose samples are all in memory.
     pub fn new(split: Split, test: Dataset) -> Self {
         Self {
+            problem: Arc::new(Problem::unnamed(test.channels(), test.outputs())),
             split,
             further: None,
             test: Arc::new(test),
         }
     }
+
+    /// Returns the sets with this description of their channels.
+    #[must_use]
+    pub fn described(self, problem: Problem) -> Self {
+        Self {
+            problem: Arc::new(problem),
+            ..self
+        }
+    }
 }
 
 impl SimulatedSettings {
+    /// As [`Self::sets_unless`], after a check that they fit into memory.
+    pub(crate) fn checked_sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
+        Workload::of(self)?.check_memory()?;
+        self.sets_unless(is_cancelled)
+    }
+
     /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the work.
     ///
     /// # Errors
@@ -42,7 +60,7 @@ impl SimulatedSettings {
         }
         Ok(Some(RunSets {
             further,
-            ..RunSets::new(split, test)
+            ..RunSets::new(split, test).described(self.source.problem())
         }))
     }
 }

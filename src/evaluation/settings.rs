@@ -8,14 +8,14 @@ use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
     network::{InputChoice, LARGEST_HIDDEN},
     scene::Scene,
-    sensor::SensorModel,
     training::{Method, TrainingSettings},
 };
 
 /// Settings of a run. The same settings (and the same sets, if measured) give the same network, bit for bit.
 ///
 /// `S` is the source of the samples: any [`Source`], or [`Simulation`] where only that is possible.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RunSettings<S = Source> {
     /// Source of the samples.
     pub source: S,
@@ -125,7 +125,7 @@ impl<S> RunSettings<S> {
     ///
     /// # Errors
     /// The first number out of range.
-    pub(super) fn check_network(&self) -> Result<(), CountError> {
+    pub(crate) fn check_network(&self) -> Result<(), CountError> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
             ("starts", self.starts, 1..=MOST_STARTS),
@@ -193,97 +193,5 @@ fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); 
     match counts.into_iter().find(|(_, count, allowed)| !allowed.contains(count)) {
         Some((what, count, allowed)) => Err(CountError { what, count, allowed }),
         None => Ok(()),
-    }
-}
-
-/// File format of the settings of a simulation: a single record.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Record {
-    sensor: SensorModel,
-    scene: Scene,
-    #[serde(default)]
-    inputs: InputChoice,
-    samples: usize,
-    validation_samples: usize,
-    test_samples: usize,
-    hidden: usize,
-    #[serde(default = "one_start")]
-    starts: usize,
-    training: TrainingSettings,
-    seed: Seed,
-}
-
-/// Default for files written before there were several starts.
-fn one_start() -> usize {
-    1
-}
-
-impl Serialize for SimulatedSettings {
-    fn serialize<Z: serde::Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
-        let Simulation {
-            sensor,
-            scene,
-            samples,
-            validation_samples,
-            test_samples,
-        } = self.source;
-        let record = Record {
-            sensor,
-            scene,
-            inputs: self.inputs,
-            samples,
-            validation_samples,
-            test_samples,
-            hidden: self.hidden,
-            starts: self.starts,
-            training: self.training,
-            seed: self.seed,
-        };
-        record.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for SimulatedSettings {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let record = Record::deserialize(deserializer)?;
-        Ok(Self {
-            source: Simulation {
-                sensor: record.sensor,
-                scene: record.scene,
-                samples: record.samples,
-                validation_samples: record.validation_samples,
-                test_samples: record.test_samples,
-            },
-            inputs: record.inputs,
-            hidden: record.hidden,
-            starts: record.starts,
-            training: record.training,
-            seed: record.seed,
-        })
-    }
-}
-
-/// File format of the settings of a run on measured samples.
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "RunSettings<Measured>", deny_unknown_fields)]
-struct MeasuredRecord {
-    source: Measured,
-    inputs: InputChoice,
-    hidden: usize,
-    starts: usize,
-    training: TrainingSettings,
-    seed: Seed,
-}
-
-impl Serialize for MeasuredSettings {
-    fn serialize<Z: serde::Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
-        MeasuredRecord::serialize(self, serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for MeasuredSettings {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        MeasuredRecord::deserialize(deserializer)
     }
 }

@@ -10,7 +10,8 @@ use crate::{
     clippy::large_enum_variant,
     reason = "there is one a run, and a box would cost the settings their `Copy`"
 )]
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Source {
     /// Samples drawn from a model of the sensor.
     Simulated(Simulation),
@@ -19,7 +20,8 @@ pub enum Source {
 }
 
 /// A simulated sensor, its scene, and the numbers of samples to draw.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// Model of the sensor.
     pub sensor: SensorModel,

@@ -1,7 +1,6 @@
 use std::{
     fmt, fs,
     io::{self, Read as _},
-    ops::RangeInclusive,
     path::{Path, PathBuf},
 };
 
@@ -12,7 +11,11 @@ use super::{
     heading::{Heading, NoHeading},
     limited::read_limited,
 };
-use crate::dataset::system_cause;
+use crate::{
+    dataset::system_cause,
+    evaluation::{Run, Source},
+    import::Recorded,
+};
 
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
 
@@ -24,10 +27,6 @@ pub enum DocumentKind {
     Network,
     /// A training to be resumed: [`super::CheckpointFile`].
     Checkpoint,
-    /// A network trained on measured samples: [`super::MeasuredNetworkFile`].
-    MeasuredNetwork,
-    /// A training on measured samples to be resumed: [`super::MeasuredCheckpointFile`].
-    MeasuredCheckpoint,
     /// A recipe by which measured samples are made of files: [`super::RecipeFile`].
     Recipe,
     /// A sensor model: [`super::SensorFile`].
@@ -42,11 +41,9 @@ pub enum DocumentKind {
 
 impl DocumentKind {
     /// Every kind.
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 7] = [
         Self::Network,
         Self::Checkpoint,
-        Self::MeasuredNetwork,
-        Self::MeasuredCheckpoint,
         Self::Recipe,
         Self::Sensor,
         Self::RunList,
@@ -73,9 +70,7 @@ impl DocumentKind {
         match self {
             Self::Network => "decoupler network",
             Self::Checkpoint => "decoupler checkpoint",
-            Self::MeasuredNetwork => "decoupler measured network",
-            Self::MeasuredCheckpoint => "decoupler measured checkpoint",
-            Self::Recipe => "decoupler import",
+            Self::Recipe => "decoupler recipe",
             Self::Sensor => "decoupler sensor",
             Self::RunList => "decoupler run list",
             Self::Trial => "decoupler trial",
@@ -83,47 +78,51 @@ impl DocumentKind {
         }
     }
 
-    /// Versions that can be read, of which the last is written.
-    pub(super) fn versions(self) -> RangeInclusive<u64> {
+    /// Version of the format, the only one that can be read.
+    pub(super) fn version(self) -> u64 {
         match self {
-            // Version 1 had one network and the paper's scene only, version 3 has a checksum and the ranges of the
-            // readings in training.
-            Self::Network => 1..=3,
-            // Version 1 had the paper's scene only, version 3 has the wall time.
-            Self::Checkpoint => 1..=3,
-            Self::MeasuredNetwork | Self::MeasuredCheckpoint | Self::Recipe | Self::Sensor => 1..=1,
-            Self::RunList | Self::Trial | Self::SweepPlan => 1..=1,
+            Self::Network | Self::Checkpoint => 4,
+            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial | Self::SweepPlan => 1,
+        }
+    }
+
+    /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.
+    ///
+    /// # Errors
+    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    pub(super) fn recorded_of(self, run: &Run, recorded: Option<&Recorded>) -> Result<Option<Recorded>, DocumentError> {
+        match (&run.settings().source, recorded) {
+            (Source::Simulated(_), _) => Ok(None),
+            (Source::Measured(_), Some(recorded)) => Ok(Some(recorded.clone())),
+            (Source::Measured(_), None) => Err(DocumentError::NoPlan(self)),
         }
     }
 
     fn cure(self) -> &'static str {
         match self {
-            Self::Network | Self::MeasuredNetwork => "copy or save it again",
+            Self::Network => "copy or save it again",
             Self::Recipe => "correct it, or write it again with --save-recipe",
             Self::Sensor => "correct it, or calibrate again",
-            Self::Checkpoint | Self::MeasuredCheckpoint => "copy it again, or start a new training",
+            Self::Checkpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",
             Self::Trial | Self::SweepPlan => "delete it and run the sweep again",
         }
     }
 
-    /// Reads the file of this kind at `path`, as far as its heading.
+    /// Reads the bytes of the file of this kind at `path` and checks their heading.
     ///
     /// # Errors
-    /// The file cannot be read, or is of another kind or a newer version.
-    pub(super) fn read(self, path: &Path) -> Result<(Heading, Vec<u8>), DocumentError> {
+    /// The file cannot be read, or is of another kind or version.
+    pub(super) fn read(self, path: &Path) -> Result<Vec<u8>, DocumentError> {
         let bytes = read_limited(path).map_err(|source| DocumentError::Read {
             path: path.to_owned(),
             source,
         })?;
-        Ok((self.heading(path, &bytes)?, bytes))
+        self.check_heading(path, &bytes)?;
+        Ok(bytes)
     }
 
-    /// Reads the heading of the file at `path` from its `bytes`.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub(super) fn heading(self, path: &Path, bytes: &[u8]) -> Result<Heading, DocumentError> {
+    fn check_heading(self, path: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
         let path = || path.to_owned();
         let other = |reason| DocumentError::Other {
             path: path(),
@@ -143,21 +142,16 @@ impl DocumentKind {
             NoHeading::Other => other(format!("it has no field \"format\": \"{}\"", self.format())),
         })?;
         if heading.format != self.format() {
-            let measured = [Self::MeasuredNetwork, Self::MeasuredCheckpoint];
-            let found = measured.into_iter().find(|kind| heading.format == kind.format());
-            return Err(other(match found {
-                Some(kind) => format!("it is a {kind}, which has no sensor's geometry"),
-                None => format!("its format is {}", heading.format),
-            }));
+            return Err(other(format!("its format is {}", heading.format)));
         }
-        match heading.newer_than(*self.versions().end()) {
+        match heading.version_other_than(self.version()) {
             Some(version) => Err(DocumentError::Version {
                 path: path(),
                 kind: self,
                 version,
                 program: heading.program(),
             }),
-            None => Ok(heading),
+            None => Ok(()),
         }
     }
 
@@ -172,9 +166,7 @@ impl fmt::Display for DocumentKind {
         f.write_str(match self {
             Self::Network => "network file",
             Self::Checkpoint => "checkpoint",
-            Self::MeasuredNetwork => "network file of measured samples",
-            Self::MeasuredCheckpoint => "checkpoint of measured samples",
-            Self::Recipe => "recipe of an import",
+            Self::Recipe => "recipe",
             Self::Sensor => "sensor file",
             Self::RunList => "part of a run list",
             Self::Trial => "trial",
@@ -218,7 +210,7 @@ pub enum DocumentError {
         column: usize,
     },
     /// Written in a format unknown to this version.
-    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads versions {} to {}: install a newer one", .path.display(), .kind.versions().start(), .kind.versions().end())]
+    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads version {}: open it with the program that wrote it", .path.display(), .kind.version())]
     Version {
         /// The file.
         path: PathBuf,
@@ -239,14 +231,11 @@ pub enum DocumentError {
         /// Description of the defect, with the field or with line and column.
         flaw: String,
     },
-    /// A run on measured samples: the file tells of a simulated sensor, from which samples are drawn again.
+    /// The samples are recorded, and nothing says where.
     #[error(
-        "a run on measured samples has no {0}; save its networks with serde, or its states and samples, and resume it on the same sets"
+        "a {0} of recorded samples names the recording: give the plan that reads it, or save the networks with serde"
     )]
-    Measured(DocumentKind),
-    /// A run on simulated samples, where the file tells of measured ones.
-    #[error("a run on simulated samples has no {0}; save it as a network file or checkpoint of its own kind")]
-    Simulated(DocumentKind),
+    NoPlan(DocumentKind),
     /// The run has values that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
     Unsound {

@@ -39,10 +39,9 @@ impl Heading {
         })
     }
 
-    /// The version, if it is newer than `known`.
-    pub(super) fn newer_than(&self, known: u64) -> Option<String> {
-        let newer = self.version.as_u64().is_some_and(|version| version > known);
-        newer.then(|| self.version.to_string())
+    /// The version, if it is another one.
+    pub(super) fn version_other_than(&self, known: u64) -> Option<String> {
+        (self.version.as_u64() != Some(known)).then(|| self.version.to_string())
     }
 
     /// The program that wrote it.

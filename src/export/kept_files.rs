@@ -56,7 +56,7 @@ pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteErro
 /// The file cannot be read, is of another kind or version, or is damaged.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
     let bytes = match KIND.read(path) {
-        Ok((_, bytes)) => bytes,
+        Ok(bytes) => bytes,
         Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(error),
     };

@@ -13,11 +13,7 @@ pub mod figures;
 mod heading;
 mod kept_files;
 mod limited;
-mod measured_checkpoint;
-mod measured_network;
-mod network_document;
 mod network_file;
-mod old_run_list;
 mod recipe_file;
 mod recorded_words;
 #[cfg(feature = "figures")]
@@ -37,6 +33,7 @@ mod tables;
 mod test_folder;
 #[cfg(feature = "figures")]
 mod trade_tables;
+mod training_record;
 mod unfinished;
 mod workload_words;
 
@@ -46,9 +43,7 @@ pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
-pub use measured_checkpoint::MeasuredCheckpointFile;
-pub use measured_network::MeasuredNetworkFile;
-pub use network_file::{NetworkFile, TrainingRecord};
+pub use network_file::NetworkFile;
 pub use recipe_file::RecipeFile;
 pub use recorded_words::{
     describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
@@ -75,6 +70,7 @@ pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{decoder_table, error_table, write_loss_curves};
 #[cfg(feature = "figures")]
 pub use trade_tables::{trade_off_points, trade_off_summary};
+pub use training_record::TrainingRecord;
 #[cfg(feature = "cli")]
 pub(crate) use unfinished::exit_leaving_nothing;
 pub use workload_words::describe_workload;

@@ -1,112 +1,78 @@
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind,
+    AtomicFile, DocumentError, DocumentKind, TrainingRecord,
     document::PROGRAM,
-    heading::Heading,
-    network_document::{RunDocument, UnsealedDocument},
     sealed::{Commit, Sealed},
     soundness::flaw,
+    unfinished::folder_of,
 };
 use crate::{
-    evaluation::{Baselines, Errors, PastNetwork, Run, SimulatedSettings, StartRecord},
+    evaluation::{ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores},
+    import::{Recorded, Setup},
     network::Networks,
-    training::{EpochRecord, Stage, StopReason},
 };
 
 const KIND: DocumentKind = DocumentKind::Network;
-/// First version with a checksum, and with the ranges of the readings in training.
-const SEALED_VERSION: u64 = 3;
 
-/// A trained network with its settings, the record of its training, and its errors.
-/// The file is JSON; a network that is read back gives bit-identical results.
+/// A trained network with its settings, the description of its channels, the record of its training, and its errors; for a
+/// recording also the plan that reads it. The file is JSON; a network that is read back gives bit-identical results.
+///
+/// Paths of recordings are stored relative to the folder of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkFile {
     /// Program and version that wrote the file.
     pub program: String,
-    /// Version of the format in which the file was found, or will be written.
-    pub version: u64,
-    /// Settings of the run: sensor, scene, samples, method, stopping rules, seed.
-    pub settings: SimulatedSettings,
+    /// Settings of the run: source, method, stopping rules, seed.
+    pub settings: RunSettings,
+    /// Origin of recorded samples, with absolute paths; `None` for a simulated array.
+    pub recorded: Option<Recorded>,
+    /// Names, units and positions of readings and targets.
+    pub problem: Problem,
+    /// Row-wires of the samples in ascending order, from 0, if they are known.
+    pub row_wires: Option<Vec<usize>>,
     /// Best network of the training, or best network of each row-wire.
     pub network: Networks,
     /// Record of the training.
     pub training: TrainingRecord,
-    /// Errors of the network on the test set.
-    pub errors: Errors,
-    /// Errors of the baselines on the same test set.
-    pub baselines: Baselines,
+    /// Errors of the network and of the baselines on the test set.
+    pub scores: Scores,
 }
 
-/// Record of a training.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainingRecord {
-    /// Reason for which training ended; `None` while it runs.
-    pub stop_reason: Option<StopReason>,
-    /// Epoch of the best network.
-    pub best_epoch: usize,
-    /// Training time on one thread in seconds, summed over the networks of all rows.
-    pub seconds: f64,
-    /// Record of every epoch, from the initial weights on.
-    pub history: Vec<EpochRecord>,
-    /// Training methods in the order in which they were used.
-    pub stages: Vec<Stage>,
-    /// All starts of the run, of which the best gave the network. Empty in files of versions that had one start
-    /// only, and of the network of a past epoch.
-    pub starts: Vec<StartRecord>,
-}
-
-impl TrainingRecord {
-    /// Takes the record of `run` so far.
-    pub(super) fn of(run: &Run) -> Self {
-        let trainer = run.leader();
-        Self {
-            stop_reason: run.stop_reason(),
-            best_epoch: trainer.best_epoch(),
-            seconds: trainer.elapsed().as_secs_f64(),
-            history: trainer.history().to_vec(),
-            stages: trainer.stages().to_vec(),
-            starts: run.starts(),
-        }
-    }
-
-    /// Takes the record of the start that led at a past epoch until then.
-    fn until(run: &Run, past: &PastNetwork) -> Self {
-        let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
-        let epochs = trainer.history().partition_point(|record| record.epoch <= past.epoch);
-        let stages = trainer
-            .stages()
-            .partition_point(|stage| stage.first_epoch <= past.epoch);
-        Self {
-            stop_reason: Some(StopReason::Stopped),
-            best_epoch: past.best_epoch,
-            seconds: past.elapsed.as_secs_f64(),
-            history: trainer.history()[..epochs].to_vec(),
-            stages: trainer.stages()[..stages].to_vec(),
-            // How the other starts stood then is not kept.
-            starts: Vec::new(),
-        }
-    }
+/// The part of the file that the checksum covers.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    settings: RunSettings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recorded: Option<Recorded>,
+    problem: Problem,
+    row_wires: Option<Vec<usize>>,
+    network: Networks,
+    training: TrainingRecord,
+    scores: Scores,
 }
 
 impl NetworkFile {
-    /// Takes the best network of `run` so far, with its record and errors.
+    /// Takes the best network of `run` so far, with its record and errors; `recorded` is the origin of its samples if they are
+    /// recorded.
     ///
     /// # Errors
-    /// [`DocumentError::Measured`] if the samples were measured.
-    pub fn from_run(run: &Run) -> Result<Self, DocumentError> {
-        let simulated = run.settings().simulated().zip(run.node_scores());
-        let (settings, scores) = simulated.ok_or(DocumentError::Measured(KIND))?;
+    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
+        let scores = run.scores().ok_or(DocumentError::NoPlan(KIND))?;
         Ok(Self {
             program: PROGRAM.to_owned(),
-            version: *KIND.versions().end(),
-            settings,
+            settings: *run.settings(),
+            recorded: KIND.recorded_of(run, recorded)?,
+            problem: Problem::clone(run.problem()),
+            row_wires: run.test().row_wires_read().map(<[usize]>::to_vec),
             network: run.network(),
             training: TrainingRecord::of(run),
-            errors: scores.network,
-            baselines: scores.baselines,
+            scores,
         })
     }
 
@@ -114,15 +80,30 @@ impl NetworkFile {
     /// errors.
     ///
     /// # Errors
-    /// [`DocumentError::Measured`] if the samples were measured.
-    pub fn from_past(run: &Run, past: &PastNetwork) -> Result<Self, DocumentError> {
-        let errors = run.errors_of(&past.networks.decouple(run.test()));
-        Ok(Self {
-            network: past.networks.clone(),
-            training: TrainingRecord::until(run, past),
-            errors: errors.ok_or(DocumentError::Measured(KIND))?,
-            ..Self::from_run(run)?
-        })
+    /// As [`Self::from_run`].
+    pub fn from_past(run: &Run, recorded: Option<&Recorded>, past: &PastNetwork) -> Result<Self, DocumentError> {
+        let mut file = Self::from_run(run, recorded)?;
+        file.scores.network = run.errors_of(&past.networks.decouple(run.test()));
+        file.network = past.networks.clone();
+        file.training = TrainingRecord::until(run, past);
+        Ok(file)
+    }
+
+    /// Setup of the run.
+    pub fn setup(&self) -> Setup {
+        let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
+        Setup::of(self.settings, plan).expect("a file of a recording has its plan, as reading and writing check")
+    }
+
+    /// Name of the source: the array scale, or the stem of the first recording.
+    pub fn source_name(&self) -> String {
+        self.setup().source_name()
+    }
+
+    /// Errors of the network and of the baselines, next to the published ones if there are any.
+    pub fn error_table(&self) -> ErrorTable {
+        let published = self.settings.simulated().and_then(|settings| settings.published());
+        ErrorTable::of_scores(&self.problem, &self.scores, published.as_ref())
     }
 
     /// Writes the file whole or not at all.
@@ -142,8 +123,27 @@ impl NetworkFile {
         if let Some(flaw) = flaw(self) {
             return Err(unsound(flaw));
         }
-        let run = to_raw_value(&RunDocument::of(self)).map_err(|error| unsound(error.to_string()))?;
-        Ok(Sealed::new(KIND, &self.program, &run).save(path, commit)?)
+        let Self {
+            program,
+            settings,
+            recorded,
+            problem,
+            row_wires,
+            network,
+            training,
+            scores,
+        } = self.clone();
+        let document = Document {
+            settings,
+            recorded: recorded.map(|recorded| recorded.relative_to(folder_of(path))),
+            problem,
+            row_wires,
+            network,
+            training,
+            scores,
+        };
+        let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
+        Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
     }
 
     /// Reads the file at `path`.
@@ -151,8 +151,10 @@ impl NetworkFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
-        let (heading, bytes) = KIND.read(path)?;
-        Self::parse(path, &heading, &bytes)
+        let bytes = KIND.read(path)?;
+        let read = Self::parse(&bytes, folder_of(path));
+        let sound = read.and_then(|file| flaw(&file).map_or(Ok(file), Err));
+        sound.map_err(|flaw| KIND.damaged(path, flaw))
     }
 
     /// Describes the first defect that would keep the file from being read back.
@@ -160,43 +162,18 @@ impl NetworkFile {
         flaw(self)
     }
 
-    /// Tells what cannot be noticed because an old version of the program wrote the file.
-    pub fn old_version_warning(&self) -> Option<String> {
-        (self.version < SEALED_VERSION).then(|| {
-            format!(
-                "the file has version {} of the format, without a checksum and without the range of the readings in \
-                 training: neither damage nor readings outside that range are noticed; train again to have both",
-                self.version
-            )
+    fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {
+        let Sealed { program, run, .. } = Sealed::read(bytes)?;
+        let document: Document = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
+        Ok(Self {
+            program,
+            settings: document.settings,
+            recorded: document.recorded.map(|recorded| recorded.within(folder)),
+            problem: document.problem,
+            row_wires: document.row_wires,
+            network: document.network,
+            training: document.training,
+            scores: document.scores,
         })
-    }
-
-    /// Reads the file at `path` from its `bytes`.
-    pub(super) fn parse(path: &Path, heading: &Heading, bytes: &[u8]) -> Result<Self, DocumentError> {
-        let is_sealed = heading.version.as_u64() >= Some(SEALED_VERSION);
-        let read = if is_sealed {
-            Self::read_sealed(bytes)
-        } else {
-            Self::read_unsealed(bytes)
-        };
-        let sound = read.and_then(|file| flaw(&file).map_or(Ok(file), Err));
-        sound.map_err(|flaw| KIND.damaged(path, flaw))
-    }
-
-    fn read_sealed(bytes: &[u8]) -> Result<Self, String> {
-        let Sealed {
-            version, program, run, ..
-        } = Sealed::read(bytes)?;
-        let run: RunDocument = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
-        run.into_file(program, version)
-    }
-
-    fn read_unsealed(bytes: &[u8]) -> Result<Self, String> {
-        let document: UnsealedDocument = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
-        if !KIND.versions().contains(&document.version) {
-            return Err(format!("version: there is no version {}", document.version));
-        }
-        let (program, version) = (document.program.clone(), document.version);
-        RunDocument::from(document).into_file(program, version)
     }
 }

@@ -29,7 +29,7 @@ impl RecipeFile {
     pub fn save(plan: &Plan, path: &Path) -> Result<(), WriteError> {
         let document = Document {
             format: KIND.format().to_owned(),
-            version: *KIND.versions().end(),
+            version: KIND.version(),
             program: PROGRAM.to_owned(),
             plan: plan.relative_to(folder(path)),
         };
@@ -44,7 +44,7 @@ impl RecipeFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or has a field that is missing, unknown or wrong.
     pub fn load(path: &Path) -> Result<Plan, DocumentError> {
-        let (_, bytes) = KIND.read(path)?;
+        let bytes = KIND.read(path)?;
         let document: Document =
             serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
         Ok(document.plan.within(folder(path)))

@@ -1,4 +1,4 @@
-use super::{MeasuredNetworkFile, format_number};
+use super::{NetworkFile, format_number};
 use crate::{
     evaluation::{Channel, TargetPosition},
     evaluation::{
@@ -54,9 +54,11 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
 }
 
 /// Warns of targets on which the network is worse than ridge, or no better to three digits.
-pub fn describe_worse_than_ridge(file: &MeasuredNetworkFile) -> Vec<String> {
-    let errors = file.errors.iter().zip(&file.ridge);
+pub fn describe_worse_than_ridge(file: &NetworkFile) -> Vec<String> {
+    let scores = &file.scores;
+    let errors = scores.network.targets().iter().zip(scores.baselines.linear.targets());
     let worse = file
+        .problem
         .targets
         .iter()
         .zip(errors)

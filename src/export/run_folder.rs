@@ -9,9 +9,8 @@ use std::{
 use super::{
     AtomicFile, DocumentError, NetworkFile, WriteError,
     kept_files::{ids, name_path, pinned_path, read, run_path, write},
-    old_run_list::OldRunList,
 };
-use crate::{dataset::clean_name::clean_name, dataset::system_cause, evaluation::SimulatedSettings};
+use crate::dataset::{clean_name::clean_name, system_cause};
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,24 +51,17 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Opens the folder at `path`, which is created if it is missing. A new folder takes over the runs of
-    /// `workspace.json` beside it, in which earlier versions kept all of them; that file stays as it is.
+    /// Opens the folder at `path`, which is created if it is missing, and reads its runs.
     ///
     /// # Errors
     /// The folder cannot be written.
     pub fn open(path: &Path) -> Result<(Self, Vec<String>), DocumentError> {
         fs::create_dir_all(path).map_err(|source| WriteError::io(path, source))?;
-        let mut problems = Vec::new();
-        if !pinned_path(path).exists() {
-            let pinned = take_over(&path.with_file_name("workspace.json"), path, &mut problems)?;
-            // Written last: while it is missing, the old list has not been taken over whole.
-            write(&pinned_path(path), &pinned)?;
-        }
         let mut folder = Self {
             path: Some(path.to_owned()),
             ..Self::default()
         };
-        problems.extend(folder.look());
+        let problems = folder.look();
         Ok((folder, problems))
     }
 
@@ -106,7 +98,7 @@ impl RunFolder {
             if let Err(place) = self.kept.runs.binary_search_by_key(&id, |run| run.id) {
                 match NetworkFile::load(&run_path(path, id)) {
                     Ok(file) => {
-                        let name = new_name(&self.kept.runs, &file.settings);
+                        let name = new_name(&self.kept.runs, &file);
                         let file = Arc::new(file);
                         self.kept.runs.insert(place, KeptRun { id, name, file });
                     }
@@ -143,12 +135,12 @@ impl RunFolder {
         problems
     }
 
-    /// Adds a finished training under a new name: array, hidden nodes and method.
+    /// Adds a finished training under a new name: source, hidden nodes and method.
     ///
     /// # Errors
     /// Its file cannot be written; it is then in the list until the program ends.
     pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
-        let name = new_name(&self.kept.runs, &file.settings);
+        let name = new_name(&self.kept.runs, &file);
         let (id, written) = self.write_run(&file, &name);
         if self.folder_of(id).is_none() {
             self.unwritten.insert(id);
@@ -228,41 +220,12 @@ impl RunFolder {
     }
 }
 
-/// Returns array, hidden nodes and method; numbered if there is such a name.
-fn new_name(runs: &[KeptRun], settings: &SimulatedSettings) -> String {
-    let method = settings.training.method.short_name();
-    let name = format!("{} h{} {method}", settings.source.sensor.scale, settings.hidden);
+/// Returns source, hidden nodes and method; numbered if there is such a name.
+fn new_name(runs: &[KeptRun], file: &NetworkFile) -> String {
+    let method = file.settings.training.method.short_name();
+    let name = format!("{} h{} {method}", file.source_name(), file.settings.hidden);
     let is_taken = |name: &str| runs.iter().any(|run| run.name == name);
     let numbered = (2..).map(|number| format!("{name} ({number})"));
     let mut names = std::iter::once(name.clone()).chain(numbered);
     names.find(|name| !is_taken(name)).unwrap_or(name)
-}
-
-/// Copies the runs of the file `old` to `folder`, numbered from 1, and returns the two that are compared. What cannot be
-/// read is added to `problems`.
-fn take_over(old: &Path, folder: &Path, problems: &mut Vec<String>) -> Result<[Option<u64>; 2], DocumentError> {
-    if !old.exists() {
-        return Ok([None; 2]);
-    }
-    let damaged = |flaw: &str| {
-        let old = old.display();
-        format!("not all runs of the earlier run list '{old}' could be taken over ({flaw}); it is kept as it is")
-    };
-    let list = match OldRunList::read(old) {
-        Ok(list) => list,
-        Err(flaw) => {
-            problems.push(damaged(&flaw));
-            return Ok([None; 2]);
-        }
-    };
-    for (id, (name, file)) in (1..).zip(list.runs) {
-        match file {
-            Ok(file) => {
-                file.save(&run_path(folder, id))?;
-                write(&name_path(folder, id), &name)?;
-            }
-            Err(flaw) => problems.push(damaged(&format!("run '{name}': {flaw}"))),
-        }
-    }
-    Ok(list.pinned.map(|position| Some(position? as u64 + 1)))
 }

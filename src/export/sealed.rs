@@ -25,7 +25,7 @@ impl<'a> Sealed<'a> {
     pub(super) fn new(kind: DocumentKind, program: &str, run: &'a RawValue) -> Self {
         Self {
             format: kind.format().to_owned(),
-            version: *kind.versions().end(),
+            version: kind.version(),
             program: program.to_owned(),
             crc32: checksum(run),
             run,

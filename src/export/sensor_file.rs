@@ -28,7 +28,7 @@ impl SensorFile {
     pub fn save(sensor: &SensorModel, path: &Path) -> Result<(), WriteError> {
         let document = Document {
             format: KIND.format().to_owned(),
-            version: *KIND.versions().end(),
+            version: KIND.version(),
             program: PROGRAM.to_owned(),
             sensor: *sensor,
         };
@@ -43,7 +43,7 @@ impl SensorFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or its sensor is impossible.
     pub fn load(path: &Path) -> Result<SensorModel, DocumentError> {
-        let (_, bytes) = KIND.read(path)?;
+        let bytes = KIND.read(path)?;
         let document: Document =
             serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
         let sensor = document.sensor;

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::NetworkFile;
 use crate::{
-    evaluation::{Baselines, Errors, SimulatedSettings, StartRecord},
+    evaluation::{Problem, RunSettings, Scores, SimulatedSettings, StartRecord, TestErrors},
+    import::Recorded,
     network::{DecouplingNetwork, Networks},
-    sensor::ArrayScale,
 };
 
 /// Describes the first defect of a network file and its field. Checked before writing and after reading, so
@@ -14,30 +14,29 @@ use crate::{
 pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     let NetworkFile {
         program: _,
-        version: _,
         settings,
+        recorded,
+        problem,
+        row_wires,
         network,
         training,
-        errors,
-        baselines:
-            Baselines {
-                mean,
-                linear,
-                reference,
-                no_reference: _,
-            },
+        scores: Scores {
+            network: errors,
+            baselines,
+        },
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();
         weights.iter().position(|weight| !weight.is_finite())
     };
     let last_epoch = training.history.last().map(|record| record.epoch);
+    let simulated = settings.simulated();
     let flaws = [
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
-        number_flaw(network, settings),
-        (network.values().iter()).find_map(|network| mismatch(network, settings.source.sensor.scale, settings.hidden)),
-        place_flaw(network, settings),
+        number_flaw(network, settings, row_wires.as_deref()),
+        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.hidden)),
+        simulated.and_then(|settings| place_flaw(network, &settings)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
@@ -45,33 +44,43 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
         starts_flaw(file),
-        unmeasured("errors", errors),
-        unmeasured("baselines.mean", mean),
-        unmeasured("baselines.linear", linear),
-        reference
-            .as_ref()
-            .and_then(|reference| unmeasured("baselines.reference", reference)),
+        unmeasured("scores.network", errors, problem),
+        unmeasured("scores.baselines.mean", &baselines.mean, problem),
+        unmeasured("scores.baselines.linear", &baselines.linear, problem),
+        (baselines.reference.as_ref())
+            .and_then(|reference| unmeasured("scores.baselines.reference", reference, problem)),
     ];
-    settings_flaw(settings).or_else(|| flaws.into_iter().flatten().next())
+    let problem_flaw = simulated
+        .filter(|settings| *problem != settings.source.problem())
+        .map(|_| "problem: it is not that of the array".to_owned());
+    settings_flaw(settings, recorded.as_ref())
+        .or(problem_flaw)
+        .or_else(|| flaws.into_iter().flatten().next())
 }
 
 /// Describes the first impossible value of the settings in a file, and its field.
-pub(super) fn settings_flaw(settings: &SimulatedSettings) -> Option<String> {
+pub(super) fn settings_flaw(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
     let at = |field: &str, flaw: &dyn Display| format!("{field}: {flaw}");
-    let checks = [
-        settings.check_counts().map_err(|flaw| at("settings", &flaw)),
-        settings
-            .source
-            .sensor
-            .check()
-            .map_err(|flaw| at("settings.source.sensor", &flaw)),
-        settings
-            .source
-            .scene
-            .check()
-            .map_err(|flaw| at("settings.source.scene", &flaw)),
-        settings.training.check().map_err(|flaw| at("settings.training", &flaw)),
-    ];
+    let training = settings.training.check().map_err(|flaw| at("settings.training", &flaw));
+    let source = match settings.simulated() {
+        Some(settings) => [
+            settings.check_counts().map_err(|flaw| at("settings", &flaw)),
+            (settings.source.sensor.check()).map_err(|flaw| at("settings.source.sensor", &flaw)),
+            (settings.source.scene.check()).map_err(|flaw| at("settings.source.scene", &flaw)),
+        ],
+        None => [
+            settings.check_network().map_err(|flaw| at("settings", &flaw)),
+            Ok(()),
+            Ok(()),
+        ],
+    };
+    let is_recording = settings.source.simulation().is_none();
+    let recorded = match recorded {
+        Some(_) if !is_recording => Err("recorded: the source is a simulated array".to_owned()),
+        None if is_recording => Err("recorded: it is missing".to_owned()),
+        _ => Ok(()),
+    };
+    let checks = source.into_iter().chain([training, recorded]);
     checks.into_iter().find_map(Result::err)
 }
 
@@ -93,32 +102,33 @@ fn starts_flaw(file: &NetworkFile) -> Option<String> {
     ))
 }
 
-fn number_flaw(network: &Networks, settings: &SimulatedSettings) -> Option<String> {
-    let (found, rows) = (network.values().len(), settings.source.scene.rows);
-    match settings.source.model_size() {
-        Ok(size) if size.networks == found => None,
-        Ok(size) => Some(format!(
-            "network: {found} of them, but rows {rows} of {} need {}",
-            settings.source.sensor.scale, size.networks
-        )),
-        Err(flaw) => Some(format!("settings.source.scene.rows: {flaw}")),
+fn number_flaw(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
+    let found = network.values().len();
+    match settings.simulated().map(|settings| settings.source) {
+        Some(source) => match source.model_size() {
+            Ok(size) if size.networks == found => None,
+            Ok(size) => Some(format!(
+                "network: {found} of them, but rows {} of {} need {}",
+                source.scene.rows, source.sensor.scale, size.networks
+            )),
+            Err(flaw) => Some(format!("settings.source.scene.rows: {flaw}")),
+        },
+        None => {
+            let rows = row_wires.map_or(1, <[usize]>::len);
+            (found != 1 && found != rows).then(|| format!("network: {found} of them for {rows} row-wires"))
+        }
     }
 }
 
-fn mismatch(network: &DecouplingNetwork, scale: ArrayScale, hidden: usize) -> Option<String> {
+fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Option<String> {
     let sizes = [
-        ("reads", network.inputs().channels(), scale.columns(), "resistances"),
-        (
-            "gives",
-            network.outputs().channels(),
-            scale.coordinates_per_row(),
-            "coordinates",
-        ),
+        ("reads", network.inputs().channels(), problem.inputs.len(), "readings"),
+        ("gives", network.outputs().channels(), problem.targets.len(), "targets"),
         ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
     ];
     let (verb, found, expected, what) = sizes.into_iter().find(|(_, found, expected, _)| found != expected)?;
     Some(format!(
-        "network: it {verb} {found} {what}, but array {scale} with {hidden} hidden nodes needs {expected}"
+        "network: it {verb} {found} {what}, but the settings need {expected}"
     ))
 }
 
@@ -160,25 +170,15 @@ fn place_flaw(networks: &Networks, settings: &SimulatedSettings) -> Option<Strin
     None
 }
 
-fn unmeasured(place: &str, errors: &Errors) -> Option<String> {
-    let Errors {
-        z_percent,
-        x_percent,
-        y_percent,
-        z_mm,
-        z_full_scale_percent,
-        worst_mm,
-        worst_node: _,
-    } = *errors;
-    let figures = [
-        ("z_percent", z_percent),
-        ("x_percent", x_percent),
-        ("y_percent", y_percent),
-        ("z_mm", Some(z_mm)),
-        ("z_full_scale_percent", Some(z_full_scale_percent)),
-        ("worst_mm", Some(worst_mm)),
-    ];
-    let infinite = |(_, figure): &(_, Option<f64>)| figure.is_some_and(|figure| !figure.is_finite());
-    let (name, _) = figures.into_iter().find(infinite)?;
+fn unmeasured(place: &str, errors: &TestErrors, problem: &Problem) -> Option<String> {
+    match errors {
+        TestErrors::Nodes(_) if !problem.has_nodes => return Some(format!("{place}: the targets are not nodes")),
+        TestErrors::Targets(targets) if targets.len() != problem.targets.len() => {
+            let (found, expected) = (targets.len(), problem.targets.len());
+            return Some(format!("{place}: {found} of them for {expected} targets"));
+        }
+        _ => {}
+    }
+    let name = errors.infinite_figure()?;
     Some(format!("{place}.{name}: it is not a finite number"))
 }

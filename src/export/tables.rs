@@ -2,31 +2,34 @@ use std::io::{self, Write};
 
 use super::{Cell, Table, TableColumn};
 use crate::{
-    evaluation::{DecoderReport, ErrorRow, Errors},
+    evaluation::{Channel, DecoderReport, ErrorBlock, ErrorRow, ErrorTable, Errors},
     training::EpochRecord,
 };
 
-/// The error table: for files all figures of [`ErrorRow`], for readers the same with units.
-pub fn error_table(rows: &[ErrorRow]) -> Table {
-    let words = [
-        ("Z", "%"),
-        ("X", "%"),
-        ("Y", "%"),
-        ("Z", "mm"),
-        ("Z", "% of the stroke"),
-        ("worst node", "mm"),
-    ];
-    let fields = ErrorRow::COLUMNS.into_iter().zip(words);
-    let figures = fields.map(|(field, (heading, unit))| TableColumn::new(field, heading, unit));
-    let row = |row: &ErrorRow| {
-        let values = row.values().into_iter().map(Cell::from);
-        std::iter::once(row.name.into()).chain(values).collect()
+/// Returns the error table: a row for each decoder and baseline, in a recording for each of every target.
+pub fn error_table(table: &ErrorTable) -> Table {
+    let has_targets = table.blocks.iter().any(|block| block.target.is_some());
+    let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
+    let measures = table.measures.iter().map(|measure| {
+        let (heading, unit) = measure.heading();
+        TableColumn::new(measure.field(), heading, unit)
+    });
+    let row = |block: &ErrorBlock, row: &ErrorRow| -> Vec<Cell> {
+        let target = has_targets.then(|| block.target.as_ref().map_or(String::new(), Channel::title).into());
+        let errors = row.errors.iter().copied().map(Cell::from);
+        target.into_iter().chain([row.name.into()]).chain(errors).collect()
     };
+    let rows = table
+        .blocks
+        .iter()
+        .flat_map(|block| block.rows.iter().map(move |line| row(block, line)));
     Table {
-        columns: std::iter::once(TableColumn::new("decoupler", "Decoder", ""))
-            .chain(figures)
+        columns: target
+            .into_iter()
+            .chain([TableColumn::new("decoupler", "Decoder", "")])
+            .chain(measures)
             .collect(),
-        rows: rows.iter().map(row).collect(),
+        rows: rows.collect(),
     }
 }
 
@@ -34,11 +37,12 @@ pub fn error_table(rows: &[ErrorRow]) -> Table {
 pub fn decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> Table {
     let reference = reference.filter(|reference| !reference.is_rounding());
     let row = |report: &DecoderReport| {
+        let nodes = report.errors.nodes();
         vec![
             report.kind.name(report.precision).into(),
-            report.errors.z_percent.into(),
-            report.errors.z_mm.into(),
-            reference.and_then(|reference| report.errors.times(reference)).into(),
+            report.errors.percent().into(),
+            nodes.map(|errors| errors.z_mm).into(),
+            reference.and_then(|reference| nodes?.times(reference)).into(),
             report.residual.into(),
             report.cost.frame_us.into(),
         ]
@@ -108,20 +112,22 @@ fn write_optional(value: Option<f64>, writer: &mut dyn Write) -> io::Result<()> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::Problem;
 
     #[test]
     fn an_error_table_has_gaps_where_the_paper_is_silent() {
         let row = ErrorRow {
             name: "published",
-            z_percent: Some(2.28),
-            x_percent: Some(0.22),
-            y_percent: Some(2.39e-12),
-            z_mm: None,
-            z_full_scale_percent: None,
-            worst_mm: None,
+            errors: vec![Some(2.28), Some(0.22), Some(2.39e-12), None, None, None],
         };
+        let problem = Problem {
+            has_nodes: true,
+            ..Problem::default()
+        };
+        let mut errors = ErrorTable::new(&problem, &[]);
+        errors.blocks[0].rows.push(row);
         let mut table = Vec::new();
-        error_table(&[row]).write_csv(&mut table).unwrap();
+        error_table(&errors).write_csv(&mut table).unwrap();
         assert_eq!(
             String::from_utf8(table).unwrap(),
             "decoupler,z_percent,x_percent,y_percent,z_mm,z_full_scale_percent,worst_mm\n\

@@ -38,14 +38,16 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
             let count = |count: Option<usize>| count.map_or(Cell::Number(None), Cell::from);
             vec![
                 level.noise.into(),
-                point.preset.to_string().into(),
+                point
+                    .preset
+                    .map_or(Cell::Number(None), |preset| preset.to_string().into()),
                 report.kind.to_string().into(),
                 precision.into(),
                 count(hidden),
-                point.settings.source.samples.into(),
+                count(point.settings.source.simulation().map(|simulation| simulation.samples)),
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
-                report.errors.z_percent.into(),
-                report.errors.z_mm.into(),
+                report.errors.percent().into(),
+                report.errors.nodes().map(|errors| errors.z_mm).into(),
                 report.cost.frame_us.into(),
                 point.training_seconds.into(),
                 report.residual.into(),
@@ -68,8 +70,8 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let row = |point: &TradeOffPoint| {
         vec![
             point_name(point).into(),
-            point.report.errors.z_percent.into(),
-            point.report.errors.z_mm.into(),
+            point.report.errors.percent().into(),
+            point.report.errors.nodes().map(|errors| errors.z_mm).into(),
             point.to_reference().into(),
             point.report.cost.frame_us.into(),
             point.training_seconds.into(),

@@ -11,13 +11,13 @@ use super::{
 use crate::{
     decoupling::Precision,
     evaluation::Channel,
-    evaluation::{TargetReport, format::format_number, pareto_front},
+    evaluation::{DecoderReport, format::format_number, pareto_front},
 };
 
 /// Error of each decoder for the target at this place against its time to decode `decoded` ("a sample"), with the Pareto
 /// front: what no other decoder beats in both.
-pub fn decoders_figure(reports: &[TargetReport], target: usize, channel: &Channel, decoded: &str) -> PlotFigure {
-    let at = |report: &TargetReport| (report.cost.frame_us, report.targets[target].rmse);
+pub fn decoders_figure(reports: &[DecoderReport], target: usize, channel: &Channel, decoded: &str) -> PlotFigure {
+    let at = |report: &DecoderReport| (report.cost.frame_us, report.errors.targets()[target].rmse);
     let places: Vec<(f64, f64)> = reports.iter().map(at).collect();
     let is_on_front = pareto_front(&places);
     let front = Look::line(Hue::Grey, LineStyle::Solid);

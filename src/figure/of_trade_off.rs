@@ -45,8 +45,8 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
         keys.extend(is_there.then(|| Key::new(kind.name(Precision::Double), look)));
     }
     for preset in Preset::ALL {
-        let look = Look::marker(Hue::Ink, marker(preset, Precision::Double));
-        let is_there = level.points.iter().any(|point| point.preset == preset);
+        let look = Look::marker(Hue::Ink, marker(Some(preset), Precision::Double));
+        let is_there = level.points.iter().any(|point| point.preset == Some(preset));
         keys.extend(is_there.then(|| Key::new(format!("{preset} preset"), look)));
     }
     let mut points = level.points.iter();
@@ -77,12 +77,12 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
     }
 }
 
-fn marker(preset: Preset, precision: Precision) -> Marker {
+fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
     match (preset, precision) {
-        (Preset::Paper, Precision::Double) => Marker::Disc,
-        (Preset::Paper, Precision::Single) => Marker::Ring,
-        (Preset::Best, Precision::Double) => Marker::Diamond,
-        (Preset::Best, Precision::Single) => Marker::HollowDiamond,
+        (Some(Preset::Paper) | None, Precision::Double) => Marker::Disc,
+        (Some(Preset::Paper) | None, Precision::Single) => Marker::Ring,
+        (Some(Preset::Best), Precision::Double) => Marker::Diamond,
+        (Some(Preset::Best), Precision::Single) => Marker::HollowDiamond,
     }
 }
 
@@ -95,7 +95,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     let is_on_front = level.front(cost);
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
-            for preset in Preset::ALL {
+            for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
                 let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
                     (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
                 };
@@ -106,7 +106,10 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
                     ..PlotPoint::from(at(point))
                 });
                 let look = Look::marker(kind.colour().into(), marker(preset, precision));
-                let name = format!("{}, {preset} preset", kind.name(precision));
+                let name = match preset {
+                    Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
+                    None => kind.name(precision).to_owned(),
+                };
                 series.push(Series {
                     points: points.collect(),
                     ..Series::new(name, look, [])
@@ -136,7 +139,11 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     series.retain(|series| !series.points.is_empty());
     let mut plot = Plot::new(
         PlotAxis::logarithmic(cost.name()),
-        PlotAxis::logarithmic("Z error (%)"),
+        PlotAxis::logarithmic(if level.noise.is_some() {
+            "Z error (%)"
+        } else {
+            "mean absolute error (% of range)"
+        }),
         series,
     );
     let reference = level.points.first().and_then(|point| point.reference);

@@ -10,7 +10,11 @@ use crate::evaluation::{
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradeOffPoint) -> String {
     let mut name = point.report.kind.name(point.report.precision).to_owned();
-    name += &format!(", {} preset", point.preset);
+    if let Some(preset) = point.preset {
+        name += &format!(", {preset} preset");
+    } else if let Some(method) = point.method() {
+        name += &format!(", {}", method.short_name());
+    }
     if let Some(hidden) = point.hidden() {
         name += &format!(", {hidden} hidden");
     }
@@ -42,11 +46,11 @@ pub fn training_time(seconds: f64) -> String {
 
 /// Returns the errors and times of a point, line by line.
 pub fn point_facts(point: &TradeOffPoint) -> Vec<String> {
-    let mut facts = vec![format!(
-        "Z error {}, {} mm",
-        format_percent(point.report.errors.z_percent),
-        format_number(point.report.errors.z_mm)
-    )];
+    let percent = format_percent(point.report.errors.percent());
+    let mut facts = vec![match point.report.errors.nodes() {
+        Some(errors) => format!("Z error {percent}, {} mm", format_number(errors.z_mm)),
+        None => format!("mean absolute error {percent} of the range"),
+    }];
     if let Some(ratio) = point.to_reference() {
         facts.push(format!("{} times the Bayesian reference", format_number(ratio)));
     }

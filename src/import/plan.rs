@@ -150,7 +150,7 @@ impl Plan {
         self.with_paths(|path| folder.join(path))
     }
 
-    fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {
+    pub(super) fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {
         let mut plan = self.clone();
         plan.import.data = of(&plan.import.data);
         plan.import

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Excess, Format};
 use crate::{
     dataset::Dataset,
-    evaluation::{Channel, TargetPosition},
+    evaluation::{Channel, Problem, TargetPosition},
 };
 
 /// Measured samples with the meaning of their columns.
@@ -75,4 +75,16 @@ pub struct JoinReport {
     pub unused: usize,
     /// Median of the time of a row minus that of its partner.
     pub median_offset: Option<f64>,
+}
+
+impl Recording {
+    /// Returns the description of the channels.
+    pub fn problem(&self) -> Problem {
+        Problem {
+            inputs: self.inputs.clone(),
+            targets: self.targets.clone(),
+            positions: self.positions.clone(),
+            has_nodes: false,
+        }
+    }
 }

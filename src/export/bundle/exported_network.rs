@@ -12,7 +12,7 @@ use crate::{
     dataset::{Seed, Stream},
     evaluation::Channel,
     evaluation::{SimulatedSettings, TargetErrors},
-    export::{DocumentError, MeasuredNetworkFile, NetworkFile},
+    export::{DocumentError, NetworkFile},
     network::Networks,
 };
 
@@ -22,7 +22,7 @@ pub enum ExportedNetwork<'a> {
     /// Of a simulated sensor.
     Simulated(&'a NetworkFile),
     /// Of own data.
-    Measured(&'a MeasuredNetworkFile),
+    Measured(&'a NetworkFile),
 }
 
 /// Readings of one row with the index of their network.
@@ -33,13 +33,11 @@ pub(super) type Metadata = Map<String, Value>;
 
 impl<'a> From<&'a NetworkFile> for ExportedNetwork<'a> {
     fn from(file: &'a NetworkFile) -> Self {
-        Self::Simulated(file)
-    }
-}
-
-impl<'a> From<&'a MeasuredNetworkFile> for ExportedNetwork<'a> {
-    fn from(file: &'a MeasuredNetworkFile) -> Self {
-        Self::Measured(file)
+        if file.recorded.is_none() {
+            Self::Simulated(file)
+        } else {
+            Self::Measured(file)
+        }
     }
 }
 
@@ -54,10 +52,10 @@ impl ExportedNetwork<'_> {
 
     pub(super) fn meaning(&self) -> Meaning {
         match self {
-            Self::Simulated(file) => Meaning::Array(file.settings.source.sensor.scale),
+            Self::Simulated(file) => Meaning::Array(simulated(file).source.sensor.scale),
             Self::Measured(file) => Meaning::Own {
-                inputs: file.inputs.clone(),
-                targets: file.targets.clone(),
+                inputs: file.problem.inputs.clone(),
+                targets: file.problem.targets.clone(),
                 row_wires: match (&file.row_wires, file.network.values().len()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
@@ -78,8 +76,8 @@ impl ExportedNetwork<'_> {
         const EVEN: [usize; 2] = [100, 4];
         match self {
             Self::Simulated(file) => {
-                let rows = file.settings.source.model_size().map_or(1, |size| size.rows);
-                let mut settings = SimulatedSettings { ..file.settings };
+                let mut settings = simulated(file);
+                let rows = settings.source.model_size().map_or(1, |size| size.rows);
                 settings.source.test_samples = SNAPSHOTS[0] * rows;
                 let set = settings.draw_test().map_err(Box::new)?;
                 let network = |sample| if portable.takes_row() { set.row_index(sample) } else { 0 };
@@ -107,10 +105,8 @@ impl ExportedNetwork<'_> {
     /// # Errors
     /// It cannot be written.
     pub(super) fn save(&self, path: &Path) -> Result<(), DocumentError> {
-        match self {
-            Self::Simulated(file) => file.save(path),
-            Self::Measured(file) => file.save(path),
-        }
+        let (Self::Simulated(file) | Self::Measured(file)) = self;
+        file.save(path)
     }
 
     /// Returns `true` if the file at `path` has this network.
@@ -118,16 +114,9 @@ impl ExportedNetwork<'_> {
     /// # Errors
     /// It cannot be read.
     pub(super) fn is_saved_at(&self, path: &Path) -> Result<bool, DocumentError> {
-        Ok(match self {
-            Self::Simulated(file) => {
-                let read = NetworkFile::load(path)?;
-                (&read.network, &read.settings) == (&file.network, &file.settings)
-            }
-            Self::Measured(file) => {
-                let read = MeasuredNetworkFile::load(path)?;
-                (&read.network, &read.settings) == (&file.network, &file.settings)
-            }
-        })
+        let (Self::Simulated(file) | Self::Measured(file)) = self;
+        let read = NetworkFile::load(path)?;
+        Ok((&read.network, &read.settings) == (&file.network, &file.settings))
     }
 
     /// Collects the metadata of a bundle.
@@ -153,8 +142,13 @@ impl ExportedNetwork<'_> {
     }
 }
 
+/// Settings of the file of a simulated array.
+fn simulated(file: &NetworkFile) -> SimulatedSettings {
+    file.settings.simulated().expect("the file is of a simulated array")
+}
+
 fn of_array(file: &NetworkFile, portable: &Portable) -> Value {
-    let settings = &file.settings;
+    let settings = simulated(file);
     let sensor = &settings.source.sensor;
     let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
     json!({
@@ -168,41 +162,35 @@ fn of_array(file: &NetworkFile, portable: &Portable) -> Value {
         "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
         "training_samples": settings.source.samples,
         "seed": settings.seed,
-        "errors": file.errors,
+        "errors": file.scores.network.nodes(),
         "readings_in_training_ohm": ranges(portable),
         "output_range_mm": portable.output_range_mm(),
     })
 }
 
-fn of_own_data(file: &MeasuredNetworkFile, portable: &Portable) -> Value {
+fn of_own_data(file: &NetworkFile, portable: &Portable) -> Value {
     let columns = |channels: &[Channel]| {
         let (names, units): (Vec<_>, Vec<_>) = channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
         json!({ "names": names, "units": units })
     };
     // Without their folders, which are nobody's business.
-    let plan = &file.plan;
-    let paths = std::iter::once(&plan.import.data).chain(plan.import.join.iter().map(|joined| &joined.file));
-    let paths = paths.chain(
-        plan.test
-            .iter()
-            .flat_map(|test| std::iter::once(&test.data).chain(&test.join)),
-    );
+    let paths = file.recorded.iter().flat_map(|recorded| recorded.plan.files());
     let files = paths.map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned()));
     let errors = |errors: &[TargetErrors]| {
         let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
-        file.targets.iter().zip(errors).map(of).collect::<Vec<_>>()
+        file.problem.targets.iter().zip(errors).map(of).collect::<Vec<_>>()
     };
     let row_wires = file.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
     json!({
         "trained_by": file.program,
         "files": files.collect::<Vec<_>>(),
         "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&file.inputs),
-        "outputs": columns(&file.targets),
+        "inputs": columns(&file.problem.inputs),
+        "outputs": columns(&file.problem.targets),
         "method": file.settings.training.method.short_name(),
         "seed": file.settings.seed,
-        "errors": errors(&file.errors),
-        "errors_of_ridge": errors(&file.ridge),
+        "errors": errors(file.scores.network.targets()),
+        "errors_of_ridge": errors(file.scores.baselines.linear.targets()),
         "readings_in_training": ranges(portable),
         "output_ranges": portable.scales,
     })

@@ -4,9 +4,7 @@ use thiserror::Error;
 
 use super::{command::train_command, html::Html, pictures::pictures, settings::settings_facts};
 use crate::{
-    evaluation::{
-        DecoderReport, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings, error_remarks, error_rows,
-    },
+    evaluation::{DecoderReport, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings, error_remarks},
     export::{
         Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, document::PROGRAM, error_table,
         figures::dark_style, format_duration, format_percent,
@@ -56,7 +54,7 @@ impl RunReport<'_> {
     /// The test set cannot be drawn.
     pub fn html(&self) -> Result<String, RunError> {
         let Self { file, decoders, .. } = *self;
-        let settings = &file.settings;
+        let settings = self.settings();
         let test = settings.draw_test()?;
         let decoupled_mm = file.network.decouple(&test);
         let title = self.title();
@@ -66,10 +64,9 @@ impl RunReport<'_> {
         for remark in self.remarks() {
             html.element("p", "warning", &remark);
         }
-        let baselines = &file.baselines;
+        let baselines = &file.scores.baselines;
         html.section("Errors on the test set", |html| {
-            let rows = error_rows(&file.errors, baselines, settings.published().as_ref());
-            html.table(&error_table(&rows), "network");
+            html.table(&error_table(&file.error_table()), "network");
             let text = "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the \
                         stroke. The reference is the error that remains given the noise and the loading of the scene; \
                         training mean and linear map are what a network has to beat.";
@@ -77,14 +74,15 @@ impl RunReport<'_> {
         });
         if !decoders.is_empty() {
             html.section("Decoders", |html| {
-                html.table(&decoder_table(decoders, baselines.reference.as_ref()), "Network");
+                let reference = baselines.reference.as_ref().and_then(|errors| errors.nodes());
+                html.table(&decoder_table(decoders, reference), "Network");
                 let text = "The residual is the rms relative difference between the readings and those of the decoded \
                             deformation; it needs no ground truth. Times are those of a frame on one thread.";
                 html.element("p", "dim", text);
             });
         }
         html.section("Figures", |html| {
-            for (number, (caption, figure)) in pictures(file, &test, &decoupled_mm).into_iter().enumerate() {
+            for (number, (caption, figure)) in pictures(file, &settings, &test, &decoupled_mm).into_iter().enumerate() {
                 html.figure(&caption, &figure.draw().inline_svg(number, &caption));
             }
         });
@@ -92,7 +90,7 @@ impl RunReport<'_> {
             html.section("Starts", |html| html.table(&self.starts_table(), ""));
         }
         html.section("Settings", |html| {
-            html.facts(&settings_facts(file));
+            html.facts(&settings_facts(file, &settings));
             for note in settings.source.sensor.scale.note().iter().map(String::as_str) {
                 html.element("p", "dim", note);
             }
@@ -102,8 +100,13 @@ impl RunReport<'_> {
         Ok(html.finish(&title, &format!("{}{}", include_str!("style.css"), dark_style())))
     }
 
+    /// Settings of the run.
+    fn settings(&self) -> SimulatedSettings {
+        self.file.settings.simulated().expect("the run is simulated")
+    }
+
     fn title(&self) -> String {
-        let settings = &self.file.settings;
+        let settings = self.settings();
         let what = format!(
             "{}, {}, seed {}",
             settings.source.sensor.scale,
@@ -125,7 +128,7 @@ impl RunReport<'_> {
         let time = Duration::try_from_secs_f64(training.seconds).unwrap_or_default();
         format!(
             "Z error {} on the test set. Trained for {}, {} on one thread ({reason}); weights kept from epoch {}.",
-            format_percent(self.file.errors.z_percent),
+            format_percent(self.file.scores.network.percent()),
             counted(self.last_epoch(), "epoch"),
             format_duration(time),
             training.best_epoch
@@ -139,9 +142,9 @@ impl RunReport<'_> {
     /// Everything that a reader has to weigh, with cause and cure.
     fn remarks(&self) -> Vec<String> {
         let Self { file, decoders, .. } = *self;
-        let mut remarks: Vec<String> = file.old_version_warning().into_iter().collect();
-        remarks.extend(self.flaw.map(ToString::to_string));
-        let outlook = Outlook::of(&file.settings.source).ok();
+        let settings = self.settings();
+        let mut remarks = Vec::from_iter(self.flaw.map(ToString::to_string));
+        let outlook = Outlook::of(&settings.source).ok();
         remarks.extend(
             outlook
                 .iter()
@@ -149,10 +152,12 @@ impl RunReport<'_> {
                 .map(ToString::to_string),
         );
         let reason = file.training.stop_reason;
-        let of_rows = error_remarks(&file.settings, &file.errors, &file.baselines, reason);
+        let of_rows = error_remarks(&settings, &file.scores, reason);
         remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
-        let (ours, linear) = (&file.errors, &file.baselines.linear);
-        if ours.z_mm > linear.z_mm
+        let baselines = &file.scores.baselines;
+        let [ours, linear] =
+            [&file.scores.network, &baselines.linear].map(|errors| errors.nodes().map(|errors| errors.z_mm));
+        if ours > linear
             && let Some(reason) = reason
         {
             let remedy = reason.remedy(&file.settings.training.method);
@@ -160,8 +165,13 @@ impl RunReport<'_> {
                 "a linear map of the resistances is better on z than this network: {remedy}"
             ));
         }
-        remarks.extend(ReferenceNote::of(&file.baselines).map(|note| note.to_string()));
-        if file.baselines.reference.as_ref().is_some_and(Errors::is_rounding) {
+        remarks.extend(ReferenceNote::of(baselines).map(|note| note.to_string()));
+        if baselines
+            .reference
+            .as_ref()
+            .and_then(|errors| errors.nodes())
+            .is_some_and(Errors::is_rounding)
+        {
             let text = "the reference is nothing but rounding: the readings determine the deformation, and no ratio to \
                         it is given";
             remarks.push(text.to_owned());
@@ -202,7 +212,7 @@ impl RunReport<'_> {
     /// The command of the terminal, and what it does not repeat.
     fn repeat(&self, html: &mut Html) {
         let training = &self.file.training;
-        let mut settings: SimulatedSettings = self.file.settings;
+        let mut settings = self.settings();
         if let Some(first) = training.stages.first() {
             settings.training.method = first.method;
         }

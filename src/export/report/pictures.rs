@@ -7,7 +7,7 @@ use ndarray::Array2;
 
 use crate::{
     dataset::Dataset,
-    evaluation::NodeAddress,
+    evaluation::{NodeAddress, SimulatedSettings},
     export::NetworkFile,
     figure::{
         Figure, SequentialMap, error_histogram_figure, loss_figure, regression_figure,
@@ -18,12 +18,21 @@ use crate::{
 };
 
 /// Captions and figures of a run: `decoupled_mm` are the answers of its network to `test`.
-pub(super) fn pictures(file: &NetworkFile, test: &Dataset, decoupled_mm: &Array2<f64>) -> Vec<(String, Figure)> {
+pub(super) fn pictures(
+    file: &NetworkFile,
+    settings: &SimulatedSettings,
+    test: &Dataset,
+    decoupled_mm: &Array2<f64>,
+) -> Vec<(String, Figure)> {
     let training = &file.training;
     let pairs_mm = z_pairs_mm(test, decoupled_mm);
-    let worst = file.errors.worst_node;
+    let worst = file
+        .scores
+        .network
+        .nodes()
+        .map_or_else(Default::default, |errors| errors.worst_node);
     let mut pictures = Vec::new();
-    if let Some(surfaces) = surfaces(file, test, decoupled_mm, worst) {
+    if let Some(surfaces) = surfaces(settings, test, decoupled_mm, worst) {
         let caption = format!(
             "Snapshot {} of the test set, which has the worst node of all (row {}, node {}, marked).",
             worst.snapshot + 1,
@@ -56,12 +65,12 @@ pub(super) fn pictures(file: &NetworkFile, test: &Dataset, decoupled_mm: &Array2
 /// Actual and decoupled surface of the snapshot of `worst`, which is marked, and the error; `None` where no surface can be
 /// laid through the nodes.
 fn surfaces(
-    file: &NetworkFile,
+    settings: &SimulatedSettings,
     test: &Dataset,
     decoupled_mm: &Array2<f64>,
     worst: NodeAddress,
 ) -> Option<SurfaceFigure> {
-    let source = &file.settings.source;
+    let source = &settings.source;
     let (scale, geometry) = (source.sensor.scale, &source.sensor.geometry);
     let rows = source.scene.rows.read(scale.rows()).ok()?;
     let x_mm: Vec<f64> = rows.iter().map(|&row| geometry.row_x_mm(row)).collect();

@@ -8,8 +8,8 @@ use crate::{
 };
 
 /// Names and values of all settings.
-pub(super) fn settings_facts(file: &NetworkFile) -> Vec<(&'static str, String)> {
-    let SimulatedSettings { source, inputs, .. } = &file.settings;
+pub(super) fn settings_facts(file: &NetworkFile, settings: &SimulatedSettings) -> Vec<(&'static str, String)> {
+    let SimulatedSettings { source, inputs, .. } = settings;
     let (geometry, scene) = (&source.sensor.geometry, &source.scene);
     let rules = file.settings.training.stopping;
     let mut facts = vec![
