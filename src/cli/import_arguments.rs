@@ -252,12 +252,17 @@ impl ImportArguments {
     pub(super) fn relocated(&self, saved: &Recorded) -> Result<Recorded, Failure> {
         let mut found = saved.clone();
         for (argument, given, place) in self.files(&saved.plan) {
-            let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
-            let is_named = |path: &&PathBuf| path.file_name() == given.file_name();
-            let named = place.filter(is_named).or_else(|| saved.plan.files().find(is_named));
-            let Some(before) = named.or(place) else {
+            let Some(place) = place else {
                 let message = format!("{argument}: the checkpoint has no such file; leave it out to resume");
                 return Err(Failure::Arguments(message));
+            };
+            let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
+            let is_named = |path: &PathBuf| path.file_name() == given.file_name();
+            let mut named = saved.plan.files().filter(|path| is_named(path));
+            let before = if is_named(place) {
+                place
+            } else {
+                named.next().unwrap_or(place)
             };
             found = found.relocated(before, &given);
             let missing = Vec::from_iter(found.missing().into_iter().map(Path::to_owned));
