@@ -20,6 +20,8 @@ pub struct TableColumn {
     pub heading: String,
     /// Unit of its numbers; empty where they have none.
     pub unit: &'static str,
+    /// Definition of its numbers, shown as a tooltip; empty where the heading says it.
+    pub meaning: &'static str,
 }
 
 impl TableColumn {
@@ -29,7 +31,13 @@ impl TableColumn {
             field: field.into(),
             heading: heading.into(),
             unit,
+            meaning: "",
         }
+    }
+
+    /// With this definition.
+    pub fn meaning(self, meaning: &'static str) -> Self {
+        Self { meaning, ..self }
     }
 
     /// A column of a table that is only written for programs: its heading is the name of the field.

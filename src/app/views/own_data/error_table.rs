@@ -1,63 +1,44 @@
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 
 use crate::{
     app::{
-        theme::{Theme, semibold, space, type_size},
-        widgets::{Column, Row, TableWidths, captioned_table_ui},
+        theme::Theme,
+        widgets::{TableColumn, TableRow, TableView},
     },
     evaluation::TargetErrors,
     export::format_number,
     import::Channel,
 };
 
-const COLUMNS: [Column; 5] = [
-    Column {
-        heading: "RMSE",
-        meaning: "Root mean squared error, in the unit of the target",
-    },
-    Column {
-        heading: "MAE",
-        meaning: "Mean absolute error, in the unit of the target",
-    },
-    Column {
-        heading: "R²",
-        meaning: "Share of the target's variance that the answers explain: 1 is exact, 0 is no better than the mean",
-    },
-    Column {
-        heading: "worst",
-        meaning: "Largest absolute error, in the unit of the target",
-    },
-    Column {
-        heading: "% of range",
-        meaning: "Mean absolute error in percent of the range of the target",
-    },
+const COLUMNS: [TableColumn<'_>; 6] = [
+    TableColumn::text(""),
+    TableColumn::figure("RMSE").meaning("Root mean squared error, in the unit of the target"),
+    TableColumn::figure("MAE").meaning("Mean absolute error, in the unit of the target"),
+    TableColumn::figure("R²")
+        .meaning("Share of the target's variance that the answers explain: 1 is exact, 0 is no better than the mean"),
+    TableColumn::figure("worst").meaning("Largest absolute error, in the unit of the target"),
+    TableColumn::figure("% of range").meaning("Mean absolute error in percent of the range of the target"),
 ];
 
-/// Errors of each target, a table for each with a row for each of `rows`; the last is the strong one.
+/// Errors of each target, with a row for each of `rows`; the last is the strong one.
 pub(super) fn error_tables_ui(ui: &mut Ui, targets: &[Channel], rows: &[(&'static str, &[TargetErrors])]) {
     let palette = Theme::of(ui).palette;
-    let lines = |index: usize| -> Vec<Row> {
+    let of_target = |(index, target): (usize, &Channel)| {
+        let title = target.title();
         let lines = rows.iter().enumerate().filter_map(|(number, (name, errors))| {
             let is_network = number + 1 == rows.len();
-            Some(Row {
-                mark: "",
-                name,
-                meaning: meaning(name),
-                cells: cells(errors.get(index)?),
-                colour: if is_network { palette.accent } else { palette.text },
-                is_strong: is_network,
-            })
+            let colour = if is_network { palette.accent } else { palette.text };
+            let row = TableRow::figures(*name, cells(errors.get(index)?));
+            let row = row.named(format!("{title}, {name}")).meaning(meaning(name));
+            Some(row.colour(colour).strong(is_network))
         });
-        lines.collect()
+        std::iter::once(TableRow::section(&title)).chain(lines.collect::<Vec<_>>())
     };
-    let tables = Vec::from_iter((0..targets.len()).map(lines));
-    let widths = TableWidths::fitting(ui, &COLUMNS, &Vec::from_iter(tables.iter().flatten()));
-    for (target, lines) in targets.iter().zip(&tables) {
-        ui.add_space(space(1));
-        ui.label(RichText::new(target.title()).font(semibold(type_size().body)));
-        ui.scope(|ui| captioned_table_ui(ui, &target.title(), &COLUMNS, lines, &widths));
-        ui.add_space(space(2));
-    }
+    let lines = targets
+        .iter()
+        .enumerate()
+        .flat_map(|(index, target)| of_target((index, target)).collect::<Vec<_>>());
+    TableView::new("errors", &COLUMNS).show_all(ui, lines.collect());
 }
 
 fn cells(errors: &TargetErrors) -> Vec<String> {

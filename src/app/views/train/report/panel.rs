@@ -9,7 +9,9 @@ use crate::{
         shared::{Effect, Phase, RunResult, RunView, Shared},
         theme::{Theme, space, type_size},
         views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
-        widgets::{Column, Landmark, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+        widgets::{
+            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
+        },
     },
     decoupling::DecoderKind,
     evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
@@ -92,8 +94,9 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 /// The name of the network's row.
 const NETWORK: &str = "network";
 
-/// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
-const COLUMNS: [Column; 5] = [
+/// The names and the error columns, in the order of [`ErrorRow::values`]; the last, the worst node, is below the table.
+const COLUMNS: [TableColumn<'_>; 6] = [
+    TableColumn::text(""),
     column(glossary::Z_PERCENT),
     column(glossary::X_PERCENT),
     column(glossary::Y_PERCENT),
@@ -101,39 +104,33 @@ const COLUMNS: [Column; 5] = [
     column(glossary::STROKE_PERCENT),
 ];
 
-const fn column(term: Term) -> Column {
-    Column {
-        heading: term.name,
-        meaning: term.hint,
-    }
+const fn column(term: Term) -> TableColumn<'static> {
+    TableColumn::figure(term.name).meaning(term.hint)
 }
 
 fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
     let palette = Theme::of(ui).palette;
     let of_network = rows.iter().find(|row| row.name == NETWORK).and_then(|row| row.z_mm);
-    let row = |row: &ErrorRow| Row {
-        name: row.name,
-        meaning: match row.name {
-            "training mean" => DecoderKind::Mean.meaning(),
-            "linear map" => glossary::LINEAR_MAP.hint,
-            NETWORK => "The network with the lowest validation error so far",
-            "reference" => glossary::REFERENCE.hint,
-            "published" => glossary::PUBLISHED.hint,
-            _ => "",
-        },
-        cells: row.values()[..COLUMNS.len()]
-            .iter()
-            .map(|value| format_number(*value))
-            .collect(),
-        colour: match row.name {
-            NETWORK => palette.accent,
-            "published" | "reference" => palette.dim,
-            _ => palette.text,
-        },
-        is_strong: row.name == NETWORK,
-        mark: if beats(row, of_network) { BETTER } else { "" },
+    let row = |row: &ErrorRow| {
+        let values = row.values().into_iter().take(COLUMNS.len() - 1);
+        TableRow::figures(row.name, values.map(format_number))
+            .meaning(match row.name {
+                "training mean" => DecoderKind::Mean.meaning(),
+                "linear map" => glossary::LINEAR_MAP.hint,
+                NETWORK => "The network with the lowest validation error so far",
+                "reference" => glossary::REFERENCE.hint,
+                "published" => glossary::PUBLISHED.hint,
+                _ => "",
+            })
+            .colour(match row.name {
+                NETWORK => palette.accent,
+                "published" | "reference" => palette.dim,
+                _ => palette.text,
+            })
+            .strong(row.name == NETWORK)
+            .mark(if beats(row, of_network) { BETTER } else { "" })
     };
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.iter().map(row).collect::<Vec<_>>()));
+    TableView::new("errors", &COLUMNS).show_all(ui, rows.iter().map(row).collect());
 }
 
 /// Meaning of the mark at a baseline.
