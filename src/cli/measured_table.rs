@@ -7,7 +7,7 @@ use crate::{
         TargetErrors,
         recorded::{Determination, Undetermined},
     },
-    export::format_number,
+    export::{Cell, Table},
     import::Channel,
 };
 
@@ -53,37 +53,25 @@ pub(super) fn write_table(
     rows: &[(&str, &[TargetErrors])],
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let width = channels
-        .iter()
-        .map(|channel| channel.title().chars().count())
-        .max()
-        .unwrap_or(0)
-        .max(6);
-    let names = rows.iter().map(|(name, _)| name.chars().count());
-    let name_width = names.max().unwrap_or(0).max(8);
-    writeln!(
-        out,
-        "{:<width$}  {:<name_width$}{:>11}{:>11}{:>9}{:>11}{:>11}",
-        "target", "", "RMSE", "MAE", "R²", "worst", "% of range"
-    )?;
-    for (index, channel) in channels.iter().enumerate() {
-        for (number, (name, errors)) in rows.iter().enumerate() {
-            let Some(errors) = errors.get(index) else { continue };
+    let of_target = |(index, channel): (usize, &Channel)| {
+        let errors = rows.iter().enumerate().filter_map(move |(number, (name, errors))| {
+            let errors = errors.get(index)?;
             let title = if number == 0 { channel.title() } else { String::new() };
-            let or_none =
-                |value: Option<f64>, digits| value.map_or("–".to_owned(), |value| format!("{value:.digits$}"));
-            writeln!(
-                out,
-                "{title:<width$}  {name:<name_width$}{:>11}{:>11}{:>9}{:>11}{:>11}",
-                format_number(errors.rmse),
-                format_number(errors.mae),
-                or_none(errors.r2, 4),
-                format_number(errors.worst),
-                or_none(errors.percent_of_range, 2)
-            )?;
-        }
-    }
-    Ok(())
+            Some(vec![
+                title.into(),
+                (*name).into(),
+                errors.rmse.into(),
+                errors.mae.into(),
+                Cell::r2(errors.r2),
+                errors.worst.into(),
+                errors.percent_of_range.into(),
+            ])
+        });
+        errors.collect::<Vec<_>>()
+    };
+    let headings = ["target", "", "RMSE", "MAE", "R²", "worst", "% of range"];
+    let table = Table::of_headings(headings, channels.iter().enumerate().flat_map(of_target));
+    write!(out, "{}", table.aligned())
 }
 
 pub(super) fn write_warnings(warnings: &[String], out: &mut impl Write) -> io::Result<()> {

@@ -10,12 +10,12 @@ use super::{
     measured_report::Report,
     measured_table::{Target, targets, write_table, write_warnings},
     output::{print, print_object},
-    trade_report::{Choice, FRONTS, Limits, precision_word},
+    trade_report::{Choice, FRONTS, Limits, front_marks, precision_word},
 };
 use crate::{
     dataset::SplitBy,
     evaluation::{TargetErrors, TargetTradeOffPoint, pareto_front},
-    export::{format_duration, format_number},
+    export::{Cell, Table, format_duration},
     import::Channel,
 };
 
@@ -175,27 +175,22 @@ impl TradeOff {
             "\nTime to decode {} (one thread) and training time against the error (MAE in % of the range, mean of the targets)\n",
             self.decoded
         )?;
-        writeln!(
-            out,
-            "{:<13}{:>7}{:>9}{:>12}{:>12}{:>12}",
-            "decoder", "hidden", "method", "% of range", "us", "training"
-        )?;
-        for (Measured { point, .. }, (on_decoding_front, on_training_front)) in self.measured.iter().zip(self.fronts())
-        {
+        let row = |(measured, (on_decoding_front, on_training_front)): (&Measured, (bool, bool))| {
+            let point = &measured.point;
             let training = Duration::try_from_secs_f64(point.training_seconds).unwrap_or_default();
-            writeln!(
-                out,
-                "{:<13}{:>7}{:>9}{:>12}{:>12}{:>12} {}{}",
-                point.report.name(),
-                point.hidden().map_or(String::new(), |hidden| hidden.to_string()),
-                point.method().map_or("", |method| method.short_name()),
-                format_number(point.percent_of_range()),
-                format_number(point.report.cost.frame_us),
-                format_duration(training),
-                if on_decoding_front { "*" } else { " " },
-                if on_training_front { "+" } else { "" },
-            )?;
-        }
+            vec![
+                point.report.name().into(),
+                point.hidden().map_or_else(|| "".into(), Cell::from),
+                point.method().map_or("", |method| method.short_name()).into(),
+                point.percent_of_range().into(),
+                point.report.cost.frame_us.into(),
+                format_duration(training).into(),
+                front_marks(on_decoding_front, on_training_front).into(),
+            ]
+        };
+        let headings = ["decoder", "hidden", "method", "% of range", "us", "training", ""];
+        let table = Table::of_headings(headings, self.measured.iter().zip(self.fronts()).map(row));
+        write!(out, "{}", table.aligned())?;
         writeln!(out, "\n{FRONTS}\n")?;
         let names = Vec::from_iter(self.measured.iter().map(|measured| name(&measured.point)));
         let errors = self.measured.iter().map(|measured| &measured.point.report.targets[..]);

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     decoupling::Precision,
     evaluation::{SimulatedSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, fastest_under, most_accurate_under},
-    export::{format_duration, format_number},
+    export::{Cell, Table, format_duration, format_number},
     sensor::ArrayScale,
 };
 
@@ -26,6 +26,13 @@ pub(super) struct Limits {
 /// Legend of the marks behind the lines of the table.
 pub(super) const FRONTS: &str = "* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
                                  Training time is the sum over all rows and starts.";
+
+/// Marks of a point, as [`FRONTS`] explains them.
+pub(super) fn front_marks(is_on_decoding_front: bool, is_on_training_front: bool) -> String {
+    let decoding = if is_on_decoding_front { "*" } else { " " };
+    let training = if is_on_training_front { "+" } else { "" };
+    format!("{decoding}{training}")
+}
 
 /// Word for a precision.
 pub(super) fn precision_word(precision: Precision) -> &'static str {
@@ -205,28 +212,34 @@ fn write_level(level: &TradeOffLevel, limits: Limits, out: &mut impl Write) -> i
             write!(out, ", nothing but rounding")?;
         }
     }
-    writeln!(
-        out,
-        "\n{:<7}{:<13}{:>7}{:>12}{:>12}{:>13}{:>12}{:>12}",
-        "preset", "decoder", "hidden", "Z %", "Z mm", "x reference", "us a frame", "training"
-    )?;
-    for (point, (on_decoding_front, on_training_front)) in level.points.iter().zip(fronts(level)) {
-        let hidden = point.hidden().map_or(String::new(), |hidden| hidden.to_string());
+    let row = |(point, (on_decoding_front, on_training_front)): (&TradeOffPoint, (bool, bool))| {
+        let hidden = point.hidden().map_or_else(|| "".into(), Cell::from);
         let training = Duration::try_from_secs_f64(point.training_seconds).unwrap_or_default();
-        writeln!(
-            out,
-            "{:<7}{:<13}{hidden:>7}{:>12}{:>12}{:>13}{:>12}{:>12} {}{}",
-            point.preset,
-            point.report.name(),
-            format_number(point.report.errors.z_percent),
-            format_number(point.report.errors.z_mm),
-            format_number(point.to_reference()),
-            format_number(point.report.cost.frame_us),
-            format_duration(training),
-            if on_decoding_front { "*" } else { " " },
-            if on_training_front { "+" } else { "" },
-        )?;
-    }
+        vec![
+            point.preset.to_string().into(),
+            point.report.name().into(),
+            hidden,
+            point.report.errors.z_percent.into(),
+            point.report.errors.z_mm.into(),
+            point.to_reference().into(),
+            point.report.cost.frame_us.into(),
+            format_duration(training).into(),
+            front_marks(on_decoding_front, on_training_front).into(),
+        ]
+    };
+    let headings = [
+        "preset",
+        "decoder",
+        "hidden",
+        "Z %",
+        "Z mm",
+        "x reference",
+        "us a frame",
+        "training",
+        "",
+    ];
+    let table = Table::of_headings(headings, level.points.iter().zip(fronts(level)).map(row));
+    write!(out, "\n{}", table.aligned())?;
     for point in &level.points {
         let hidden = point
             .hidden()

@@ -12,7 +12,7 @@ use crate::{
         Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
         StartRecord, best_start, error_remarks, error_rows,
     },
-    export::{NetworkFile, TrainingRecord, format_duration, format_number},
+    export::{Cell, NetworkFile, Table, TrainingRecord, format_duration},
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
     sensor::{ArrayScale, Geometry, counted},
@@ -329,27 +329,20 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
     if decoders.is_empty() {
         return Ok(());
     }
-    let headings = ["Z %", "Z mm", "x reference", "residual", "us a frame"];
-    write!(out, "\n{:<14}", "Decoder")?;
-    for heading in headings {
-        write!(out, "{heading:>12}")?;
-    }
-    writeln!(out)?;
-    for report in decoders {
-        write!(out, "{:<14}", report.name())?;
+    let row = |report: &DecoderReport| {
         let ratio = reference.and_then(|reference| report.errors.times(reference));
-        let values = [
-            report.errors.z_percent,
-            Some(report.errors.z_mm),
-            ratio,
-            Some(report.residual).filter(|residual| residual.is_finite()),
-            Some(report.cost.frame_us),
-        ];
-        for value in values {
-            write!(out, "{:>12}", format_number(value))?;
-        }
-        writeln!(out)?;
-    }
+        vec![
+            report.name().into(),
+            report.errors.z_percent.into(),
+            report.errors.z_mm.into(),
+            ratio.into(),
+            report.residual.into(),
+            report.cost.frame_us.into(),
+        ]
+    };
+    let headings = ["Decoder", "Z %", "Z mm", "x reference", "residual", "us a frame"];
+    let table = Table::of_headings(headings, decoders.iter().map(row));
+    write!(out, "\n{}", table.aligned())?;
     for report in decoders {
         for remark in &report.remarks {
             writeln!(out, "Warning: {}: {remark}", report.name())?;
@@ -363,18 +356,10 @@ fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &
 }
 
 fn write_table(rows: &[ErrorRow], out: &mut impl Write) -> io::Result<()> {
-    let headings = ["Z %", "X %", "Y %", "Z mm", "Z % stroke", "worst mm"];
-    write!(out, "{:<14}", "")?;
-    for heading in headings {
-        write!(out, "{heading:>12}")?;
-    }
-    writeln!(out)?;
-    for row in rows {
-        write!(out, "{:<14}", row.name)?;
-        for value in row.values() {
-            write!(out, "{:>12}", format_number(value))?;
-        }
-        writeln!(out)?;
-    }
-    Ok(())
+    let row = |row: &ErrorRow| {
+        let values = row.values().into_iter().map(Cell::from);
+        std::iter::once(row.name.into()).chain(values).collect()
+    };
+    let headings = ["", "Z %", "X %", "Y %", "Z mm", "Z % stroke", "worst mm"];
+    write!(out, "{}", Table::of_headings(headings, rows.iter().map(row)).aligned())
 }

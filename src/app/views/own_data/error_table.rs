@@ -6,7 +6,7 @@ use crate::{
         widgets::{TableColumn, TableRow, TableView},
     },
     evaluation::TargetErrors,
-    export::format_number,
+    export::{format_number, format_r2},
     import::Channel,
 };
 
@@ -42,15 +42,10 @@ pub(super) fn error_tables_ui(ui: &mut Ui, targets: &[Channel], rows: &[(&'stati
 }
 
 fn cells(errors: &TargetErrors) -> Vec<String> {
-    let decimals = |value: Option<f64>| match value {
-        Some(r2) if r2.abs() < 5e-5 => "0.0000".to_owned(),
-        Some(r2) if r2 > -1e4 => format!("{r2:.4}").replace('-', "−"),
-        other => format_number(other),
-    };
     vec![
         format_number(errors.rmse),
         format_number(errors.mae),
-        decimals(errors.r2),
+        format_r2(errors.r2),
         format_number(errors.worst),
         format_number(errors.percent_of_range),
     ]

@@ -44,16 +44,11 @@ pub(in crate::app::views::experiments) fn folder_card_ui(ui: &mut Ui, folder: &m
 
 fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
     let (finished, trials) = (table.finished(), table.trials);
-    let how_far = if finished == trials {
-        format!("All {} finished.", counted(trials, "trial"))
-    } else {
-        format!(
-            "{finished} of {} finished; new ones appear here by themselves.",
-            counted(trials, "trial")
-        )
-    };
-    dim_ui(ui, &how_far);
-    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32);
+    let how_far = format!("{finished} of {} finished", counted(trials, "trial"));
+    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32, &how_far);
+    if finished < trials {
+        dim_ui(ui, "New trials appear here by themselves.");
+    }
     ui.add_space(space(1));
     for problem in table.problems.iter().take(MOST_PROBLEMS) {
         note_ui(ui, problem);

@@ -14,7 +14,7 @@ use crate::{
         },
     },
     evaluation::TargetReport,
-    export::{format_duration, format_number},
+    export::{format_duration, format_number, format_r2},
     figure::{PlotFigure, decoders_figure, trade_words::frame_time},
 };
 
@@ -128,9 +128,7 @@ fn table_ui(ui: &mut Ui, decoders: &Decoders, target: usize) {
         let errors = &report.targets[target];
         let texts = [
             format_number(errors.rmse),
-            errors
-                .r2
-                .map_or_else(|| format_number(None), |r2| format!("{r2:.4}").replace('-', "−")),
+            format_r2(errors.r2),
             frame_time(report.cost.frame_us),
             fit_time(report),
         ];
