@@ -11,6 +11,7 @@ use super::{
 use crate::{
     evaluation::{
         RunSettings, TargetErrors,
+        format::capitalised,
         recorded::{ChannelImportance, Determination, Findings, FittedModel, Interval, LearningCurve, Standing},
     },
     export::{Cell, Table, describe_target, describe_warnings, format_number},
@@ -101,13 +102,6 @@ impl From<Figure> for Interval {
     fn from(Figure { value, low, high }: Figure) -> Self {
         Self { value, low, high }
     }
-}
-
-/// A sentence of its own.
-fn capitalised(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
 }
 
 fn name_of(model: FittedModel) -> &'static str {

@@ -65,6 +65,13 @@ pub fn format_duration(duration: Duration) -> String {
     }
 }
 
+/// Returns the text with its first letter as a capital.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
