@@ -31,7 +31,7 @@ pub enum ColumnWidth<'a> {
 }
 
 impl<'a> ColumnWidth<'a> {
-    /// As wide as the longest of `texts`; it is the widest but for a point or two, which the gap takes.
+    /// As wide as the longest of `texts`; it may be a point or two narrower than the widest, which the gap takes.
     pub fn of_longest(texts: impl Iterator<Item = &'a str>) -> Self {
         Self::Fits(texts.max_by_key(|text| text.chars().count()).unwrap_or_default())
     }

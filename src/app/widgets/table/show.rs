@@ -41,7 +41,7 @@ impl TableView<'_> {
         scrolled.inner
     }
 
-    /// Lays out a table of so many rows that fills the available space and scrolls where it is larger; `row` makes those in
+    /// Lays out a table of `rows` rows that fills the available space and scrolls where it is larger; `row` makes those in
     /// view.
     pub fn show<'r>(self, ui: &mut Ui, rows: usize, row: impl Fn(usize) -> TableRow<'r>) -> Option<TableClick> {
         let is_measured = |column: &TableColumn<'_>| column.width == super::ColumnWidth::Content;
@@ -256,10 +256,10 @@ impl<'a> Shown<'a> {
             cell_ui.set_clip_rect(parts.clip(body, place));
             // A row that is a whole for assistive technology names itself.
             let label = match place {
-                0 if row.label.is_empty() => cell.text.clone(),
-                _ if column.is_figure && !row.name.is_empty() => {
+                1.. if column.is_figure && !row.name.is_empty() => {
                     format!("{}, {}: {}", row.name, column.heading, cell.text)
                 }
+                _ if row.label.is_empty() => cell.text.clone(),
                 _ => String::new(),
             };
             let of_row = if place == 0 && row.label.is_empty() {

@@ -57,28 +57,31 @@ impl Request<'_> {
     /// Returns widths that fill the line where they can, in smaller type where there is less room.
     pub(super) fn widths(&self, ui: &Ui, rows: &[TableRow<'_>]) -> Widths {
         let gaps = (self.columns.len().saturating_sub(1)) as f32;
-        let total = |least: &[f32], gap: f32| least.iter().sum::<f32>() + gap * gaps + 2.0 * self.padding;
-        let (mut widths, mut size, mut least_gap) =
-            (self.least(ui, rows, type_size().note), type_size().note, READABLE_GAP);
-        if total(&widths, least_gap) > self.available {
-            let small = self.least(ui, rows, type_size().small);
+        let total = |widths: &[f32], gap: f32| widths.iter().sum::<f32>() + gap * gaps + 2.0 * self.padding;
+        let (mut widths, mut size, mut min_gap) = (
+            self.min_widths(ui, rows, type_size().note),
+            type_size().note,
+            READABLE_GAP,
+        );
+        if total(&widths, min_gap) > self.available {
+            let small = self.min_widths(ui, rows, type_size().small);
             // A table that scrolls sideways needs no smaller type.
             if total(&small, MIN_GAP) <= self.available {
-                (widths, size, least_gap) = (small, type_size().small, MIN_GAP);
+                (widths, size, min_gap) = (small, type_size().small, MIN_GAP);
             }
         }
-        let left = (self.available - total(&widths, least_gap)).max(0.0);
+        let left = (self.available - total(&widths, min_gap)).max(0.0);
         let is_rest = |column: &TableColumn<'_>| column.width == ColumnWidth::Rest;
         let rests = self.columns.iter().filter(|column| is_rest(column)).count();
         let share = left / gaps.max(1.0);
-        let gap = least_gap
+        let gap = min_gap
             + share.min(match (rests, self.fills) {
-                (1.., _) => USUAL_GAP - least_gap,
-                (0, true) => MAX_GAP - least_gap,
+                (1.., _) => USUAL_GAP - min_gap,
+                (0, true) => MAX_GAP - min_gap,
                 (0, false) => f32::INFINITY,
             });
         if rests > 0 {
-            let more = (left - (gap - least_gap) * gaps).max(0.0) / rests as f32;
+            let more = (left - (gap - min_gap) * gaps).max(0.0) / rests as f32;
             let of_rest = widths.iter_mut().zip(self.columns);
             of_rest
                 .filter(|(_, column)| is_rest(column))
@@ -99,7 +102,7 @@ impl Request<'_> {
     }
 
     /// Smallest widths of the columns.
-    fn least(&self, ui: &Ui, rows: &[TableRow<'_>], size: f32) -> Vec<f32> {
+    fn min_widths(&self, ui: &Ui, rows: &[TableRow<'_>], size: f32) -> Vec<f32> {
         let width = |text: &str, font: FontId| {
             let galley = ui.painter().layout_no_wrap(text.to_owned(), font, Color32::WHITE);
             galley.size().x

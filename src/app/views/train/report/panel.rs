@@ -16,6 +16,7 @@ use crate::{
     decoupling::DecoderKind,
     evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
     export::{format_duration, format_number},
+    figure::trade_words::frame_time,
 };
 
 /// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
@@ -240,22 +241,13 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", format_short_time(time)));
+        rows.push(("Decoding a snapshot", frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
         });
-    }
-}
-
-/// As [`format_duration`], with microseconds below a millisecond.
-fn format_short_time(time: Duration) -> String {
-    if time < Duration::from_millis(1) {
-        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
-    } else {
-        format_duration(time)
     }
 }
 
