@@ -1,10 +1,16 @@
 //! Exports of the training on show.
 
-use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
+use super::{
+    bottom_tab::has_target_surface,
+    chart::{all_targets_figure, chart},
+    state::TrainView,
+    surfaces::surface_figure,
+};
 use crate::{
     app::shared::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
-        RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
+        RunView, Shared, SourceKind, copy_exports, error_table_export, file_stem, loss_export, network_exports,
+        picture_exports,
     },
     evaluation::{DecoderReport, TestErrors},
     export::{decoder_table, error_table},
@@ -56,15 +62,16 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
             .map_or_else(|_| String::new(), |run| file_stem(what, &run.setup))
     };
     let mut exports = networks(view, &shown);
-    let what = match shared.look.mode {
-        ViewMode::ThreeD => "surfaces",
-        ViewMode::Top => "surfaces-top",
+    let (name, what) = match shared.look.mode {
+        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
+        ViewMode::ThreeD => ("Surfaces", "surfaces"),
+        ViewMode::Top => ("Surfaces", "surfaces-top"),
     };
-    let surfaces = run.clone().map(|_| || Figure::from(surface_figure(view, shared)));
-    exports.extend(picture_exports("Surfaces", stem(what), surfaces));
+    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
+    exports.extend(picture_exports(name, stem(what), surfaces));
     let chart = run.clone().and_then(|_| {
-        let figure = chart_figure(view, shared).ok_or("This chart has nothing to show yet.")?;
-        Ok(move || Figure::from(figure.clone()))
+        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+        Ok(move || figure.clone())
     });
     exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
     let errors = shown.clone().map(|(run, latest)| {
@@ -97,6 +104,15 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         ask: standing.map(|run| -> Ask<'a> { Box::new(|| Effect::ChooseFile(checkpoint_task(run))) }),
     });
     exports
+}
+
+/// What is drawn above the charts: the surfaces, or all targets of a sample.
+fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
+    let surfaces = surface_figure(view, shared);
+    match all_targets_figure(view, shared) {
+        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
+        _ => surfaces.into(),
+    }
 }
 
 /// The best network, and before it that of a past epoch while it is on show.

@@ -11,6 +11,7 @@ mod inspect;
 mod paper_figure;
 mod press;
 mod report;
+mod sample_card;
 mod scrub;
 mod state;
 mod surfaces;

@@ -5,10 +5,12 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        glossary::{self, Term},
+        glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
         theme::{Theme, semibold, space, type_size},
-        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
+        views::train::{
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
+        },
         widgets::{
             Column, Landmark, Row, TableWidths, captioned_table_ui, dim_ui, ghost_button, note_ui, scrolled_ui,
             section_heading_ui, table_ui,
@@ -45,8 +47,8 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            if let Some(worst) = worst_node_ui(ui, result) {
-                view.go_to(worst, shared);
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             decoders_ui(ui, &mut view.decoders, shared.phase, limit);
