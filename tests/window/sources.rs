@@ -161,6 +161,21 @@ pub(crate) fn network_figures(run: &Run) -> Vec<String> {
     figures
 }
 
+impl Opened {
+    /// Changes the settings of the next training.
+    #[track_caller]
+    pub(crate) fn change(&mut self, change: impl FnOnce(&mut RunSettings)) {
+        let mut settings = *self.setup.settings();
+        change(&mut settings);
+        self.setup = self.setup.with_settings(settings);
+        self.driver
+            .window_mut()
+            .apply(Effect::TakeSetup(Box::new(self.setup.clone())));
+        self.driver.harness().run_steps(2);
+        assert_eq!(self.driver.state().setup().as_ref(), Ok(&self.setup));
+    }
+}
+
 impl Driver {
     /// Makes this recording the source of the next training, and waits until the window can read it.
     #[track_caller]

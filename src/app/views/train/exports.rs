@@ -9,8 +9,8 @@ use super::{
 use crate::{
     app::shared::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
-        RunView, Shared, SourceKind, copy_exports, error_table_export, file_stem, loss_export, network_exports,
-        picture_exports,
+        RunView, Shared, SourceKind, copy_exports, csv_export, error_table_export, file_stem, loss_export,
+        network_exports, picture_exports,
     },
     evaluation::{DecoderReport, TestErrors},
     export::{decoder_table, error_table},
@@ -29,6 +29,12 @@ const OPENED: FileWords = FileWords {
     description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
                   history, and pauses it. A resumed training gives bit-identical results.",
     ..CHECKPOINT
+};
+
+const DECODERS: FileWords = FileWords {
+    kind: "decoder table",
+    description: "Errors and times of the measured decoders with every digit, as CSV.",
+    extensions: &["csv"],
 };
 
 /// Task of saving the checkpoint of `run`.
@@ -90,6 +96,12 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         }
         Ok(move || decoder_table(&reports, run.baselines.reference.as_ref().and_then(TestErrors::nodes)))
     });
+    exports.push(csv_export(
+        "Decoder table",
+        DECODERS,
+        stem("decoders"),
+        decoders.clone(),
+    ));
     exports.extend(copy_exports("Decoder table", decoders));
     let standing = run.and_then(|run| match shared.phase {
         Phase::Paused | Phase::Ended(_) => Ok(run),

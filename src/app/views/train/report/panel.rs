@@ -53,7 +53,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             decoders_ui(ui, &mut view.decoders, shared.phase, limit);
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.starts);
+            spread_ui(ui, &run.problem, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -323,7 +323,12 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", format_short_time(time)));
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, format_short_time(time)));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
