@@ -40,7 +40,7 @@ pub use run_view::RunView;
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind};
 pub use surfaces::{follow_surface, view_mode_ui};
 pub use training_form::{method_choice_ui, method_settings_ui, stopping_ui};
-pub use training_status::phase_in_words;
+
 use training_status::training_status_ui;
 pub use unfinished::Unfinished;
 pub use view::{Columns, View};

@@ -8,7 +8,9 @@ use crate::{
         glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
         theme::{Theme, space, type_size},
-        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
+        views::train::{
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
+        },
         widgets::{
             Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
@@ -45,13 +47,13 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            if let Some(worst) = worst_node_ui(ui, result) {
-                view.go_to(worst, shared);
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             decoders_ui(ui, &mut view.decoders, shared.phase, limit);
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.starts);
+            spread_ui(ui, &run.problem, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -307,7 +309,12 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", frame_time(1e6 * time.as_secs_f64())));
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
