@@ -21,7 +21,12 @@ use crate::{
 };
 
 /// Pattern and sensitivity above, singular values and what they come to below.
-pub(super) fn identifiability_ui(ui: &mut Ui, shown: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
+pub(super) fn identifiability_ui(
+    ui: &mut Ui,
+    shown: &mut IdentifiabilityView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
     let whole = ui.available_rect_before_wrap();
     let Some(analysis) = &shown.analysis else {
         card_ui(ui, whole, |ui| match &shown.problem {
@@ -78,7 +83,12 @@ fn sensitivity_range(analysis: &Analysis) -> RangeInclusive<f64> {
 }
 
 /// The worst-seen pattern and the sensitivity of the nodes.
-pub(super) fn identifiability_figure(shown: &IdentifiabilityView, analysis: &Analysis, place: usize, look: Look) -> SurfaceFigure {
+pub(super) fn identifiability_figure(
+    shown: &IdentifiabilityView,
+    analysis: &Analysis,
+    place: usize,
+    look: Look,
+) -> SurfaceFigure {
     let surface = |title: &str, frame: &Frame, quantity, range, mode| Surface {
         title: title.to_owned(),
         map: Arc::clone(&analysis.surface),

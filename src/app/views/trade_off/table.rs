@@ -26,11 +26,13 @@ impl Figure {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
     const WIDTH: f32 = space(18);
 
-    fn heading(self) -> &'static str {
+    /// Heading; `has_nodes` is false for the targets of a recording.
+    fn heading(self, has_nodes: bool) -> &'static str {
         match self {
-            Self::Error => "Z %",
+            Self::Error if has_nodes => "Z %",
+            Self::Error => "% of range",
             Self::ToLimit => "× limit",
-            Self::Frame => "a frame",
+            Self::Frame => "decoding",
             Self::Training => "training",
         }
     }
@@ -73,7 +75,7 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         width: ColumnWidth::Rest,
     };
     let columns = figures.iter().map(|figure| TableColumn {
-        heading: figure.heading(),
+        heading: figure.heading(level.noise.is_some()),
         is_figure: true,
         width: ColumnWidth::Points(Figure::WIDTH),
     });

@@ -8,7 +8,7 @@ use crate::{
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, note_ui, section_heading_ui},
     },
-    evaluation::{Channel, recorded::FittedModel},
+    evaluation::recorded::FittedModel,
     export::{describe_target, describe_warnings, format_duration, format_number},
     figure::{PlotFigure, learning_curve_figure},
 };

@@ -152,7 +152,10 @@ fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
     let last = shared.result().and_then(|result| result.wall_time);
     let time = last.map_or_else(String::new, |last| {
         let [least, most] = [least, most].map(|count| format_duration(last.saturating_mul(count as u32)));
-        format!("; the last training took {}, so {least} to {most}", format_duration(last))
+        format!(
+            "; the last training took {}, so {least} to {most}",
+            format_duration(last)
+        )
     });
     format!("The analysis takes {range} trainings with {folds} folds{time}.")
 }

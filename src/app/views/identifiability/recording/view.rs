@@ -56,7 +56,10 @@ pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
                 }
                 None => {
                     ui.add_space(space(2));
-                    dim_ui(ui, "“Cross-validate” tests on every sample and lists the held-out errors here.");
+                    dim_ui(
+                        ui,
+                        "“Cross-validate” tests on every sample and lists the held-out errors here.",
+                    );
                 }
             }
         });
