@@ -1,6 +1,6 @@
 use std::{
     fs::File,
-    io::{BufReader, Write, stderr},
+    io::BufReader,
     path::{Path, PathBuf},
 };
 
@@ -10,10 +10,7 @@ use ndarray::{Array2, Axis, Slice};
 use super::{failure::Failure, follow::Follow, measured_decode, outside_training::OutsideTraining};
 use crate::{
     dataset::{ReadError, Reading, ResistanceReader, SimulationError},
-    export::{
-        AtomicFile, DocumentError, MeasuredNetworkFile, NetworkFile, WriteError, is_same, write_decoded,
-        write_decoded_header,
-    },
+    export::{AtomicFile, NetworkFile, WriteError, is_same, write_decoded, write_decoded_header},
     network::Networks,
     scene::RowModel,
 };
@@ -51,15 +48,9 @@ impl Decode {
         if let Some((input, output)) = self.input.as_ref().zip(self.output.as_ref()) {
             self.check_output(input, output)?;
         }
-        match MeasuredNetworkFile::load(&self.network) {
-            // It is of another kind.
-            Err(DocumentError::Other { .. }) => {}
-            file => return self.decode_measured(&file?),
-        }
         let file = NetworkFile::load(&self.network)?;
-        if let Some(warning) = file.old_version_warning() {
-            // Nobody is left to tell if this fails.
-            let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
+        if file.recorded.is_some() {
+            return self.decode_measured(&file);
         }
         match (&self.input, &self.output) {
             (Some(input), Some(output)) if !self.follow.follow => {
@@ -73,7 +64,7 @@ impl Decode {
         }
     }
 
-    fn decode_measured(&self, file: &MeasuredNetworkFile) -> Result<(), Failure> {
+    fn decode_measured(&self, file: &NetworkFile) -> Result<(), Failure> {
         match (&self.input, &self.output) {
             (Some(input), Some(output)) if !self.follow.follow => {
                 self.follow.check_unused()?;
@@ -99,7 +90,8 @@ impl Decode {
 
 /// Decodes the file `input` into the file `output`.
 fn decode_file(file: NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
-    let NetworkFile { settings, network, .. } = file;
+    let network = file.network;
+    let settings = file.settings.simulated().expect("the network is of an array");
     let scale = settings.source.sensor.scale;
     let opened = File::open(input).map_err(|source| Failure::Open {
         path: input.to_owned(),

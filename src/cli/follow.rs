@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     dataset::SimulationError,
-    export::{MeasuredNetworkFile, NetworkFile},
+    export::NetworkFile,
     live::{Keeping, Line, LineParser, Lines, NextLine, ParsedLine, Source},
 };
 
@@ -67,7 +67,7 @@ impl Follow {
     }
 
     /// Decodes `input` with a network of own data until it ends, or until Ctrl-C.
-    pub(super) fn run_measured(&self, input: &Path, file: &MeasuredNetworkFile) -> Result<(), Failure> {
+    pub(super) fn run_measured(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
         if self.noise.is_some() {
             return Err(wrong(
                 "--noise",
@@ -159,10 +159,11 @@ impl Follow {
     pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
         let source = self.source(input)?;
         let keeping = source.keeping();
-        let (scene, scale) = (&file.settings.source.scene, file.settings.source.sensor.scale);
+        let source_of_network = file.settings.simulated().expect("the network is of an array").source;
+        let (scene, scale) = (&source_of_network.scene, source_of_network.sensor.scale);
         let mut parser = LineParser::new(scale, scene.rows, keeping == Keeping::All).map_err(SimulationError::from)?;
         let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
-        let mut faults = Faults::new(&file.settings.source, self.noise)?;
+        let mut faults = Faults::new(&source_of_network, self.noise)?;
         let mut checked: Option<Instant> = None;
         let input = source.clone();
         let end = self.follow(source, answers.rows(), |Line { number, text, read_at }, report| {

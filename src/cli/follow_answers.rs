@@ -37,8 +37,9 @@ pub(super) struct Answers<'a> {
 
 impl<'a> Answers<'a> {
     pub(super) fn new(file: &'a NetworkFile, form: Form) -> Result<Self, Failure> {
-        let scale = file.settings.source.sensor.scale;
-        let read = file.settings.source.scene.rows.read(scale.rows());
+        let source = file.settings.simulated().expect("the network is of an array").source;
+        let scale = source.sensor.scale;
+        let read = source.scene.rows.read(scale.rows());
         let rows = read.map_err(SimulationError::from)?.len();
         Ok(Self {
             networks: &file.network,

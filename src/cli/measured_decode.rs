@@ -5,27 +5,27 @@ use std::{
     path::Path,
 };
 
-use super::{failure::Failure, follow_answers::Form, import_arguments::with_bar};
+use super::{failure::Failure, follow_answers::Form, samples::with_bar};
 use crate::{
     dataset::clean_name::inert,
     dataset::{CsvFields, number},
     decoupling::{CompiledNetworks, Decoder},
-    export::{AtomicFile, MeasuredNetworkFile, WriteError},
-    import::{InputColumns, InputError},
+    export::{AtomicFile, NetworkFile, WriteError},
+    import::{InputColumns, InputError, Recipe},
     network::DecouplingNetwork,
 };
 
 /// Decodes the file `input` into the file `output`.
-pub(super) fn decode_file(file: &MeasuredNetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
-    let recipe = &file.plan.import;
+pub(super) fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
+    let recipe = recipe(file);
     let table = with_bar(true, |watch| {
-        recipe.read_inputs(input, &file.inputs, file.network.only().is_none(), watch)
+        recipe.read_inputs(input, &file.problem.inputs, file.network.only().is_none(), watch)
     })?;
     let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows(file));
     let refused = |source| WriteError::io(output, source);
     let mut written = AtomicFile::create(output)?;
     write_heading(file, &mut written).map_err(refused)?;
-    let mut answer = vec![0.0; file.targets.len()];
+    let mut answer = vec![0.0; file.problem.targets.len()];
     let mut lines_outside = 0;
     for (sample, &line) in table.lines.iter().enumerate() {
         let row_index = match (&table.row_wires, &file.row_wires) {
@@ -69,8 +69,14 @@ pub(super) fn decode_file(file: &MeasuredNetworkFile, input: &Path, output: &Pat
     Ok(())
 }
 
+/// Recipe by which the samples of the network were read.
+fn recipe(file: &NetworkFile) -> &Recipe {
+    let recorded = file.recorded.as_ref();
+    &recorded.expect("the network is of a recording").plan.import
+}
+
 /// Number of row-wires that are told apart.
-fn rows(file: &MeasuredNetworkFile) -> usize {
+fn rows(file: &NetworkFile) -> usize {
     file.network.values().len()
 }
 
@@ -83,8 +89,8 @@ fn outside(network: &DecouplingNetwork, readings: &[f64], answer: &[f64]) -> (us
     (readings, network.outputs().far_outside(answer).count())
 }
 
-fn write_heading(file: &MeasuredNetworkFile, out: &mut impl Write) -> io::Result<()> {
-    let titles = file.targets.iter().map(|target| inert(&target.title()));
+fn write_heading(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
+    let titles = file.problem.targets.iter().map(|target| inert(&target.title()));
     let names = titles.chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(names).map_err(io::Error::other)?;
@@ -105,7 +111,7 @@ fn write_answer(
 
 /// Decodes lines as they come and writes their answers to standard output.
 pub(super) struct MeasuredAnswers<'a> {
-    file: &'a MeasuredNetworkFile,
+    file: &'a NetworkFile,
     compiled: CompiledNetworks<f64>,
     fields: CsvFields,
     /// Columns of the lines, by their header or else by the first line that was decoded.
@@ -133,7 +139,7 @@ pub(super) enum Answered {
 }
 
 impl<'a> MeasuredAnswers<'a> {
-    pub(super) fn new(file: &'a MeasuredNetworkFile, form: Form) -> Self {
+    pub(super) fn new(file: &'a NetworkFile, form: Form) -> Self {
         Self {
             file,
             compiled: CompiledNetworks::new(&file.network, rows(file)),
@@ -141,7 +147,7 @@ impl<'a> MeasuredAnswers<'a> {
             columns: None,
             readings: Vec::new(),
             inputs: Vec::new(),
-            answer: vec![0.0; file.targets.len()],
+            answer: vec![0.0; file.problem.targets.len()],
             form,
             has_heading: form == Form::Jsonl,
             output: BufWriter::with_capacity(1 << 16, stdout().lock()),
@@ -157,8 +163,8 @@ impl<'a> MeasuredAnswers<'a> {
             return Ok(Answered::NoReadings);
         }
         self.fields.split(text);
-        let recipe = &self.file.plan.import;
-        let (inputs, row_wire) = (&self.file.inputs, recipe.row_wire.as_deref());
+        let recipe = recipe(self.file);
+        let (inputs, row_wire) = (&self.file.problem.inputs, recipe.row_wire.as_deref());
         self.readings.clear();
         self.readings
             .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
@@ -231,7 +237,7 @@ impl<'a> MeasuredAnswers<'a> {
         match self.form {
             Form::Csv => write_answer(&self.answer, readings_outside, targets_outside, &mut self.output)?,
             Form::Jsonl => {
-                let names = self.file.targets.iter().map(|target| target.name.as_str());
+                let names = self.file.problem.targets.iter().map(|target| target.name.as_str());
                 let targets: serde_json::Map<String, serde_json::Value> = names
                     .zip(&self.answer)
                     .map(|(name, value)| (name.to_owned(), (*value).into()))

@@ -4,11 +4,12 @@
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
-mod announcement;
 mod arguments;
 mod calibrate;
 mod checkpointing;
+mod cross_validation;
 mod decode;
+mod errors_report;
 mod export;
 mod export_report;
 mod failure;
@@ -23,20 +24,15 @@ mod frames;
 mod import_arguments;
 mod inspect;
 mod interruption;
-mod measured_command;
 mod measured_decode;
-mod measured_files;
-mod measured_report;
-mod measured_table;
-mod measured_trade;
-mod measured_trade_report;
-mod measured_train;
 mod output;
 mod outside_training;
 mod parse_error;
 mod parsers;
+mod recording_report;
 mod reproduce;
 mod reproduce_report;
+mod samples;
 mod scene_arguments;
 mod shell;
 mod simulate;
@@ -44,6 +40,7 @@ mod specification_error;
 mod spread_plot;
 mod sweep;
 mod trade;
+mod trade_command;
 mod trade_report;
 mod train;
 mod train_report;
