@@ -28,8 +28,6 @@ pub enum Matter {
     Identifiability,
     /// The view with what each way of decoding costs.
     TradeOff,
-    /// The view with two trainings side by side.
-    Comparison,
     /// Frames decoded as they come.
     Live,
     /// Recordings, and networks trained on them.

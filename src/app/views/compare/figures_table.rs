@@ -7,10 +7,11 @@ use crate::{
     app::{
         shared::{PLACES, RunList},
         theme::Theme,
-        widgets::{Column, Row, fields::capitalised, table_ui},
+        widgets::{Column, Row, fact_ui, fields::capitalised, note_ui, table_ui},
     },
-    evaluation::{Errors, Simulation},
+    evaluation::{Channel, Errors, Simulation, TargetErrors},
     export::{KeptRun, Table, TableColumn, format_duration, format_number},
+    import::Plan,
 };
 
 const COLUMNS: [Column; 2] = [
@@ -23,6 +24,9 @@ const COLUMNS: [Column; 2] = [
         meaning: "The run chosen as B",
     },
 ];
+
+const OTHER_SAMPLES: &str =
+    "These networks were tested on different samples, so their errors are not comparable directly.";
 
 /// A figure of a run, in words; `None` if runs of its source have none.
 type FigureOf = fn(&KeptRun) -> Option<String>;
@@ -39,7 +43,7 @@ fn of_array(run: &KeptRun, figure: fn(&Simulation) -> String) -> Option<String> 
     run.file.settings.source.simulation().map(figure)
 }
 
-const FIGURES: [(&str, FigureOf); 19] = [
+const FIGURES: [(&str, FigureOf); 20] = [
     ("Z error, %", |run| of_nodes(run, |errors| errors.z_percent)),
     ("X error, %", |run| of_nodes(run, |errors| errors.x_percent)),
     ("Y error, %", |run| of_nodes(run, |errors| errors.y_percent)),
@@ -59,6 +63,7 @@ const FIGURES: [(&str, FigureOf); 19] = [
         Some(format_number(run.file.scores.baselines.mean.percent()))
     }),
     ("source", |run| Some(run.file.source_name())),
+    ("split", |run| Some(split_words(&run.file.recorded.as_ref()?.plan))),
     ("rows", |run| of_array(run, |array| rows_words(array.scene.rows))),
     ("axes", |run| {
         of_array(run, |array| movement_words(array.scene.movement))
@@ -93,6 +98,55 @@ fn figures(runs: &RunList) -> impl Iterator<Item = (&'static str, [Option<String
         .filter(move |(_, words)| is_empty || words.iter().any(Option::is_some))
 }
 
+/// RMSE and R² of each target of the recordings compared, with the words for each run.
+fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
+    let pinned = [0, 1].map(|place| runs.pinned(place));
+    let mut targets: Vec<&Channel> = Vec::new();
+    let recorded = pinned.into_iter().flatten().filter(|run| run.file.recorded.is_some());
+    for target in recorded.flat_map(|run| &run.file.problem.targets) {
+        if !targets.contains(&target) {
+            targets.push(target);
+        }
+    }
+    let errors = |run: &KeptRun, target: &Channel| {
+        let index = run.file.problem.targets.iter().position(|other| other == target)?;
+        run.file.scores.network.targets().get(index).copied()
+    };
+    let figures = |target: &Channel| {
+        let of = |figure: fn(&TargetErrors) -> String| {
+            pinned.map(|run| run.and_then(|run| errors(run, target)).map(|errors| figure(&errors)))
+        };
+        let title = target.title();
+        [
+            (format!("RMSE of {title}"), of(|errors| format_number(errors.rmse))),
+            (format!("R² of {title}"), of(|errors| format_number(errors.r2))),
+        ]
+    };
+    targets.into_iter().flat_map(figures).collect()
+}
+
+/// Returns true if the errors of two recordings are not of the same samples.
+fn are_other_samples(runs: &RunList) -> bool {
+    // The channels of the readings may differ.
+    let samples = |run: &KeptRun| {
+        let mut plan = run.file.recorded.as_ref()?.plan.clone();
+        plan.import.inputs.clear();
+        plan.import.units.clear();
+        Some((plan, run.file.settings.seed))
+    };
+    match [0, 1].map(|place| runs.pinned(place)) {
+        [Some(a), Some(b)] => samples(a) != samples(b),
+        _ => false,
+    }
+}
+
+fn split_words(plan: &Plan) -> String {
+    match plan.test {
+        Some(_) => "test file".to_owned(),
+        None => plan.division.by.to_string(),
+    }
+}
+
 /// The same figures for other documents, under the names of the runs.
 pub fn compared_table(runs: &RunList) -> Table {
     let name = |place: usize| {
@@ -100,10 +154,11 @@ pub fn compared_table(runs: &RunList) -> Table {
         TableColumn::field(format!("{}: {run}", PLACES[place]))
     };
     let cell = |words: Option<String>| words.unwrap_or_else(|| format_number(None)).into();
-    let row = |(name, [a, b]): (&str, [Option<String>; 2])| vec![capitalised(name).into(), cell(a), cell(b)];
+    let row = |(name, [a, b]): (String, [Option<String>; 2])| vec![capitalised(&name).into(), cell(a), cell(b)];
+    let of_runs = figures(runs).map(|(name, words)| (name.to_owned(), words));
     Table {
         columns: vec![TableColumn::field("Figure"), name(0), name(1)],
-        rows: figures(runs).map(row).collect(),
+        rows: of_runs.chain(target_figures(runs)).map(row).collect(),
     }
 }
 
@@ -120,5 +175,16 @@ pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
         mark: "",
     };
     let rows: Vec<Row> = figures(runs).map(row).collect();
+    if are_other_samples(runs) {
+        note_ui(ui, OTHER_SAMPLES);
+    }
     ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+    for (name, [a, b]) in target_figures(runs) {
+        fact_ui(
+            ui,
+            &name,
+            "",
+            &format!("{}: {}, {}: {}", PLACES[0], cell(a), PLACES[1], cell(b)),
+        );
+    }
 }
