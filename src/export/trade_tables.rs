@@ -7,12 +7,13 @@ use crate::{
 
 /// Every point of every level, with all its figures: for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    const FIELDS: [&str; 16] = [
+    const FIELDS: [&str; 17] = [
         "noise",
         "preset",
         "decoder",
         "precision",
         "hidden",
+        "method",
         "samples",
         "epochs",
         "z_percent",
@@ -44,6 +45,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 report.kind.to_string().into(),
                 precision.into(),
                 count(hidden),
+                point
+                    .method()
+                    .map_or(Cell::Number(None), |method| method.short_name().into()),
                 count(point.settings.source.simulation().map(|simulation| simulation.samples)),
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
                 report.errors.percent().into(),
@@ -59,10 +63,21 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         };
         points.map(row).collect::<Vec<_>>()
     };
-    Table {
+    let mut table = Table {
         columns: FIELDS.map(TableColumn::field).to_vec(),
         rows: levels.iter().flat_map(of_level).collect(),
+    };
+    if levels.iter().all(|level| level.noise.is_none()) {
+        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
+        for field in of_arrays.into_iter().chain(["reference_z_percent", "reference_z_mm"]) {
+            table.remove_column(field);
+        }
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::field("percent_of_range"));
     }
+    table
 }
 
 /// The points of one level, fastest first: for readers.
@@ -90,6 +105,13 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
         ],
         rows: points.into_iter().map(row).collect(),
     };
+    if level.noise.is_none() {
+        table.remove_column("z_mm");
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
+    }
     // Without noise there is no limit to compare with.
     if level.points.iter().all(|point| point.to_reference().is_none()) {
         table.remove_column("times_reference");
