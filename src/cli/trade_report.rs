@@ -19,6 +19,7 @@ use crate::{
         most_accurate_under,
     },
     export::{Cell, Table, TableColumn, error_table, format_duration, format_number},
+    figure::trade_words::point_name,
     import::Recordings,
     sensor::ArrayScale,
 };
@@ -311,18 +312,6 @@ impl MeasuredLevel {
         }
     }
 
-    /// Name of a point among all of the level.
-    fn name(point: &TradeOffPoint) -> String {
-        let preset = point.preset.map(|preset| format!("{preset} preset"));
-        let hidden = point.hidden().map(|hidden| format!("{hidden} hidden"));
-        // Every network of a preset has its method.
-        let method = point.method().filter(|_| preset.is_none());
-        let method = method.map(|method| method.short_name().to_owned());
-        let name = point.report.kind.name(point.report.precision).to_owned();
-        let parts = [Some(name), preset, method, hidden];
-        Vec::from_iter(parts.into_iter().flatten()).join(", ")
-    }
-
     fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
         if let Some(noise) = self.level.noise {
             write!(out, "\nNoise {noise}")?;
@@ -337,7 +326,7 @@ impl MeasuredLevel {
         write!(out, "\n{}", self.table().aligned())?;
         for point in &self.level.points {
             for remark in &point.report.remarks {
-                writeln!(out, "Warning: {}: {remark}", Self::name(point))?;
+                writeln!(out, "Warning: {}: {remark}", point_name(point))?;
             }
         }
         write_warnings(&self.refused, out)?;
@@ -347,7 +336,7 @@ impl MeasuredLevel {
             most_accurate.map(|choice| (format!("Most accurate under {} us", choice.limit), choice)),
         ];
         for (what, choice) in choices.into_iter().flatten() {
-            let decoder = choice.point.map(|place| Self::name(&self.level.points[place]));
+            let decoder = choice.point.map(|place| point_name(&self.level.points[place]));
             let answer = choice.command.or(decoder).unwrap_or_else(|| "none".to_owned());
             writeln!(out, "{what}: {answer}")?;
         }
@@ -361,7 +350,7 @@ impl MeasuredLevel {
         let mut table = error_table(&ErrorTable::new(problem, &Vec::from_iter(errors)));
         // The rows of each target are the points in their order.
         for (row, point) in table.rows.iter_mut().zip(points.iter().cycle()) {
-            row[1] = Self::name(point).into();
+            row[1] = point_name(point).into();
         }
         table
     }

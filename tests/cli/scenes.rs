@@ -180,7 +180,10 @@ fn a_point_of_a_trade_worse_than_the_mean_says_so() {
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
     }
     let text = success(arguments, folder.path());
-    assert!(text.contains("Warning: paper, "), "{text}");
+    assert!(
+        text.contains("Warning: Network, paper preset, 2 hidden: ") || text.contains("Warning: Ridge, paper preset: "),
+        "{text}"
+    );
 }
 
 #[test]
