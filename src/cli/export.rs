@@ -8,25 +8,36 @@ use clap::Args;
 use super::{
     export_report::{print_json, print_text},
     failure::Failure,
+    import_arguments::{with_bar, working_folder},
 };
-use crate::export::{
-    DocumentError, MeasuredNetworkFile, NetworkFile,
-    bundle::{BundleFormat, BundlePrecision, ExportedNetwork, export_bundle},
-    is_same,
+use crate::{
+    dataset::Dataset,
+    evaluation::RunSettings,
+    export::{
+        DocumentError, MeasuredNetworkFile, NetworkFile,
+        bundle::{
+            BundleDecoder, BundleError, BundleFormat, BundlePrecision, ExportedDecoder, ExportedNetwork, export_bundle,
+            fitted,
+        },
+        is_same,
+    },
 };
 
-/// Write a network for other programs, and verify what was written
+/// Write a decoder for other programs, and verify what was written
 ///
-/// The exported network of a simulated sensor takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
+/// The exported decoder of a simulated sensor takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
 /// the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; scaling, conductances or logarithms, and
-/// constant coordinates are part of it. A network of own data (train --data) takes its inputs and gives its targets, in their
-/// units. Networks of known rows leave as one, which also takes the number of the row-wire,
+/// constant coordinates are part of it. A decoder of own data (train --data) takes its inputs and gives its targets, in their
+/// units. Decoders of known rows leave as one, which also takes the number of the row-wire,
 /// from 1.
 ///
-/// What was written is read back, evaluated, and compared with the network on readings of its scene and on the extremes of
+/// Decoders other than the network are fitted again: to the training samples of the network file, which are drawn again from
+/// its settings or imported again from its recording.
+///
+/// What was written is read back, evaluated, and compared with the decoder on readings of its scene and on the extremes of
 /// its training range: the largest deviation is shown, relative to the widest range of a coordinate in training. A bundle
 /// that deviates by more than 1e-12 (f64) or 1e-5 (f32), or in fixed16 by more than its proven bound, is not written,
-/// unless the network itself magnifies rounding errors further, which is then reported. A bundle in f32 also takes its
+/// unless the decoder itself magnifies rounding errors further, which is then reported. A bundle in f32 also takes its
 /// readings in single precision: the change by rounding them to it is reported too, and a bundle that it changes by more
 /// than 1 % is not written. The bundle is a folder (for json a file) with golden vectors and a README.txt that shows how to
 /// call it.
@@ -35,12 +46,22 @@ pub(super) struct Export {
     /// Network saved by train --out or by the window
     #[arg(long, value_name = "FILE")]
     network: PathBuf,
+    /// network: the network of the file; ridge, linear, rbf (radial basis), fuzzy (rules) and mean: fitted to the training
+    /// samples; newton and polish (network, then Newton): an iteration on the equations of the sensor, for scenes without
+    /// noise (c99, numpy)
+    #[arg(
+        long,
+        value_name = "network|ridge|linear|rbf|fuzzy|mean|newton|polish",
+        default_value_t
+    )]
+    decoder: BundleDecoder,
     /// onnx: a graph (opset 13) for ONNX runtimes; c99: one header and one source in C; matlab: one function file for
-    /// MATLAB and GNU Octave; numpy: weights (.npz) and a decode.py; json: the network file itself
+    /// MATLAB and GNU Octave; numpy: weights (.npz) and a decode.py; json: the network file itself, or the numbers of
+    /// another decoder
     #[arg(long, value_name = "onnx|c99|matlab|numpy|json")]
     format: BundleFormat,
     /// Numbers in which it decodes. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: whole numbers
-    /// with 16-bit weights (c99), which reads whole numbers of nano-, micro- or milliohm and gives nanometres
+    /// with 16-bit weights (networks, c99), which reads whole numbers of nano-, micro- or milliohm and gives nanometres
     #[arg(long, value_name = "f64|f32|fixed16", default_value_t)]
     precision: BundlePrecision,
     /// Folder to be made (for json the file), which must not exist or be an empty folder
@@ -57,25 +78,50 @@ impl Export {
             let message = "--network and --out name the same file: give --out another name";
             return Err(Failure::Arguments(message.to_owned()));
         }
+        self.format
+            .check_for(self.decoder, self.precision)
+            .map_err(BundleError::from)?;
         match MeasuredNetworkFile::load(&self.network) {
             // It is of another kind.
             Err(DocumentError::Other { .. }) => {}
-            file => return self.export(&file?),
+            file => return self.export((&file?).into()),
         }
         let file = NetworkFile::load(&self.network)?;
         if let Some(warning) = file.old_version_warning() {
             // Nobody is left to tell if this fails.
             let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
         }
-        self.export(&file)
+        self.export((&file).into())
     }
 
-    fn export<'a>(&self, network: impl Into<ExportedNetwork<'a>>) -> Result<(), Failure> {
-        let report = export_bundle(network, self.format, self.precision, &self.out)?;
+    fn export(&self, file: ExportedNetwork<'_>) -> Result<(), Failure> {
+        let decoder = if self.decoder.is_network() {
+            ExportedDecoder::network_of(file)
+        } else {
+            let (settings, training, test) = samples_of(file, self.json)?;
+            let networks = Some(file.networks().clone());
+            ExportedDecoder::new(file, fitted(settings, training, networks, self.decoder, &test)?)
+        };
+        let report = export_bundle(decoder, self.format, self.precision, &self.out)?;
         if self.json {
             print_json(&report)
         } else {
             print_text(&report)
+        }
+    }
+}
+
+/// The settings of a network file with its training and test samples, drawn or imported again.
+fn samples_of(file: ExportedNetwork<'_>, is_quiet: bool) -> Result<(RunSettings, Dataset, Dataset), Failure> {
+    match file {
+        ExportedNetwork::Simulated(file) => {
+            let (split, test) = file.settings.draw_held()?;
+            Ok((file.settings.into(), split.training, test))
+        }
+        ExportedNetwork::Measured(file) => {
+            let (folder, seed) = (working_folder(), file.settings.seed);
+            let sets = with_bar(is_quiet, |watch| file.plan.sets(folder, seed, watch))?;
+            Ok((file.settings.into(), sets.split.training, sets.test))
         }
     }
 }

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::{
     Errors, MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TargetErrors,
-    frame_time::frame_us, task::unseen_noise,
+    baselines::fit_baselines, frame_time::frame_us, task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},
@@ -165,6 +165,14 @@ impl DecoderSet {
                 }
             }
         }))
+    }
+
+    /// Fits the linear map of the error table.
+    ///
+    /// # Errors
+    /// If samples cannot be scaled.
+    pub fn linear(&self) -> Result<Box<dyn Decoder>, RunError> {
+        Ok(Box::new(fit_baselines(&self.training, &self.settings)?.1))
     }
 
     /// Compiles the networks for decoding.

@@ -2,6 +2,8 @@ use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
+use super::BundleDecoder;
+
 /// Form in which a network leaves the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BundleFormat {
@@ -36,6 +38,25 @@ pub enum ChoiceError {
     /// No such format.
     #[error("'{0}' is not a format: give onnx, c99, matlab, numpy or json")]
     Format(String),
+    /// No such decoder.
+    #[error("'{0}' is not a decoder: give one of {all}", all = decoder_words())]
+    Decoder(String),
+    /// Whole numbers for another decoder than a network.
+    #[error("fixed16 is for networks only: give f64 or f32")]
+    WholeNumbers,
+    /// A format that has no iterations.
+    #[error(
+        "{format} cannot express the iteration of {decoder} on the equations of the sensor: give c99 or numpy, or take another decoder"
+    )]
+    Iteration {
+        /// The format.
+        format: BundleFormat,
+        /// The decoder.
+        decoder: BundleDecoder,
+    },
+    /// Equations in single precision.
+    #[error("{0} solves equations that magnify the rounding of readings in single precision beyond use: give f64")]
+    SingleEquations(BundleDecoder),
     /// No such precision.
     #[error("'{0}' is not a precision: give f64, f32 or fixed16")]
     Precision(String),
@@ -77,10 +98,36 @@ impl BundleFormat {
         })
     }
 
+    /// Checks that the format can express `decoder` in `precision`.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check_for(self, decoder: BundleDecoder, precision: BundlePrecision) -> Result<(), ChoiceError> {
+        self.check(precision)?;
+        let has_iterations = matches!(self, Self::C99 | Self::NumPy);
+        if precision == BundlePrecision::Fixed16 && !decoder.is_network() {
+            Err(ChoiceError::WholeNumbers)
+        } else if decoder.solves_equations() && !has_iterations {
+            Err(ChoiceError::Iteration { format: self, decoder })
+        } else if decoder.solves_equations() && precision != BundlePrecision::Double {
+            Err(ChoiceError::SingleEquations(decoder))
+        } else {
+            Ok(())
+        }
+    }
+
     fn precision_names(self) -> String {
         let names = self.precisions().iter().map(BundlePrecision::to_string);
         names.collect::<Vec<_>>().join(" or ")
     }
+}
+
+/// The words of all decoders.
+fn decoder_words() -> String {
+    BundleDecoder::all()
+        .map(|decoder| decoder.to_string())
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 impl BundlePrecision {

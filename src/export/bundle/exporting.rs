@@ -4,7 +4,7 @@ use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
     error::BundleError,
-    exported_network::{ExportedNetwork, Metadata},
+    exported_decoder::{ExportedDecoder, ExportedNetwork, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::AtomicFolder,
     golden::golden_csv,
@@ -19,31 +19,31 @@ use super::{
     weights::{Arithmetic, Weights},
 };
 
-/// Writes a network as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
-/// read back and compared with the network before it is put in its place.
+/// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
+/// read back and compared with the decoder before it is put in its place.
 ///
 /// # Errors
-/// The format lacks the precision, the network cannot be written in it, `path` is taken or cannot be written, or the
-/// bundle deviates from the network. Nothing is left behind.
+/// The format lacks the precision, the decoder cannot be written in it, `path` is taken or cannot be written, or the
+/// bundle deviates from the decoder. Nothing is left behind.
 pub fn export_bundle<'a>(
-    network: impl Into<ExportedNetwork<'a>>,
+    decoder: impl Into<ExportedDecoder<'a>>,
     format: BundleFormat,
     precision: BundlePrecision,
     path: &Path,
 ) -> Result<BundleReport, BundleError> {
-    let exported = network.into();
-    format.check(precision)?;
+    let exported = decoder.into();
+    format.check_for(exported.kind(), precision)?;
     if format == BundleFormat::Json {
-        return export_network_file(exported, path);
+        return export_network_file(&exported, path);
     }
     let folder = AtomicFolder::create(path)?;
-    let portable = Portable::of(exported)?;
+    let portable = Portable::of(&exported)?;
     let mut bundle = Bundle {
-        exported,
         name: identifier(path),
         format,
         precision,
         metadata: exported.metadata(&portable, precision),
+        exported,
         portable,
         folder,
         remarks: Vec::new(),
@@ -64,20 +64,21 @@ pub fn export_bundle<'a>(
 }
 
 /// Copies the network file.
-fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<BundleReport, BundleError> {
+fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<BundleReport, BundleError> {
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
     let trial = tempfile::tempdir().map_err(|error| crate::export::WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    exported.save(&copy)?;
-    if !exported.is_saved_at(&copy)? {
+    let file: ExportedNetwork<'_> = exported.file();
+    file.save(&copy)?;
+    if !file.is_saved_at(&copy)? {
         return Err(BundleError::ReadBack {
             file: path.display().to_string(),
             reason: "it is another network".to_owned(),
         });
     }
-    exported.save(path)?;
+    file.save(path)?;
     let portable = Portable::of(exported)?;
     let size = fs::metadata(path).map_or(0, |found| found.len());
     Ok(BundleReport {
@@ -100,22 +101,23 @@ fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<Bun
     })
 }
 
-/// Single precision throughout where that is enough, and otherwise the hidden sums in double.
+/// Single precision throughout where that is enough, and otherwise as many first layers in double as it takes.
 fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     /// Part of the limit that single precision may use in this evaluation: others add up in another order.
     const PART: f64 = 0.2;
-    let single = Weights::of(portable, Arithmetic::SINGLE);
-    let deviation = vectors.deviation(|vector| single.decode(vector.network, &vector.taken));
-    if deviation.of_arithmetic <= PART * Tolerance::SINGLE {
-        Arithmetic::SINGLE
-    } else {
-        Arithmetic::MIXED
-    }
+    let is_enough = |arithmetic: &Arithmetic| {
+        let single = Weights::of(portable, *arithmetic);
+        let deviation = vectors.deviation(|vector| single.decode(vector.row, &vector.taken));
+        deviation.of_arithmetic <= PART * Tolerance::SINGLE
+    };
+    let layers = portable.layers().len();
+    let mut all = (0..layers).map(Arithmetic::single);
+    all.find(is_enough).unwrap_or(Arithmetic::single(layers))
 }
 
 /// A bundle in the making.
 struct Bundle<'a> {
-    exported: ExportedNetwork<'a>,
+    exported: ExportedDecoder<'a>,
     name: String,
     format: BundleFormat,
     precision: BundlePrecision,
@@ -127,8 +129,8 @@ struct Bundle<'a> {
 }
 
 impl Bundle<'_> {
-    fn vectors(&self, taking: Taking<'_>) -> Result<Vectors, BundleError> {
-        Vectors::of(self.exported, &self.portable, taking)
+    fn vectors(&mut self, taking: Taking<'_>) -> Result<Vectors, BundleError> {
+        Vectors::of(&mut self.exported, &self.portable, taking)
     }
 
     /// Notes what rounding the readings to single precision changes.
@@ -148,7 +150,8 @@ impl Bundle<'_> {
         self.metadata.insert("change_by_rounding_readings".to_owned(), figures);
         if worst > Tolerance::SINGLE {
             self.remarks.push(format!(
-                "rounding the readings to single precision changes a {output} by up to {largest} in the verification and by                  at most {bound}; if that is too much, {cure}",
+                "rounding the readings to single precision changes a {output} by up to {largest} in the verification and by \
+                 at most {bound}; if that is too much, {cure}",
                 output = portable.meaning.output(),
                 largest = portable.in_words(rounding.largest),
                 bound = portable.in_words(rounding.worst()),
@@ -166,8 +169,8 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.taken));
-        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights).of_arithmetic);
+        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.row, &vector.taken));
+        let tolerance = Tolerance::of(portable, arithmetic, &vectors.growth, model(&weights).of_arithmetic);
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
         let limits = Deviation {
             total: tolerance.limit + vectors.rounding.worst(),
@@ -177,27 +180,26 @@ impl Bundle<'_> {
         let mut check = |evaluator, deviation| checks.push(BundleCheck::of(evaluator, deviation));
         match self.format {
             BundleFormat::Onnx => {
-                self.folder.write(
-                    "network.onnx",
-                    onnx::write(portable, &weights, &self.metadata, &self.remarks),
-                )?;
-                let damaged = |reason| read_back("network.onnx", reason);
-                let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
+                let file = format!("{}.onnx", portable.decoder);
+                self.folder
+                    .write(&file, onnx::write(portable, &weights, &self.metadata, &self.remarks))?;
+                let damaged = |reason| read_back(&file, reason);
+                let graph = onnx::OnnxGraph::read(&self.read(&file)?).map_err(damaged)?;
                 let answers = graph.decode(vectors.all()).map_err(damaged)?.answers;
                 if answers.len() != vectors.all().len() {
-                    return Err(read_back("network.onnx", "it has another number of answers".to_owned()));
+                    return Err(read_back(&file, "it has another number of answers".to_owned()));
                 }
                 let mut answers = answers.into_iter();
                 let deviation = vectors.deviation(|_| answers.next().unwrap_or_default());
                 check("ONNX graph, read back and evaluated", deviation);
             }
             BundleFormat::NumPy => {
-                self.folder
-                    .write("network.npz", numpy::write_weights(portable, &weights))?;
+                let file = format!("{}.npz", portable.decoder);
+                self.folder.write(&file, numpy::write_weights(portable, &weights))?;
                 self.folder
                     .write("decode.py", numpy::write_program(portable, arithmetic))?;
-                let read = numpy::read_weights(&self.read("network.npz")?, portable);
-                let read = read.map_err(|reason| read_back("network.npz", reason))?;
+                let read = numpy::read_weights(&self.read(&file)?, portable, arithmetic);
+                let read = read.map_err(|reason| read_back(&file, reason))?;
                 check("NumPy weights, read back and evaluated", model(&read));
             }
             BundleFormat::Matlab => {
@@ -233,7 +235,7 @@ impl Bundle<'_> {
             self.folder.write(&name, text)?;
         }
         let deviation = vectors.deviation(|vector| {
-            let outputs = fixed.decode(vector.network, &vector.readings);
+            let outputs = fixed.decode(vector.row, &vector.readings);
             // Readings that it cannot take were refused when they were drawn.
             outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
@@ -248,7 +250,7 @@ impl Bundle<'_> {
                 "the error is only known to be below {:.0} % of the range of the outputs; {} for a network that amplifies \
                  rounding errors less",
                 100.0 * limit,
-                self.portable.meaning.smaller_weights()
+                self.portable.smaller_weights()
             ));
         }
         match run_self_test(self.folder.path(), &self.name)? {

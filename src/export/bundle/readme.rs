@@ -42,7 +42,7 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         let _ = write!(
             text,
             " There is one network for each row, from 1 to {}.",
-            portable.networks.len()
+            portable.rows()
         );
     }
     text += "\n\nHow to call it\n\n";
@@ -131,7 +131,7 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                 (None, BundlePrecision::Single) => ("float", input, "float", output),
                 (None, _) => ("double", input, "double", output),
             };
-            let range = if portable.ranges().is_some() {
+            let range = if portable.known_ranges().is_some() {
                 format!(
                     "\nint outside = {name}_is_out_of_range({row}{readings}); counts the readings beyond the range seen in \
                      training."

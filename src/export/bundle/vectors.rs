@@ -1,16 +1,16 @@
 use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
-    exported_network::ExportedNetwork,
+    exported_decoder::ExportedDecoder,
     meaning::Meaning,
     portable::Portable,
     taking::{ReadingRounding, Taking},
 };
 
-/// Readings with the answers that the network gives to them.
+/// Readings with the answers that the decoder gives to them.
 #[derive(Clone, Debug)]
 pub(super) struct Vectors {
-    /// The golden vectors first: of each network the smallest, middle and largest readings of its training range, and a
+    /// The golden vectors first: of each row the smallest, middle and largest readings of its training range, and a
     /// few of those drawn.
     all: Vec<Vector>,
     golden: usize,
@@ -29,8 +29,8 @@ pub(super) struct Vectors {
 /// Readings of a row with the answer.
 #[derive(Clone, Debug)]
 pub(super) struct Vector {
-    /// Index of the network, and so of the row-wire where that is an argument.
-    pub(super) network: usize,
+    /// Index of the row-wire where that is an argument, and 0 otherwise.
+    pub(super) row: usize,
     /// As a caller has them, in double precision.
     pub(super) readings: Vec<f64>,
     /// The readings in the form that the bundle takes.
@@ -44,9 +44,9 @@ pub(super) struct Vector {
 /// Largest differences of an evaluation, relative to the scales of the outputs. NaN if an answer is NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deviation {
-    /// From the answers of the network to the readings that a caller has.
+    /// From the answers of the decoder to the readings that a caller has.
     pub(super) total: f64,
-    /// From the answers of the network to the readings as taken: by the arithmetic alone.
+    /// From the answers of the decoder to the readings as taken: by the arithmetic alone.
     pub(super) of_arithmetic: f64,
 }
 
@@ -56,13 +56,13 @@ impl Vectors {
     /// # Errors
     /// No readings could be drawn, or the bundle cannot take one of them.
     pub(super) fn of(
-        exported: ExportedNetwork<'_>,
+        exported: &mut ExportedDecoder<'_>,
         portable: &Portable,
         taking: Taking<'_>,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
-        for (index, network) in portable.networks.iter().enumerate() {
-            let Some(range) = &network.range else { continue };
+        for (index, range) in portable.ranges.iter().enumerate() {
+            let Some(range) = range else { continue };
             for place in [0.0, 0.5, 1.0] {
                 let between = |&(low, high): &(f64, f64)| if place == 1.0 { high } else { low + place * (high - low) };
                 readings.push((index, range.extremes.iter().map(between).collect::<Vec<_>>()));
@@ -92,30 +92,25 @@ impl Vectors {
             let errors: Vec<f64> = channels
                 .map(|(channel, &reading)| taking.error(channel, reading))
                 .collect();
-            let network = &portable.networks[index];
-            let exact = decode_exactly(portable, network, &readings);
+            let map = &portable.maps[index];
+            let exact = decode_exactly(portable, map, &readings);
             let of_taken = if taken == readings {
                 exact.clone()
             } else {
-                decode_exactly(portable, network, &taken)
+                decode_exactly(portable, map, &taken)
             };
-            vectors.growth = vectors.growth.largest(of_taken.growth);
-            let bound = exact.change_by(portable, network, &readings, &errors);
-            if let Some(range) = &network.range {
+            vectors.growth = vectors.growth.largest(&of_taken.growth);
+            let bound = exact.change_by(portable, map, &readings, &errors);
+            if let Some(range) = &portable.ranges[index] {
                 let errors: Vec<f64> = (range.limits.iter().enumerate())
                     .map(|(channel, &(low, high))| taking.error(channel, 0.5 * (high - low)))
                     .collect();
-                let bound = exact.change_by(portable, network, &readings, &errors);
+                let bound = exact.change_by(portable, map, &readings, &errors);
                 vectors.centred_bound = larger(vectors.centred_bound, bound);
             } else {
                 vectors.centred_bound = f64::INFINITY;
             }
-            let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);
-            let of_program = exported
-                .networks()
-                .at(index)
-                .decouple(row.expect("one row of readings"));
-            let of_program = of_program.into_raw_vec_and_offset().0;
+            let of_program = exported.decode(index, &readings)?;
             vectors.rounding = ReadingRounding {
                 largest: larger(
                     vectors.rounding.largest,
@@ -128,7 +123,7 @@ impl Vectors {
                 relative(&of_program, &exact.answers, &vectors.scales),
             );
             vectors.all.push(Vector {
-                network: index,
+                row: index,
                 readings,
                 taken,
                 answers: exact.answers,
@@ -141,7 +136,7 @@ impl Vectors {
     /// Leaves out the vectors with a reading that counts as outside the range of training.
     pub(super) fn inside(mut self, portable: &Portable) -> Self {
         let is_inside = |vector: &Vector| {
-            portable.networks[vector.network].range.as_ref().is_none_or(|range| {
+            portable.ranges[vector.row].as_ref().is_none_or(|range| {
                 let mut readings = vector.readings.iter().zip(&range.limits);
                 readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
             })
@@ -168,8 +163,8 @@ impl Vectors {
                 .to_owned()
         } else {
             format!(
-                "give --precision f64, or {} for a network that amplifies less",
-                portable.meaning.smaller_weights()
+                "give --precision f64, or {} for one that amplifies less",
+                portable.smaller_weights()
             )
         }
     }

@@ -100,10 +100,10 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
     let mut text = format!(
         "#include \"{name}_decode.h\"\n\n#define HIDDEN {hidden}\n\n",
         name = header.name,
-        hidden = header.portable.hidden
+        hidden = networks.hidden
     );
     let sizes = [
-        ("HIDDEN", header.portable.hidden),
+        ("HIDDEN", networks.hidden),
         ("CHANNELS", header.portable.channels),
         ("OUTPUTS", header.portable.outputs),
     ];

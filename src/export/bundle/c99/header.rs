@@ -107,7 +107,7 @@ impl Header<'_> {
             text += "#include <stdint.h>\n\n";
         }
         if portable.takes_row() {
-            let _ = writeln!(text, "#define {upper}_ROWS {}", portable.networks.len());
+            let _ = writeln!(text, "#define {upper}_ROWS {}", portable.rows());
         }
         let (channels, outputs, definitions) = (portable.channels, portable.outputs, self.definitions);
         let _ = write!(
@@ -120,7 +120,7 @@ impl Header<'_> {
              enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2\n}};\n\n"
         );
         let row = if portable.takes_row() {
-            format!(" Rows are counted from 1 to {}.", portable.networks.len())
+            format!(" Rows are counted from 1 to {}.", portable.rows())
         } else {
             String::new()
         };
@@ -138,7 +138,7 @@ impl Header<'_> {
                 ),
             },
         );
-        if portable.ranges().is_some() {
+        if portable.known_ranges().is_some() {
             let _ = write!(
                 text,
                 "/* Returns the number of readings beyond the range seen in training by more than a tenth of it, where the\n   \
@@ -156,7 +156,7 @@ pub(super) fn push_out_of_range(
     header: &Header<'_>,
     limits: impl Iterator<Item = (String, String)> + Clone,
 ) {
-    let (rows, channels) = (header.portable.networks.len(), header.portable.channels);
+    let (rows, channels) = (header.portable.rows(), header.portable.channels);
     let sizes = format!("[{rows}][{}_CHANNELS]", header.upper());
     let shape = [rows, channels];
     let reading = header.reading;

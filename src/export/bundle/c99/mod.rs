@@ -75,7 +75,7 @@ pub(super) fn write_fixed(
 }
 
 fn bits_of(networks: &FixedNetworks, vector: &Vector) -> Vec<i32> {
-    networks.decode(vector.network, &vector.readings).unwrap_or_default()
+    networks.decode(vector.row, &vector.readings).unwrap_or_default()
 }
 
 fn files(header: &Header<'_>, source: String, self_test: String) -> Files {

@@ -75,7 +75,7 @@ impl OnnxGraph {
             Tensor::real(self.digits, [vectors.len(), channels], readings),
         )];
         if self.graph.input.len() > 1 {
-            let rows = vectors.iter().map(|vector| vector.network as i64 + 1).collect();
+            let rows = vectors.iter().map(|vector| vector.row as i64 + 1).collect();
             inputs.push(("row".to_owned(), Tensor::int([vectors.len()], rows)));
         }
         let mut values = evaluate(&self.graph, inputs)?;

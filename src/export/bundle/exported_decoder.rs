@@ -4,19 +4,27 @@ use rand::RngExt;
 use serde_json::{Map, Value, json};
 
 use super::{
-    BundleError, BundlePrecision,
+    BundleDecoder, BundleError, BundlePrecision,
+    fitted::{FittedDecoder, FittedErrors},
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
 };
 use crate::{
     dataset::{Seed, Stream},
-    evaluation::{SimulatedSettings, TargetErrors},
+    decoupling::{Description, Layer},
+    evaluation::{RunError, SimulatedSettings, TargetErrors},
     export::{DocumentError, MeasuredNetworkFile, NetworkFile},
     import::Channel,
-    network::Networks,
+    network::{Networks, ReadingRange},
 };
 
-/// The network of a file, to be exported.
+/// A decoder to be exported, with the network file that has its settings and the meaning of its readings and targets.
+pub struct ExportedDecoder<'a> {
+    file: ExportedNetwork<'a>,
+    fitted: FittedDecoder,
+}
+
+/// A network file.
 #[derive(Clone, Copy, Debug)]
 pub enum ExportedNetwork<'a> {
     /// Of a simulated sensor.
@@ -25,10 +33,10 @@ pub enum ExportedNetwork<'a> {
     Measured(&'a MeasuredNetworkFile),
 }
 
-/// Readings of one row with the index of their network.
+/// Readings of one row with the index of the row-wire, 0 where that is no argument.
 pub(super) type Drawn = Vec<(usize, Vec<f64>)>;
 
-/// Facts about a network, for people and programs that have only the bundle: names of fields and JSON values.
+/// Facts about a decoder, for people and programs that have only the bundle: names of fields and JSON values.
 pub(super) type Metadata = Map<String, Value>;
 
 impl<'a> From<&'a NetworkFile> for ExportedNetwork<'a> {
@@ -43,22 +51,135 @@ impl<'a> From<&'a MeasuredNetworkFile> for ExportedNetwork<'a> {
     }
 }
 
+impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
+    fn from(file: &'a NetworkFile) -> Self {
+        Self::network_of(file)
+    }
+}
+
+impl<'a> From<&'a MeasuredNetworkFile> for ExportedDecoder<'a> {
+    fn from(file: &'a MeasuredNetworkFile) -> Self {
+        Self::network_of(file)
+    }
+}
+
+impl<'a> ExportedDecoder<'a> {
+    /// Takes the network of a file.
+    pub fn network_of(file: impl Into<ExportedNetwork<'a>>) -> Self {
+        let file = file.into();
+        Self {
+            fitted: FittedDecoder::of_networks(file.networks()),
+            file,
+        }
+    }
+
+    /// Takes a decoder fitted to the training samples of `file`.
+    pub fn new(file: impl Into<ExportedNetwork<'a>>, fitted: FittedDecoder) -> Self {
+        Self {
+            file: file.into(),
+            fitted,
+        }
+    }
+
+    /// Kind of decoder.
+    pub fn kind(&self) -> BundleDecoder {
+        self.fitted.kind
+    }
+
+    pub(super) fn file(&self) -> ExportedNetwork<'a> {
+        self.file
+    }
+
+    pub(super) fn description(&self) -> &Description {
+        &self.fitted.description
+    }
+
+    pub(super) fn meaning(&self) -> Meaning {
+        self.file.meaning(self.fitted.reading_ranges.len())
+    }
+
+    /// Readings in training of all row-wires, or of each where the row is an argument.
+    pub(super) fn reading_ranges(&self) -> &[Option<ReadingRange>] {
+        &self.fitted.reading_ranges
+    }
+
+    /// Smallest and largest target in training, likewise.
+    pub(super) fn target_extremes(&self) -> &[Vec<(f64, f64)>] {
+        &self.fitted.target_extremes
+    }
+
+    /// Answer of this program to the readings of a row-wire.
+    ///
+    /// # Errors
+    /// A reading cannot be decoded.
+    pub(super) fn decode(&mut self, row: usize, readings: &[f64]) -> Result<Vec<f64>, BundleError> {
+        let mut answer = vec![0.0; self.fitted.decoder.outputs()];
+        let decoded = self.fitted.decoder.decode_row(row, readings, &mut answer);
+        decoded.map_err(|error| Box::new(RunError::from(error)))?;
+        Ok(answer)
+    }
+
+    /// Number of rows decoded since this was last asked whose equations have no solution, or more than one.
+    pub(super) fn take_open_rows(&mut self) -> usize {
+        let solved = self.fitted.decoder.take_solved_rows();
+        solved.unsolved + solved.undetermined
+    }
+
+    /// Draws readings for the verification: the number of those that are golden vectors, which come first, and all.
+    ///
+    /// # Errors
+    /// The scene could not be drawn, or the range is not known.
+    pub(super) fn draw(&self, portable: &Portable) -> Result<(usize, Drawn), BundleError> {
+        self.file.draw(portable)
+    }
+
+    /// Collects the metadata of a bundle.
+    pub(super) fn metadata(&self, portable: &Portable, precision: BundlePrecision) -> Metadata {
+        let common = json!({
+            "program": crate::export::document::PROGRAM,
+            "decoder": self.fitted.kind.to_string(),
+            "takes_row": portable.takes_row(),
+            "quantity": portable.quantity,
+            "layers": layers(portable),
+            "precision": precision.to_string(),
+        });
+        let network = self
+            .fitted
+            .kind
+            .is_network()
+            .then(|| json!({ "hidden_nodes": portable.widest() }));
+        let errors = self.fitted.errors.as_ref();
+        let own = match self.file {
+            ExportedNetwork::Simulated(file) => of_array(file, portable, errors),
+            ExportedNetwork::Measured(file) => of_own_data(file, portable, errors),
+        };
+        let mut fields = Metadata::new();
+        for part in [Some(common), network, Some(own)] {
+            if let Some(Value::Object(part)) = part {
+                fields.extend(part);
+            }
+        }
+        fields
+    }
+}
+
 impl ExportedNetwork<'_> {
     /// One for all row-wires, or one for each.
-    pub(super) fn networks(&self) -> &Networks {
+    pub fn networks(&self) -> &Networks {
         match self {
             Self::Simulated(file) => &file.network,
             Self::Measured(file) => &file.network,
         }
     }
 
-    pub(super) fn meaning(&self) -> Meaning {
+    /// Meaning of the readings and targets of a decoder that tells so many row-wires apart.
+    fn meaning(&self, rows: usize) -> Meaning {
         match self {
             Self::Simulated(file) => Meaning::Array(file.settings.source.sensor.scale),
             Self::Measured(file) => Meaning::Own {
                 inputs: file.inputs.clone(),
                 targets: file.targets.clone(),
-                row_wires: match (&file.row_wires, file.network.values().len()) {
+                row_wires: match (&file.row_wires, rows) {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
                 },
@@ -91,13 +212,13 @@ impl ExportedNetwork<'_> {
                 let mut rng = Seed::default().rng(Stream::Test);
                 let mut drawn = Drawn::new();
                 for _ in 0..EVEN[0] {
-                    for (index, network) in portable.networks.iter().enumerate() {
-                        let range = network.range.as_ref().ok_or(BundleError::NoRange)?;
+                    for (index, range) in portable.ranges.iter().enumerate() {
+                        let range = range.as_ref().ok_or(BundleError::NoRange)?;
                         let mut between = |&(low, high): &(f64, f64)| low + rng.random::<f64>() * (high - low);
                         drawn.push((index, range.extremes.iter().map(&mut between).collect()));
                     }
                 }
-                Ok((EVEN[1] * portable.networks.len(), drawn))
+                Ok((EVEN[1] * portable.rows(), drawn))
             }
         }
     }
@@ -129,31 +250,32 @@ impl ExportedNetwork<'_> {
             }
         })
     }
-
-    /// Collects the metadata of a bundle.
-    pub(super) fn metadata(&self, portable: &Portable, precision: BundlePrecision) -> Metadata {
-        let common = json!({
-            "program": crate::export::document::PROGRAM,
-            "takes_row": portable.takes_row(),
-            "quantity": portable.quantity,
-            "hidden_nodes": portable.hidden,
-            "precision": precision.to_string(),
-        });
-        let own = match self {
-            Self::Simulated(file) => of_array(file, portable),
-            Self::Measured(file) => of_own_data(file, portable),
-        };
-        let mut fields = Metadata::new();
-        for part in [common, own] {
-            if let Value::Object(part) = part {
-                fields.extend(part);
-            }
-        }
-        fields
-    }
 }
 
-fn of_array(file: &NetworkFile, portable: &Portable) -> Value {
+/// The steps of the decoder with their sizes, in words.
+fn layers(portable: &Portable) -> Vec<String> {
+    let mut inputs = portable.channels;
+    let layers = portable.layers().iter().map(|layer| {
+        let outputs = layer.outputs(inputs);
+        let text = match layer {
+            Layer::Affine(_) => format!("affine, {inputs} to {outputs}"),
+            Layer::Tanh => "hyperbolic tangent".to_owned(),
+            Layer::Gaussians { .. } => format!("{outputs} Gaussians of {inputs} values"),
+            Layer::Rules { memberships, .. } => {
+                format!("{} fuzzy rules, {inputs} to {outputs}", memberships.outputs())
+            }
+        };
+        inputs = outputs;
+        text
+    });
+    let iteration = portable
+        .equations
+        .as_ref()
+        .map(|equations| format!("at most {} Gauss-Newton steps", equations.steps));
+    layers.collect::<Vec<_>>().into_iter().chain(iteration).collect()
+}
+
+fn of_array(file: &NetworkFile, portable: &Portable, errors: Option<&FittedErrors>) -> Value {
     let settings = &file.settings;
     let sensor = &settings.source.sensor;
     let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
@@ -163,18 +285,21 @@ fn of_array(file: &NetworkFile, portable: &Portable) -> Value {
         "geometry": sensor.geometry,
         "scene": settings.source.scene,
         "rows": settings.source.scene.rows.to_string(),
-        "row_numbers": portable.takes_row().then_some([1, portable.networks.len()]),
+        "row_numbers": portable.takes_row().then_some([1, portable.rows()]),
         "inputs": { "names": names(portable.meaning.inputs()), "unit": "ohm" },
         "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
         "training_samples": settings.source.samples,
         "seed": settings.seed,
-        "errors": file.errors,
+        "errors": match errors {
+            Some(FittedErrors::Nodes(errors)) => errors,
+            _ => &file.errors,
+        },
         "readings_in_training_ohm": ranges(portable),
         "output_range_mm": portable.output_range_mm(),
     })
 }
 
-fn of_own_data(file: &MeasuredNetworkFile, portable: &Portable) -> Value {
+fn of_own_data(file: &MeasuredNetworkFile, portable: &Portable, of_decoder: Option<&FittedErrors>) -> Value {
     let columns = |channels: &[Channel]| {
         let (names, units): (Vec<_>, Vec<_>) = channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
         json!({ "names": names, "units": units })
@@ -201,19 +326,25 @@ fn of_own_data(file: &MeasuredNetworkFile, portable: &Portable) -> Value {
         "outputs": columns(&file.targets),
         "method": file.settings.training.method.short_name(),
         "seed": file.settings.seed,
-        "errors": errors(&file.errors),
+        "errors": errors(match of_decoder {
+            Some(FittedErrors::Targets(errors)) => errors,
+            _ => &file.errors,
+        }),
         "errors_of_ridge": errors(&file.ridge),
         "readings_in_training": ranges(portable),
         "output_ranges": portable.scales,
     })
 }
 
-/// Smallest and largest readings in training, network by network.
+/// Smallest and largest readings in training, row by row.
 fn ranges(portable: &Portable) -> Vec<Option<Value>> {
     let range = |range: &ChannelRanges| {
         let (minimum, maximum): (Vec<f64>, Vec<f64>) = range.extremes.iter().copied().unzip();
         json!({ "minimum": minimum, "maximum": maximum })
     };
-    let networks = portable.networks.iter();
-    networks.map(|network| network.range.as_ref().map(range)).collect()
+    portable
+        .ranges
+        .iter()
+        .map(|of_row| of_row.as_ref().map(range))
+        .collect()
 }
