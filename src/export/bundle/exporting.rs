@@ -1,5 +1,7 @@
 use std::{fs, path::Path};
 
+use crate::export::{AtomicFile, WriteError};
+
 use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
@@ -9,13 +11,14 @@ use super::{
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
-    matlab, numpy, onnx,
+    iteration::Iteration,
+    json, matlab, numpy, onnx,
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
     taking::{ReadingRounding, Taking},
     tolerance::Tolerance,
-    vectors::{Deviation, Vectors},
+    vectors::{Deviation, Vector, Vectors},
     weights::{Arithmetic, Weights},
 };
 
@@ -33,8 +36,11 @@ pub fn export_bundle<'a>(
 ) -> Result<BundleReport, BundleError> {
     let exported = decoder.into();
     format.check_for(exported.kind(), precision)?;
-    if format == BundleFormat::Json {
+    if format == BundleFormat::Json && exported.kind().is_network() {
         return export_network_file(&exported, path);
+    }
+    if format == BundleFormat::Json {
+        return export_numbers(exported, path);
     }
     let folder = AtomicFolder::create(path)?;
     let portable = Portable::of(&exported)?;
@@ -68,7 +74,7 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
-    let trial = tempfile::tempdir().map_err(|error| crate::export::WriteError::io(path, error))?;
+    let trial = tempfile::tempdir().map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
     let file: ExportedNetwork<'_> = exported.file();
     file.save(&copy)?;
@@ -80,25 +86,63 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     }
     file.save(path)?;
     let portable = Portable::of(exported)?;
-    let size = fs::metadata(path).map_or(0, |found| found.len());
+    let check = BundleCheck {
+        evaluator: "network file, read back",
+        deviation: 0.0,
+        of_arithmetic: 0.0,
+    };
+    Ok(of_file(path, &portable, check))
+}
+
+/// Writes the numbers of a decoder as one file.
+fn export_numbers(mut exported: ExportedDecoder<'_>, path: &Path) -> Result<BundleReport, BundleError> {
+    if fs::symlink_metadata(path).is_ok() {
+        return Err(BundleError::Exists(path.to_owned()));
+    }
+    let portable = Portable::of(&exported)?;
+    let metadata = exported.metadata(&portable, BundlePrecision::Double);
+    let vectors = Vectors::of(&mut exported, &portable, Taking::Double)?;
+    let weights = Weights::of(&portable, Arithmetic::DOUBLE);
+    let text = json::write(&portable, &weights, &metadata, vectors.golden());
+    let file = path.display().to_string();
+    let read = json::read_weights(&text, &portable).map_err(|reason| read_back(&file, reason))?;
+    let deviation = vectors.deviation(|vector| read.decode(vector.row, &vector.taken));
+    let tolerance = Tolerance::of(&portable, Arithmetic::DOUBLE, &vectors.growth, deviation.of_arithmetic);
+    let check = BundleCheck::of("JSON numbers, read back and evaluated", deviation);
+    check.admit(Deviation {
+        total: tolerance.limit,
+        of_arithmetic: tolerance.limit,
+    })?;
+    let mut written = AtomicFile::create(path)?;
+    let refused = |source| WriteError::io(path, source);
+    std::io::Write::write_all(&mut written, text.as_bytes()).map_err(refused)?;
+    written.commit()?;
     Ok(BundleReport {
+        vectors: vectors.counts(),
+        limit: tolerance.limit,
+        program_deviation: vectors.program_deviation,
+        remarks: tolerance.remarks(Arithmetic::DOUBLE, &portable),
+        ..of_file(path, &portable, check)
+    })
+}
+
+/// The report on a single file in double precision.
+fn of_file(path: &Path, portable: &Portable, check: BundleCheck) -> BundleReport {
+    let size = fs::metadata(path).map_or(0, |found| found.len());
+    BundleReport {
         format: BundleFormat::Json,
         precision: BundlePrecision::Double,
         path: path.to_owned(),
         files: vec![(path.display().to_string(), size)],
         vectors: VectorCounts { verified: 0, golden: 0 },
-        checks: vec![BundleCheck {
-            evaluator: "network file, read back",
-            deviation: 0.0,
-            of_arithmetic: 0.0,
-        }],
+        checks: vec![check],
         limit: 0.0,
         rounding: None,
         output_range_mm: portable.output_range_mm(),
         program_deviation: 0.0,
         bounds: Vec::new(),
         remarks: Vec::new(),
-    })
+    }
 }
 
 /// Single precision throughout where that is enough, and otherwise as many first layers in double as it takes.
@@ -169,8 +213,11 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.row, &vector.taken));
-        let tolerance = Tolerance::of(portable, arithmetic, &vectors.growth, model(&weights).of_arithmetic);
+        let model = |weights: &Weights| vectors.deviation(|vector| answer(portable, weights, vector));
+        let tolerance = match portable.equations {
+            Some(_) => Tolerance::of_equations(),
+            None => Tolerance::of(portable, arithmetic, &vectors.growth, model(&weights).of_arithmetic),
+        };
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
         let limits = Deviation {
             total: tolerance.limit + vectors.rounding.worst(),
@@ -282,18 +329,7 @@ impl Bundle<'_> {
         fixed: Option<&FixedNetworks>,
     ) -> Result<BundleReport, BundleError> {
         for check in &checks {
-            for (deviation, limit) in [
-                (check.of_arithmetic, limits.of_arithmetic),
-                (check.deviation, limits.total),
-            ] {
-                if deviation.is_nan() || deviation > limit {
-                    return Err(BundleError::Deviation {
-                        evaluator: check.evaluator.to_owned(),
-                        deviation,
-                        limit,
-                    });
-                }
-            }
+            check.admit(limits)?;
         }
         let portable = &self.portable;
         let mut report = BundleReport {
@@ -301,10 +337,7 @@ impl Bundle<'_> {
             precision: self.precision,
             path: path.to_owned(),
             files: Vec::new(),
-            vectors: VectorCounts {
-                verified: vectors.all().len(),
-                golden: vectors.golden().len(),
-            },
+            vectors: vectors.counts(),
             checks,
             limit: limits.total,
             rounding: (self.precision == BundlePrecision::Single).then_some(vectors.rounding),
@@ -328,6 +361,17 @@ impl Bundle<'_> {
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)
+    }
+}
+
+/// Answer of a bundle with these numbers.
+fn answer(portable: &Portable, weights: &Weights, vector: &Vector) -> Vec<f64> {
+    match &portable.equations {
+        None => weights.decode(vector.row, &vector.taken),
+        Some(equations) => {
+            let first = |map: usize| weights.decode(map, &vector.taken);
+            Iteration::new(equations).decode(vector.row, &vector.taken, first)
+        }
     }
 }
 

@@ -19,6 +19,8 @@ mod folder;
 mod folding;
 mod golden;
 mod identifier;
+mod iteration;
+mod json;
 mod matlab;
 mod meaning;
 mod numpy;

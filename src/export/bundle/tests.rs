@@ -155,7 +155,11 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
         for arithmetic in [Arithmetic::DOUBLE, Arithmetic::single(1), Arithmetic::single(0)] {
             let weights = Weights::of(&portable, arithmetic);
             let bytes = numpy::write_weights(&portable, &weights);
-            assert_eq!(numpy::read_weights(&bytes, &portable, arithmetic).unwrap(), weights, "{name}");
+            assert_eq!(
+                numpy::read_weights(&bytes, &portable, arithmetic).unwrap(),
+                weights,
+                "{name}"
+            );
         }
         let weights = Weights::of(&portable, Arithmetic::DOUBLE);
         let text = matlab::write("decode", &portable, &weights);

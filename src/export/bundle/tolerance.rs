@@ -1,3 +1,5 @@
+use crate::decoupling::LARGEST_ERROR;
+
 use super::{
     exact::Growth,
     portable::Portable,
@@ -44,6 +46,15 @@ impl Tolerance {
             },
             usual,
             amplification: growth.most(),
+        }
+    }
+
+    /// The limit of an iteration on the equations of the sensor: the error within which an answer counts as their solution.
+    pub(super) fn of_equations() -> Self {
+        Self {
+            limit: LARGEST_ERROR,
+            usual: LARGEST_ERROR,
+            amplification: 0.0,
         }
     }
 

@@ -1,9 +1,12 @@
+use crate::{decoupling::RowProblemDescription, evaluation::RunError};
+
 use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
-    exported_decoder::ExportedDecoder,
+    exported_decoder::{Drawn, ExportedDecoder},
     meaning::Meaning,
     portable::Portable,
+    report::VectorCounts,
     taking::{ReadingRounding, Taking},
 };
 
@@ -61,7 +64,12 @@ impl Vectors {
         taking: Taking<'_>,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
-        for (index, range) in portable.ranges.iter().enumerate() {
+        let ranges = portable
+            .ranges
+            .iter()
+            .enumerate()
+            .filter(|_| portable.equations.is_none());
+        for (index, range) in ranges {
             let Some(range) = range else { continue };
             for place in [0.0, 0.5, 1.0] {
                 let between = |&(low, high): &(f64, f64)| if place == 1.0 { high } else { low + place * (high - low) };
@@ -69,6 +77,9 @@ impl Vectors {
             }
         }
         let (golden, drawn) = exported.draw(portable)?;
+        if let Some(equations) = &portable.equations {
+            readings.extend(of_extremes(equations, portable.takes_row())?);
+        }
         let mut vectors = Self {
             all: Vec::new(),
             golden: readings.len() + golden,
@@ -92,6 +103,18 @@ impl Vectors {
             let errors: Vec<f64> = channels
                 .map(|(channel, &reading)| taking.error(channel, reading))
                 .collect();
+            let of_program = exported.decode(index, &readings)?;
+            if portable.equations.is_some() {
+                // Equations are their own exact answer, to within what counts as their solution.
+                vectors.all.push(Vector {
+                    row: index,
+                    taken,
+                    answers_to_taken: of_program.clone(),
+                    answers: of_program,
+                    readings,
+                });
+                continue;
+            }
             let map = &portable.maps[index];
             let exact = decode_exactly(portable, map, &readings);
             let of_taken = if taken == readings {
@@ -110,7 +133,6 @@ impl Vectors {
             } else {
                 vectors.centred_bound = f64::INFINITY;
             }
-            let of_program = exported.decode(index, &readings)?;
             vectors.rounding = ReadingRounding {
                 largest: larger(
                     vectors.rounding.largest,
@@ -129,6 +151,16 @@ impl Vectors {
                 answers: exact.answers,
                 answers_to_taken: of_taken.answers,
             });
+        }
+        if portable
+            .equations
+            .as_ref()
+            .is_some_and(|equations| equations.seeks_solution)
+        {
+            let (decoder, open, rows) = (exported.kind(), exported.take_open_rows(), vectors.all.len());
+            if open > 0 {
+                return Err(BundleError::OpenRows { decoder, open, rows });
+            }
         }
         Ok(vectors)
     }
@@ -169,6 +201,14 @@ impl Vectors {
         }
     }
 
+    /// Numbers of vectors.
+    pub(super) fn counts(&self) -> VectorCounts {
+        VectorCounts {
+            verified: self.all.len(),
+            golden: self.golden,
+        }
+    }
+
     pub(super) fn all(&self) -> &[Vector] {
         &self.all
     }
@@ -191,6 +231,22 @@ impl Vectors {
             }
         })
     }
+}
+
+/// Readings of every row-wire at rest and fully pressed.
+fn of_extremes(equations: &RowProblemDescription, takes_row: bool) -> Result<Drawn, BundleError> {
+    let model = &equations.model;
+    let mut readings = Drawn::new();
+    for (index, &row) in equations.rows.iter().enumerate() {
+        // The unknowns end with z, the stroke of which is that of all nodes.
+        for pressed_mm in equations.ranges.last().map_or([0.0, 0.0], |&(low, high)| [low, high]) {
+            let displacements = vec![glam::DVec3::Z * pressed_mm; model.scale.nodes_per_row()];
+            let of_row = model.row_resistances(row, &displacements);
+            let of_row = of_row.map_err(|error| Box::new(RunError::from(error)))?;
+            readings.push((if takes_row { index } else { 0 }, of_row));
+        }
+    }
+    Ok(readings)
 }
 
 /// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is NaN.

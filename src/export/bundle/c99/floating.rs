@@ -1,5 +1,6 @@
 use super::{
     header::{Header, push_out_of_range},
+    iteration,
     literal::{number, push_array, type_name},
 };
 use crate::{
@@ -55,7 +56,10 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
         push_array(&mut text, &declaration, &shape, values);
     }
     text += &layers(header, arithmetic);
-    push_decode(&mut text, header, arithmetic.rest);
+    match &portable.equations {
+        Some(equations) => text += &iteration::source(header, equations),
+        None => push_decode(&mut text, header, arithmetic.rest),
+    }
     if let Some(ranges) = portable.known_ranges() {
         let rest = arithmetic.rest;
         let limits = ranges.iter().flat_map(|range| range.limits.iter().copied());

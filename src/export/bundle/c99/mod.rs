@@ -4,6 +4,7 @@ mod compiler;
 mod fixed;
 mod floating;
 mod header;
+mod iteration;
 mod literal;
 mod selftest;
 

@@ -1,5 +1,6 @@
 //! Bundles for NumPy: weights as `network.npz` (of other decoders `decoder.npz`), and a `decode.py` that uses them.
 
+mod iteration;
 mod npz;
 
 use self::npz::NamedArray;
@@ -102,11 +103,23 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
             format!("the targets (samples x {outputs})"),
         ),
     };
+    let answer = match &portable.equations {
+        None => format!("        {output}[mine] = decode_by(index, r[mine])\n"),
+        Some(equations) => {
+            let judged = "            if misfit > EXPLAINED:\n                \
+                 warnings.warn(f\"sample {sample}: the readings have noise or come from another sensor\")\n";
+            format!(
+                "        for sample in np.flatnonzero(mine):\n            \
+                 misfit, {output}[sample] = solve(index, r[sample])\n{}",
+                if equations.seeks_solution { judged } else { "" }
+            )
+        }
+    };
     let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
     format!(
         r#""""{purpose}; see README.txt."""
 {legend}import pathlib
-
+{warnings}
 import numpy as np
 
 MAPS = dict(np.load(pathlib.Path(__file__).with_name("{noun}.npz")))
@@ -118,8 +131,7 @@ def decode_by(index, r):
     x = r.astype(w["{centre}"].dtype)
 {steps}    return v.astype(r.dtype)
 
-{solver}
-def decode({input}{argument}):
+{solver}def decode({input}{argument}):
     """Returns {answers}, and
     {counted}.
 
@@ -138,8 +150,15 @@ def decode({input}{argument}):
         centre = meaning.centre(),
         not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
         steps = steps(portable, arithmetic),
-        solver = "",
-        answer = format_args!("        {output}[mine] = decode_by(index, r[mine])\n"),
+        warnings = if portable.equations.is_some() {
+            "import warnings\n"
+        } else {
+            ""
+        },
+        solver = portable.equations.as_ref().map_or_else(
+            || "\n".to_owned(),
+            |equations| format!("\n{}", iteration::source(equations))
+        ),
         above = if portable.quantity == Quantity::Raw {
             ""
         } else {
