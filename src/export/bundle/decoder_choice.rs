@@ -36,7 +36,7 @@ impl BundleDecoder {
         }
     }
 
-    /// Word for it in sentences, and the name of its file of weights.
+    /// Word for it in sentences, and the name of its file of weights: network or decoder.
     pub(super) fn noun(self) -> &'static str {
         if self.is_network() { "network" } else { "decoder" }
     }

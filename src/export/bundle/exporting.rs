@@ -219,6 +219,11 @@ impl Bundle<'_> {
             None => Tolerance::of(portable, arithmetic, &vectors.growth, model(&weights).of_arithmetic),
         };
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
+        if portable.equations.is_some() {
+            let exact = "it takes the readings to be exact and magnifies noise in them many times; for readings with noise, \
+                         take a decoder fitted to noisy samples";
+            self.remarks.push(exact.to_owned());
+        }
         let limits = Deviation {
             total: tolerance.limit + vectors.rounding.worst(),
             of_arithmetic: tolerance.limit,

@@ -20,7 +20,9 @@ use crate::{
 /// | logarithm | ln(1 + (r − R₀)/R₀) |
 #[derive(Clone, Debug)]
 pub(super) struct Portable {
-    /// Name of the decoder in sentences.
+    /// Name of the decoder.
+    pub(super) name: &'static str,
+    /// Word for it in sentences, and the name of its file of weights: network or decoder.
     pub(super) decoder: &'static str,
     pub(super) quantity: Quantity,
     /// Meaning of readings and outputs.
@@ -102,6 +104,7 @@ impl Portable {
             })
         });
         Ok(Self {
+            name: exported.kind().name(),
             decoder: exported.kind().noun(),
             ranges: ranges.collect(),
             equations: description.equations.clone(),

@@ -18,7 +18,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         Meaning::Own { .. } => "own data".to_owned(),
     };
     let mut text = format!(
-        "Network of {subject}, exported by {program} as {format}, {precision}.\n\n",
+        "{decoder} of {subject}, exported by {program} as {format}, {precision}.\n\n",
+        decoder = portable.name,
         program = crate::export::document::PROGRAM,
         format = report.format,
         precision = report.precision,
@@ -41,7 +42,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
     if portable.takes_row() {
         let _ = write!(
             text,
-            " There is one network for each row, from 1 to {}.",
+            " There is one {} for each row, from 1 to {}.",
+            portable.decoder,
             portable.rows()
         );
     }
@@ -74,11 +76,12 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         Meaning::Own { .. } => "names and units",
     };
     text + &format!(
-        "\ngolden.csv has readings in double precision with the {output}s that the network gives to them, for a test of your\n\
+        "\ngolden.csv has readings in double precision with the {output}s that the {decoder} gives to them, for a test of your\n\
          own: convert the readings as you would your own.\n\
-         metadata.json has {subject}, the errors of the network, the range of the readings in training,\n\
+         metadata.json has {subject}, the errors of the {decoder}, the range of the readings in training,\n\
          the seed and the version of the program.\n",
-        output = meaning.output()
+        output = meaning.output(),
+        decoder = portable.decoder,
     )
 }
 
@@ -101,7 +104,7 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
             };
             format!(
                 "    import numpy as np\n    import onnxruntime\n    \
-                 session = onnxruntime.InferenceSession(\"network.onnx\")\n    \
+                 session = onnxruntime.InferenceSession(\"{noun}.onnx\")\n    \
                  readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{end}]\n    \
                  inputs = {{\"{input}\": readings.astype(np.{kind}){row}}}\n    \
                  {output} = session.run([\"{output}\"], inputs)[0]\n\n\
@@ -114,6 +117,7 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                     " above 0"
                 },
                 one = meaning.output(),
+                noun = portable.decoder,
                 first = usize::from(takes_row),
                 end = channels + usize::from(takes_row),
                 row_text = if takes_row { ", or the row does not exist" } else { "" },
@@ -139,6 +143,13 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
             } else {
                 String::new()
             };
+            let explained = match &portable.equations {
+                Some(equations) if equations.seeks_solution => format!(
+                    "\nWhere no deformation explains the readings to 1e-10, as with noise, it is {upper}_NOT_EXPLAINED and the\n\
+                     coordinates are the best found."
+                ),
+                _ => String::new(),
+            };
             let library = if fixed.is_some() { "" } else { " -lm" };
             let units = match (fixed, meaning) {
                 (Some(_), Meaning::Own { .. }) => format!(
@@ -154,7 +165,7 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
                  int status = {name}_decode({row}{readings}, {coordinates});\n\n\
                  The status is {upper}_OK, or tells what is wrong. Compile {name}_decode.c with your program{libm}. The\n\
                  self-test compares the golden vectors:\n\n    \
-                 cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}",
+                 cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}{explained}",
                 libm = if library.is_empty() { "" } else { ", and link with -lm" },
             )
         }
@@ -176,11 +187,17 @@ fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: 
             format!(
                 "    from decode import decode\n    \
                  {output}, readings_outside = decode({input}{row})\n\n\
-                 {input} is samples x {channels}, {output} samples x {outputs}{row_text}.",
+                 {input} is samples x {channels}, {output} samples x {outputs}{row_text}.{explained}",
                 row_text = if takes_row {
                     ";\nrow has the row of each sample, from 1"
                 } else {
                     ""
+                },
+                explained = match &portable.equations {
+                    Some(equations) if equations.seeks_solution => {
+                        "\nIt warns of samples that no deformation explains to 1e-10, as with noise."
+                    }
+                    _ => "",
                 },
             )
         }

@@ -1,5 +1,7 @@
 //! Bundles of small networks of every kind against the networks themselves.
 
+mod decoders;
+
 use std::fs;
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};

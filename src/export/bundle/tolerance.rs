@@ -20,6 +20,8 @@ pub(super) struct Tolerance {
 impl Tolerance {
     /// Usual limit of double precision.
     pub(super) const DOUBLE: f64 = 1e-12;
+    /// Largest limit, whatever the decoder.
+    pub(super) const LARGEST: f64 = 0.01;
     /// Usual limit of single precision.
     pub(super) const SINGLE: f64 = 1e-5;
 
@@ -42,7 +44,7 @@ impl Tolerance {
             limit: if deviation <= NEAR * usual {
                 usual
             } else {
-                usual.max(bound)
+                usual.max(bound.min(Self::LARGEST))
             },
             usual,
             amplification: growth.most(),

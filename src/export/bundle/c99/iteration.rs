@@ -112,23 +112,23 @@ fn decode(header: &Header<'_>, equations: &RowProblemDescription) -> String {
     let (readings, coordinates) = (header.readings, header.coordinates);
     let search = match &equations.row_choice {
         RowChoice::Given => format!(
-            "    const int row = network;\n    \
+            "    const int wire = network;\n    \
              decode_by(network, {readings}, outputs);\n    \
-             misfit = attempt(row, {readings}, outputs, STARTS, u);\n"
+             misfit = attempt(wire, {readings}, outputs, STARTS, u);\n"
         ),
         RowChoice::Nearest => format!(
-            "    int row = 0;\n    \
+            "    int wire = 0;\n    \
              double x = 0;\n    \
              decode_by(network, {readings}, outputs);\n    \
              for (int n = 0; n < NODES; ++n) {{\n        \
              x += outputs[3 * n] / NODES;\n    \
              }}\n    \
              for (int other = 1; other < READ_ROWS; ++other) {{\n        \
-             if (fabs(row_x[other] - x) < fabs(row_x[row] - x)) {{\n            \
-             row = other;\n        \
+             if (fabs(row_x[other] - x) < fabs(row_x[wire] - x)) {{\n            \
+             wire = other;\n        \
              }}\n    \
              }}\n    \
-             misfit = attempt(row, {readings}, outputs, STARTS, u);\n"
+             misfit = attempt(wire, {readings}, outputs, STARTS, u);\n"
         ),
         RowChoice::Tried { .. } => TRIED
             .replace("READINGS", readings)
@@ -157,7 +157,7 @@ fn decode(header: &Header<'_>, equations: &RowProblemDescription) -> String {
          if (!(misfit <= DBL_MAX)) {{\n        \
          return {upper}_BAD_READING;\n    \
          }}\n    \
-         write_coordinates(row, u, {coordinates});\n    \
+         write_coordinates(wire, u, {coordinates});\n    \
          return {judged};\n\
          }}\n\n",
         signature = header.decode_signature(),
@@ -165,7 +165,7 @@ fn decode(header: &Header<'_>, equations: &RowProblemDescription) -> String {
 }
 
 /// Finds the row-wire by trial.
-const TRIED: &str = "    int row = 0;
+const TRIED: &str = "    int wire = 0;
     misfit = DBL_MAX;
     for (int starts = 1; misfit > EXPLAINED; starts = STARTS) {
         int is_tried[READ_ROWS] = {0};
@@ -188,7 +188,7 @@ const TRIED: &str = "    int row = 0;
             of_next = attempt(next, READINGS, outputs, starts, tried);
             if (of_next < misfit) {
                 misfit = of_next;
-                row = next;
+                wire = next;
                 for (int i = 0; i < UNKNOWNS; ++i) {
                     u[i] = tried[i];
                 }
