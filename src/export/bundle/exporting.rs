@@ -149,14 +149,20 @@ fn of_file(path: &Path, portable: &Portable, check: BundleCheck) -> BundleReport
 fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     /// Part of the limit that single precision may use in this evaluation: others add up in another order.
     const PART: f64 = 0.2;
-    let is_enough = |arithmetic: &Arithmetic| {
-        let single = Weights::of(portable, *arithmetic);
+    /// The part where the large products that nearly cancel are in double.
+    const PART_BEHIND_WIDE_LAYERS: f64 = 0.5;
+    let is_enough = |wide_layers: &usize| {
+        let single = Weights::of(portable, Arithmetic::single(*wide_layers));
         let deviation = vectors.deviation(|vector| single.decode(vector.row, &vector.taken));
-        deviation.of_arithmetic <= PART * Tolerance::SINGLE
+        let part = if *wide_layers == 0 {
+            PART
+        } else {
+            PART_BEHIND_WIDE_LAYERS
+        };
+        deviation.of_arithmetic <= part * Tolerance::SINGLE
     };
     let layers = portable.layers().len();
-    let mut all = (0..layers).map(Arithmetic::single);
-    all.find(is_enough).unwrap_or(Arithmetic::single(layers))
+    Arithmetic::single((0..layers).find(is_enough).unwrap_or(layers))
 }
 
 /// A bundle in the making.

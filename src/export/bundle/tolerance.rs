@@ -72,7 +72,7 @@ impl Tolerance {
             remarks.push(format!(
                 "the {} are computed in double precision, because their large products nearly cancel; the rest is in single \
                  precision",
-                wide.join(", ")
+                wide.join(" and ")
             ));
         }
         if self.limit > self.usual {

@@ -146,7 +146,7 @@ fn decode(header: &Header<'_>, equations: &RowProblemDescription) -> String {
     format!(
         "{signature}\n\
          {{\n    \
-         double outputs[{upper}_OUTPUTS], u[UNKNOWNS], misfit;\n\
+         double outputs[{upper}_OUTPUTS], u[UNKNOWNS] = {{0}}, misfit;\n\
          {network}    \
          for (int k = 0; k < {upper}_CHANNELS; ++k) {{\n        \
          if (!({readings}[k] > 0 && {readings}[k] <= DBL_MAX)) {{\n            \
