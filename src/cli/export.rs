@@ -46,19 +46,9 @@ pub(super) struct Export {
     /// Network saved by train --out or by the window
     #[arg(long, value_name = "FILE")]
     network: PathBuf,
-    /// network: the network of the file; ridge, linear, rbf (radial basis), fuzzy (rules) and mean: fitted to the training
-    /// samples; newton and polish (network, then Newton): an iteration on the equations of the sensor, for scenes without
-    /// noise (c99, numpy)
-    #[arg(
-        long,
-        value_name = "network|ridge|linear|rbf|fuzzy|mean|newton|polish",
-        default_value_t
-    )]
+    #[arg(long, value_name = "DECODER", default_value_t, help = BundleDecoder::help())]
     decoder: BundleDecoder,
-    /// onnx: a graph (opset 13) for ONNX runtimes; c99: one header and one source in C; matlab: one function file for
-    /// MATLAB and GNU Octave; numpy: weights (.npz) and a decode.py; json: the network file itself, or the numbers of
-    /// another decoder
-    #[arg(long, value_name = "onnx|c99|matlab|numpy|json")]
+    #[arg(long, value_name = "FORMAT", help = BundleFormat::help())]
     format: BundleFormat,
     /// Numbers in which it decodes. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: whole numbers
     /// with 16-bit weights (networks, c99), which reads whole numbers of nano-, micro- or milliohm and gives nanometres

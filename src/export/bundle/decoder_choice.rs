@@ -18,6 +18,19 @@ impl BundleDecoder {
         DecoderKind::ALL.into_iter().map(Self::Kind).chain([Self::Linear])
     }
 
+    /// Says what each decoder is, for the help of a command.
+    pub fn help() -> String {
+        let line = |decoder: Self| {
+            let meaning = match decoder {
+                Self::Kind(kind) => kind.meaning(),
+                Self::Linear => "The linear map of the error table",
+            };
+            format!("{decoder}: {meaning}")
+        };
+        let lines: Vec<String> = Self::all().map(line).collect();
+        format!("Decoder to export. {}", lines.join("; "))
+    }
+
     /// Returns `true` for the trained network.
     pub fn is_network(self) -> bool {
         self == Self::Kind(DecoderKind::Network)

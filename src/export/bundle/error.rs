@@ -111,3 +111,13 @@ pub enum BundleError {
         limit: f64,
     },
 }
+
+impl BundleError {
+    /// The error for a file of a bundle that could not be read back.
+    pub(super) fn read_back(file: &str, reason: String) -> Self {
+        Self::ReadBack {
+            file: file.to_owned(),
+            reason,
+        }
+    }
+}

@@ -1,24 +1,24 @@
 use std::{fs, path::Path};
 
-use crate::export::{AtomicFile, WriteError};
+use crate::export::WriteError;
 
 use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
+    draft::{Draft, deviation},
     error::BundleError,
     exported_decoder::{ExportedDecoder, ExportedNetwork, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
-    iteration::Iteration,
-    json, matlab, numpy, onnx,
+    json,
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
     taking::{ReadingRounding, Taking},
     tolerance::Tolerance,
-    vectors::{Deviation, Vector, Vectors},
+    vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };
 
@@ -39,8 +39,8 @@ pub fn export_bundle<'a>(
     if format == BundleFormat::Json && exported.kind().is_network() {
         return export_network_file(&exported, path);
     }
-    if format == BundleFormat::Json {
-        return export_numbers(exported, path);
+    if format == BundleFormat::Json && fs::symlink_metadata(path).is_ok() {
+        return Err(BundleError::Exists(path.to_owned()));
     }
     let folder = AtomicFolder::create(path)?;
     let portable = Portable::of(&exported)?;
@@ -91,43 +91,11 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
         deviation: 0.0,
         of_arithmetic: 0.0,
     };
-    Ok(of_file(path, &portable, check))
-}
-
-/// Writes the numbers of a decoder as one file.
-fn export_numbers(mut exported: ExportedDecoder<'_>, path: &Path) -> Result<BundleReport, BundleError> {
-    if fs::symlink_metadata(path).is_ok() {
-        return Err(BundleError::Exists(path.to_owned()));
-    }
-    let portable = Portable::of(&exported)?;
-    let metadata = exported.metadata(&portable, BundlePrecision::Double);
-    let vectors = Vectors::of(&mut exported, &portable, Taking::Double)?;
-    let weights = Weights::of(&portable, Arithmetic::DOUBLE);
-    let text = json::write(&portable, &weights, &metadata, vectors.golden());
-    let file = path.display().to_string();
-    let read = json::read_weights(&text, &portable).map_err(|reason| read_back(&file, reason))?;
-    let deviation = vectors.deviation(|vector| read.decode(vector.row, &vector.taken));
-    let tolerance = Tolerance::of(&portable, Arithmetic::DOUBLE, &vectors.growth, deviation.of_arithmetic);
-    let check = BundleCheck::of("JSON numbers, read back and evaluated", deviation);
-    check.admit(Deviation {
-        total: tolerance.limit,
-        of_arithmetic: tolerance.limit,
-    })?;
-    let mut written = AtomicFile::create(path)?;
-    let refused = |source| WriteError::io(path, source);
-    std::io::Write::write_all(&mut written, text.as_bytes()).map_err(refused)?;
-    written.commit()?;
-    Ok(BundleReport {
-        vectors: vectors.counts(),
-        limit: tolerance.limit,
-        program_deviation: vectors.program_deviation,
-        remarks: tolerance.remarks(Arithmetic::DOUBLE, &portable),
-        ..of_file(path, &portable, check)
-    })
+    Ok(of_file(path, &portable, vec![check]))
 }
 
 /// The report on a single file in double precision.
-fn of_file(path: &Path, portable: &Portable, check: BundleCheck) -> BundleReport {
+fn of_file(path: &Path, portable: &Portable, checks: Vec<BundleCheck>) -> BundleReport {
     let size = fs::metadata(path).map_or(0, |found| found.len());
     BundleReport {
         format: BundleFormat::Json,
@@ -135,7 +103,7 @@ fn of_file(path: &Path, portable: &Portable, check: BundleCheck) -> BundleReport
         path: path.to_owned(),
         files: vec![(path.display().to_string(), size)],
         vectors: VectorCounts { verified: 0, golden: 0 },
-        checks: vec![check],
+        checks,
         limit: 0.0,
         rounding: None,
         output_range_mm: portable.output_range_mm(),
@@ -153,7 +121,7 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     const PART_BEHIND_WIDE_LAYERS: f64 = 0.5;
     let is_enough = |wide_layers: &usize| {
         let single = Weights::of(portable, Arithmetic::single(*wide_layers));
-        let deviation = vectors.deviation(|vector| single.decode(vector.row, &vector.taken));
+        let deviation = deviation(portable, &single, vectors);
         let part = if *wide_layers == 0 {
             PART
         } else {
@@ -219,10 +187,14 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| vectors.deviation(|vector| answer(portable, weights, vector));
         let tolerance = match portable.equations {
             Some(_) => Tolerance::of_equations(),
-            None => Tolerance::of(portable, arithmetic, &vectors.growth, model(&weights).of_arithmetic),
+            None => Tolerance::of(
+                portable,
+                arithmetic,
+                &vectors.growth,
+                deviation(portable, &weights, vectors).of_arithmetic,
+            ),
         };
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
         if portable.equations.is_some() {
@@ -234,52 +206,17 @@ impl Bundle<'_> {
             total: tolerance.limit + vectors.rounding.worst(),
             of_arithmetic: tolerance.limit,
         };
-        let mut checks = Vec::new();
-        let mut check = |evaluator, deviation| checks.push(BundleCheck::of(evaluator, deviation));
-        match self.format {
-            BundleFormat::Onnx => {
-                let file = format!("{}.onnx", portable.decoder);
-                self.folder
-                    .write(&file, onnx::write(portable, &weights, &self.metadata, &self.remarks))?;
-                let damaged = |reason| read_back(&file, reason);
-                let graph = onnx::OnnxGraph::read(&self.read(&file)?).map_err(damaged)?;
-                let answers = graph.decode(vectors.all()).map_err(damaged)?.answers;
-                if answers.len() != vectors.all().len() {
-                    return Err(read_back(&file, "it has another number of answers".to_owned()));
-                }
-                let mut answers = answers.into_iter();
-                let deviation = vectors.deviation(|_| answers.next().unwrap_or_default());
-                check("ONNX graph, read back and evaluated", deviation);
-            }
-            BundleFormat::NumPy => {
-                let file = format!("{}.npz", portable.decoder);
-                self.folder.write(&file, numpy::write_weights(portable, &weights))?;
-                self.folder
-                    .write("decode.py", numpy::write_program(portable, arithmetic))?;
-                let read = numpy::read_weights(&self.read(&file)?, portable, arithmetic);
-                let read = read.map_err(|reason| read_back(&file, reason))?;
-                check("NumPy weights, read back and evaluated", model(&read));
-            }
-            BundleFormat::Matlab => {
-                let (function, file) = (format!("{}_decode", self.name), format!("{}_decode.m", self.name));
-                self.folder.write(&file, matlab::write(&function, portable, &weights))?;
-                let text = String::from_utf8(self.read(&file)?).map_err(|error| read_back(&file, error.to_string()))?;
-                let read = matlab::read_weights(&text, portable).map_err(|reason| read_back(&file, reason))?;
-                check("MATLAB matrices, read back and evaluated", model(&read));
-            }
-            BundleFormat::C99 | BundleFormat::Json => {
-                let notes = &self.remarks;
-                let files = c99::write_floating(&self.name, portable, &weights, vectors.golden(), limits, notes);
-                for (name, text) in files {
-                    self.folder.write(&name, text)?;
-                }
-                check("model of the C source", model(&weights));
-                match run_self_test(self.folder.path(), &self.name)? {
-                    Compiled::Ran { deviation } => check("C source, compiled and run", deviation),
-                    Compiled::NoCompiler(why) => self.remarks.push(format!("the C source was not compiled: {why}")),
-                }
-            }
-        }
+        let mut draft = Draft {
+            name: &self.name,
+            folder: &self.folder,
+            portable,
+            weights: &weights,
+            vectors,
+            limits,
+            metadata: &self.metadata,
+            remarks: &mut self.remarks,
+        };
+        let checks = (self.format.writer().export)(&mut draft)?;
         self.finish(path, vectors, checks, limits, None)
     }
 
@@ -292,12 +229,12 @@ impl Bundle<'_> {
         for (name, text) in files {
             self.folder.write(&name, text)?;
         }
-        let deviation = vectors.deviation(|vector| {
+        let found = vectors.deviation(|vector| {
             let outputs = fixed.decode(vector.row, &vector.readings);
             // Readings that it cannot take were refused when they were drawn.
             outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
-        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", deviation)];
+        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", found)];
         let mut remarks = Vec::new();
         if fixed.hidden_width == HiddenWidth::TwentyFour {
             let remark = "the hidden weights have 24 bits, because their large products nearly cancel; the rest has 16";
@@ -324,10 +261,6 @@ impl Bundle<'_> {
             of_arithmetic: limit,
         };
         self.finish(path, &vectors, checks, limits, Some(&fixed))
-    }
-
-    fn read(&self, name: &str) -> Result<Vec<u8>, BundleError> {
-        fs::read(self.folder.path().join(name)).map_err(|error| read_back(name, error.to_string()))
     }
 
     /// Checks the deviations, adds the files that every bundle has, and puts the folder in its place.
@@ -357,6 +290,13 @@ impl Bundle<'_> {
             bounds: fixed.map_or_else(Vec::new, |fixed| portable.meaning.named(&fixed.bounds)),
             remarks: self.remarks,
         };
+        if self.format == BundleFormat::Json {
+            self.folder.commit_only(json::FILE)?;
+            return Ok(BundleReport {
+                files: of_file(path, portable, Vec::new()).files,
+                ..report
+            });
+        }
         self.folder
             .write("golden.csv", golden_csv(portable, vectors.golden()))?;
         let mut metadata = self.metadata;
@@ -364,31 +304,13 @@ impl Bundle<'_> {
             "deviation": report.deviation(), "limit": report.limit, "remarks": report.remarks,
         });
         metadata.insert("verification".to_owned(), verified);
-        let metadata =
-            serde_json::to_string_pretty(&metadata).map_err(|error| read_back("metadata.json", error.to_string()))?;
+        let metadata = serde_json::to_string_pretty(&metadata)
+            .map_err(|error| BundleError::read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
         self.folder
             .write("README.txt", readme(&self.name, portable, fixed, &report))?;
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)
-    }
-}
-
-/// Answer of a bundle with these numbers.
-fn answer(portable: &Portable, weights: &Weights, vector: &Vector) -> Vec<f64> {
-    match &portable.equations {
-        None => weights.decode(vector.row, &vector.taken),
-        Some(equations) => {
-            let first = |map: usize| weights.decode(map, &vector.taken);
-            Iteration::new(equations).decode(vector.row, &vector.taken, first)
-        }
-    }
-}
-
-fn read_back(file: &str, reason: String) -> BundleError {
-    BundleError::ReadBack {
-        file: file.to_owned(),
-        reason,
     }
 }

@@ -3,14 +3,36 @@
 use serde_json::{Map, Value, json};
 
 use super::{
+    draft::Draft,
+    error::BundleError,
     exported_decoder::Metadata,
     portable::Portable,
+    report::BundleCheck,
     vectors::Vector,
     weights::{Arithmetic, Weights},
 };
 
+/// Name of the only file.
+pub(super) const FILE: &str = "decoder.json";
+
+/// Writes the file and reads it back.
+///
+/// # Errors
+/// It cannot be written or read back.
+pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
+    let (portable, golden) = (draft.portable, draft.vectors.golden());
+    let damaged = |reason| BundleError::read_back(FILE, reason);
+    let bytes = draft.write(FILE, write(portable, draft.weights, draft.metadata, golden))?;
+    let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
+    let deviation = draft.deviation_of(&read_weights(&text, portable).map_err(damaged)?);
+    Ok(vec![BundleCheck::of(
+        "JSON numbers, read back and evaluated",
+        deviation,
+    )])
+}
+
 /// Writes the numbers, the metadata and the golden vectors.
-pub(super) fn write(portable: &Portable, weights: &Weights, metadata: &Metadata, golden: &[Vector]) -> String {
+fn write(portable: &Portable, weights: &Weights, metadata: &Metadata, golden: &[Vector]) -> String {
     let tables = weights.tables(portable).into_iter().map(|table| {
         let shape = [&[weights.maps.len()], &table.shape[..]].concat();
         (table.name, json!({ "shape": shape, "values": table.values }))
@@ -31,7 +53,7 @@ pub(super) fn write(portable: &Portable, weights: &Weights, metadata: &Metadata,
 ///
 /// # Errors
 /// A description of the damage.
-pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
+fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
     let document: Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     Weights::of_tables(portable, Arithmetic::DOUBLE, |table| {
         let values = document["tables"][table.name.as_str()]["values"].as_array();

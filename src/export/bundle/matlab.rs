@@ -3,8 +3,11 @@
 use std::fmt::Write;
 
 use super::{
+    draft::{Call, Draft},
+    error::BundleError,
     meaning::Meaning,
     portable::Portable,
+    report::BundleCheck,
     tables::names,
     weights::{Arithmetic, Weights},
 };
@@ -189,4 +192,41 @@ pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, S
             .map(|number| number.parse::<f64>().map_err(|_| missing()));
         values.collect()
     })
+}
+
+/// Writes the function and reads its matrices back.
+///
+/// # Errors
+/// It cannot be written or read back.
+pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
+    let (function, file) = (format!("{}_decode", draft.name), format!("{}_decode.m", draft.name));
+    let damaged = |reason| BundleError::read_back(&file, reason);
+    let bytes = draft.write(&file, write(&function, draft.portable, draft.weights))?;
+    let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
+    let read = read_weights(&text, draft.portable).map_err(damaged)?;
+    let deviation = draft.deviation_of(&read);
+    Ok(vec![BundleCheck::of(
+        "MATLAB matrices, read back and evaluated",
+        deviation,
+    )])
+}
+
+/// How to call it, for the README.
+pub(super) fn call(call: &Call<'_>) -> String {
+    let portable = call.portable;
+    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
+    let meaning = &portable.meaning;
+    let (input, output) = (meaning.readings(), meaning.outputs());
+    let name = call.name;
+    let row = if takes_row { ", row" } else { "" };
+    format!(
+        "    [{output}, readings_outside] = {name}_decode({input}{row})\n\n\
+         in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
+         {outputs}{row_text}.",
+        row_text = if takes_row {
+            ";\nrow has the row of each sample, from 1"
+        } else {
+            ""
+        },
+    )
 }

@@ -9,6 +9,7 @@
 mod c99;
 mod choice;
 mod decoder_choice;
+mod draft;
 mod error;
 mod exact;
 mod exported_decoder;

@@ -5,8 +5,11 @@ mod npz;
 
 use self::npz::NamedArray;
 use super::{
+    draft::{Call, Draft},
+    error::BundleError,
     meaning::Meaning,
     portable::Portable,
+    report::BundleCheck,
     tables::{Table, names},
     weights::{Arithmetic, Digits, Weights},
 };
@@ -202,4 +205,46 @@ fn steps(portable: &Portable, arithmetic: Arithmetic) -> String {
         };
     }
     text
+}
+
+/// Writes weights and program, and reads the weights back.
+///
+/// # Errors
+/// They cannot be written or read back.
+pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
+    let (portable, arithmetic) = (draft.portable, draft.weights.arithmetic);
+    let file = format!("{}.npz", portable.decoder);
+    let bytes = draft.write(&file, write_weights(portable, draft.weights))?;
+    draft.write("decode.py", write_program(portable, arithmetic))?;
+    let read = read_weights(&bytes, portable, arithmetic);
+    let read = read.map_err(|reason| BundleError::read_back(&file, reason))?;
+    let deviation = draft.deviation_of(&read);
+    Ok(vec![BundleCheck::of(
+        "NumPy weights, read back and evaluated",
+        deviation,
+    )])
+}
+
+/// How to call it, for the README.
+pub(super) fn call(call: &Call<'_>) -> String {
+    let portable = call.portable;
+    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
+    let meaning = &portable.meaning;
+    let (input, output) = (meaning.readings(), meaning.outputs());
+    let row = if takes_row { ", row" } else { "" };
+    format!(
+        "    from decode import decode\n    \
+         {output}, readings_outside = decode({input}{row})\n\n\
+         {input} is samples x {channels}, {output} samples x {outputs}{row_text}.{explained}",
+        row_text = if takes_row {
+            ";\nrow has the row of each sample, from 1"
+        } else {
+            ""
+        },
+        explained = if call.tells_unexplained() {
+            "\nIt warns of samples that no deformation explains to 1e-10, as with noise."
+        } else {
+            ""
+        },
+    )
 }
