@@ -58,7 +58,7 @@ pub struct AffineLayer<T> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NotDescribed {
-    /// The decoder weighs the readings by their noise and by the prior of the scene.
+    /// The decoder uses the noise of the readings and the prior of the scene.
     #[error(
         "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, too long a program for a bundle: take another decoder, or settings without noise"
     )]
@@ -101,7 +101,7 @@ impl AffineLayer<f64> {
         }
     }
 
-    /// Changes of the targets with these indices, beside constants of all targets.
+    /// Changes of the targets with these indices, added to the constants of all targets.
     pub(super) fn of_varying(changes: &Array2<f64>, varying: &[usize], constants: &[f64]) -> Self {
         let mut weights = Array2::zeros((changes.nrows(), constants.len()));
         for (column, &target) in changes.columns().into_iter().zip(varying) {

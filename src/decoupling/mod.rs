@@ -14,7 +14,8 @@
 //!
 //! [`DecoderKind`] lists them with their names, meanings and colours. Decoders of readings alone come as
 //! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`] tells
-//! how well an answer explains the readings, without ground truth.
+//! how well an answer explains the readings, without ground truth. [`Description`] is what a decoder computes, in plain
+//! numbers, for programs that decode without this one.
 
 mod affine_map;
 mod affine_start;

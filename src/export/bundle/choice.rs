@@ -51,7 +51,8 @@ pub enum ChoiceError {
     WholeNumbers,
     /// A format that has no iterations.
     #[error(
-        "{format} cannot express the iteration of {decoder} on the equations of the sensor: give {}, or take another decoder", iterating()
+        "{format} cannot express the iteration of {decoder} on the equations of the sensor: give {}, or take another decoder",
+        iterating()
     )]
     Iteration {
         /// The format.
@@ -170,7 +171,7 @@ impl BundleFormat {
         lines.join("; ")
     }
 
-    /// Words of all formats: `onnx, c99 … or json`.
+    /// Lists all formats: `onnx, c99 … or json`.
     fn words() -> String {
         let words = Self::ALL.map(|format| format.entry().word);
         let [others @ .., last] = &words;
@@ -215,7 +216,7 @@ impl BundleFormat {
     }
 }
 
-/// Words of the formats that have iterations.
+/// Lists the formats that have iterations.
 fn iterating() -> String {
     let formats = BundleFormat::ALL
         .into_iter()
@@ -226,7 +227,7 @@ fn iterating() -> String {
         .join(" or ")
 }
 
-/// The words of all decoders.
+/// Lists all decoders.
 fn decoder_words() -> String {
     BundleDecoder::all()
         .map(|decoder| decoder.to_string())

@@ -172,7 +172,7 @@ impl ExportedNetwork<'_> {
         }
     }
 
-    /// Meaning of the readings and targets of a decoder that tells so many row-wires apart.
+    /// Meaning of the readings and targets of a decoder for this number of known row-wires.
     fn meaning(&self, rows: usize) -> Meaning {
         match self {
             Self::Simulated(file) => Meaning::Array(file.settings.source.sensor.scale),

@@ -1,7 +1,5 @@
 use std::{fs, path::Path};
 
-use crate::export::WriteError;
-
 use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
@@ -21,6 +19,7 @@ use super::{
     vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };
+use crate::export::WriteError;
 
 /// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
 /// read back and compared with the decoder before it is put in its place.

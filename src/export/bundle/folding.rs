@@ -152,7 +152,7 @@ fn widened(layer: &Layer<Twofold>, inputs: usize, width: usize) -> Layer<Twofold
             consequents,
         } => {
             let (rules, outputs) = (memberships.outputs(), consequents.outputs() / memberships.outputs());
-            // Copies of the first rule, whose memberships are 0 beside its own.
+            // Copies of the first rule, whose memberships are 0 compared with its own.
             let source = |rule: usize| if rule < rules { rule } else { 0 };
             let of_rule = |column: usize| source(column / outputs) * outputs + column % outputs;
             let pick = |table: &Array2<Twofold>, columns: usize, of: &dyn Fn(usize) -> usize| {

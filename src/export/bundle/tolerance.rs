@@ -1,11 +1,10 @@
-use crate::decoupling::LARGEST_ERROR;
-
 use super::{
     exact::Growth,
     portable::Portable,
     tables::names,
     weights::{Arithmetic, Digits},
 };
+use crate::decoupling::LARGEST_ERROR;
 
 /// Largest deviation of a bundle of floating-point numbers from its decoder, relative to the widest range of an output.
 #[derive(Clone, Copy, Debug)]

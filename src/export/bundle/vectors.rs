@@ -1,5 +1,3 @@
-use crate::{decoupling::RowProblemDescription, evaluation::RunError};
-
 use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
@@ -9,6 +7,7 @@ use super::{
     report::VectorCounts,
     taking::{ReadingRounding, Taking},
 };
+use crate::{decoupling::RowProblemDescription, evaluation::RunError};
 
 /// Readings with the answers that the decoder gives to them.
 #[derive(Clone, Debug)]

@@ -62,7 +62,7 @@ impl Arithmetic {
         rest: Digits::Double,
     };
 
-    /// Single precision, with so many first layers in double.
+    /// Single precision, with this number of first layers in double.
     pub(super) fn single(wide_layers: usize) -> Self {
         Self {
             wide_layers,

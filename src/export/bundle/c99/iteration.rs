@@ -171,16 +171,16 @@ const TRIED: &str = "    int wire = 0;
         int is_tried[READ_ROWS] = {0};
         for (int n = 0; n < READ_ROWS && misfit > EXPLAINED; ++n) {
             int next = -1;
-            double least_unlike = 0, of_next, tried[UNKNOWNS];
+            double min_unlike = 0, of_next, tried[UNKNOWNS];
             for (int other = 0; other < READ_ROWS; ++other) {
                 double unlike = 0;
                 for (int k = 0; k < CHANNELS; ++k) {
                     const double difference = log(READINGS[k]) - rest_logarithms[other][k];
                     unlike += difference * difference;
                 }
-                if (!is_tried[other] && (next < 0 || unlike < least_unlike)) {
+                if (!is_tried[other] && (next < 0 || unlike < min_unlike)) {
                     next = other;
-                    least_unlike = unlike;
+                    min_unlike = unlike;
                 }
             }
             is_tried[next] = 1;

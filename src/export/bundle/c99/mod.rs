@@ -154,7 +154,7 @@ pub(super) fn call(call: &Call<'_>) -> String {
          {reading} {readings}[{upper}_CHANNELS];\n    \
          {coordinate} {coordinates}[{upper}_OUTPUTS];\n    \
          int status = {name}_decode({row}{readings}, {coordinates});\n\n\
-         The status is {upper}_OK, or tells what is wrong. Compile {name}_decode.c with your program{libm}. The\n\
+         The status is {upper}_OK, or the reason why there is no answer. Compile {name}_decode.c with your program{libm}. The\n\
          self-test compares the golden vectors:\n\n    \
          cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}{explained}",
         libm = if library.is_empty() { "" } else { ", and link with -lm" },

@@ -106,17 +106,26 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
             format!("the targets (samples x {outputs})"),
         ),
     };
+    let seeks_solution = portable
+        .equations
+        .as_ref()
+        .is_some_and(|equations| equations.seeks_solution);
+    let [counter, counting, warning] = if seeks_solution {
+        [
+            "    unexplained = 0\n",
+            "            unexplained += misfit > EXPLAINED\n",
+            "    if unexplained:\n        \
+             warnings.warn(f\"{unexplained} of {len(r)} samples have noise or come from another sensor\")\n",
+        ]
+    } else {
+        [""; 3]
+    };
     let answer = match &portable.equations {
         None => format!("        {output}[mine] = decode_by(index, r[mine])\n"),
-        Some(equations) => {
-            let judged = "            if misfit > EXPLAINED:\n                \
-                 warnings.warn(f\"sample {sample}: the readings have noise or come from another sensor\")\n";
-            format!(
-                "        for sample in np.flatnonzero(mine):\n            \
-                 misfit, {output}[sample] = solve(index, r[sample])\n{}",
-                if equations.seeks_solution { judged } else { "" }
-            )
-        }
+        Some(_) => format!(
+            "        for sample in np.flatnonzero(mine):\n            \
+             misfit, {output}[sample] = solve(index, r[sample])\n{counting}"
+        ),
     };
     let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
     format!(
@@ -144,20 +153,16 @@ def decode_by(index, r):
     if not ({is_reading}).all():
         raise ValueError("{input}: give finite numbers{above}")
 {row}    {output}, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
-    for index in range({rows}):
+{counter}    for index in range({rows}):
         mine = row == index + 1
-{answer}{outside}    return {output}, outside
+{answer}{outside}{warning}    return {output}, outside
 "#,
         channels = portable.channels,
         noun = portable.decoder,
         centre = meaning.centre(),
         not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
         steps = steps(portable, arithmetic),
-        warnings = if portable.equations.is_some() {
-            "import warnings\n"
-        } else {
-            ""
-        },
+        warnings = if seeks_solution { "import warnings\n" } else { "" },
         solver = portable.equations.as_ref().map_or_else(
             || "\n".to_owned(),
             |equations| format!("\n{}", iteration::source(equations))
