@@ -69,11 +69,27 @@ impl OnnxGraph {
         Ok(Self { graph, digits })
     }
 
-    /// Answers all vectors as one batch.
+    /// Answers all vectors in batches, whose values are all held at once.
     ///
     /// # Errors
     /// A description of the first operation that fails.
     pub(super) fn decode(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
+        /// Vectors of a batch.
+        const BATCH: usize = 100;
+        let mut all = OnnxAnswers {
+            answers: Vec::new(),
+            readings_outside: Some(Vec::new()),
+        };
+        for batch in vectors.chunks(BATCH) {
+            let of_batch = self.decode_batch(batch)?;
+            all.answers.extend(of_batch.answers);
+            let outside = all.readings_outside.zip(of_batch.readings_outside);
+            all.readings_outside = outside.map(|(all, of_batch)| [all, of_batch].concat());
+        }
+        Ok(all)
+    }
+
+    fn decode_batch(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
         let channels = vectors.first().map_or(0, |vector| vector.readings.len());
         let readings = vectors.iter().flat_map(|vector| &vector.readings);
         let readings = readings.map(|&ohm| self.digits.round(ohm)).collect();
