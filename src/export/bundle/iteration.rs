@@ -35,10 +35,8 @@ impl Attempt {
 
     /// The one of the least misfit, the earlier if none is less.
     fn better(best: Option<Self>, other: Self) -> Self {
-        match best {
-            Some(best) if !(other.misfit < best.misfit) => best,
-            _ => other,
-        }
+        let is_best = best.as_ref().is_none_or(|best| other.misfit < best.misfit);
+        if is_best { other } else { best.unwrap_or(other) }
     }
 }
 

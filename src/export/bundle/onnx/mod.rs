@@ -45,7 +45,6 @@ pub(super) struct OnnxGraph {
 /// The outputs of a graph.
 pub(super) struct OnnxAnswers {
     pub(super) answers: Vec<Vec<f64>>,
-    #[cfg_attr(not(test), expect(dead_code, reason = "compared with the range in tests"))]
     pub(super) readings_outside: Option<Vec<i64>>,
 }
 
