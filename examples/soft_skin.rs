@@ -58,7 +58,9 @@ fn main() {
     for press in 1..=PRESSES {
         let (x_mm, y_mm) = (3.0 + 14.0 * random.uniform(), 3.0 + 14.0 * random.uniform());
         let peak_n = 1.0 + 5.0 * random.uniform();
-        drift_mt.iter_mut().for_each(|drift| *drift += DRIFT_MT * random.normal());
+        drift_mt
+            .iter_mut()
+            .for_each(|drift| *drift += DRIFT_MT * random.normal());
         let mut creep_mm = 0.0;
         for sample in 0..SAMPLES {
             let phase = (sample as f64 + 1.0) / (SAMPLES as f64 + 1.0);
