@@ -1,12 +1,12 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, Color32, Layout, RichText, Sense, Ui, Vec2};
+use eframe::egui::{Color32, RichText, Ui};
 
 use super::{Phase, RunView, Shared};
 use crate::{
     app::{
-        theme::{Palette, Theme, space, type_size},
-        widgets::state_ui,
+        theme::{Palette, Theme, type_size},
+        widgets::{state_ui, status_progress_ui},
     },
     export::{format_duration, format_number, format_percent},
     training::StopReason,
@@ -28,7 +28,9 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
             ui.label(RichText::new(part).size(type_size().note).color(palette.dim));
         }
         if shared.phase.is_busy() {
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| progress_bar_ui(ui, run));
+            let epochs_run = run.result.as_ref().map_or(0, |result| result.epochs_run);
+            let epochs = run.settings().training.stopping.epochs.max(1);
+            status_progress_ui(ui, "Training", epochs_run as f32 / epochs as f32);
         }
     });
 }
@@ -88,20 +90,4 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
 
 fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
     Duration::try_from_secs_f64(per_epoch.as_secs_f64() * epochs as f64).unwrap_or(Duration::MAX)
-}
-
-fn progress_bar_ui(ui: &mut Ui, run: &RunView) {
-    let palette = Theme::of(ui).palette;
-    let share = run.result.as_ref().map_or(0.0, |result| {
-        result.epochs_run as f32 / run.settings().training.stopping.epochs as f32
-    });
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(space(40), space(1)), Sense::hover());
-    let radius = 0.5 * space(1);
-    ui.painter().rect_filled(rect, radius, palette.line);
-    let done = rect.with_max_x(rect.left() + share.clamp(0.0, 1.0) * rect.width());
-    ui.painter().rect_filled(done, radius, palette.accent);
-    response.widget_info(|| {
-        let label = format!("Progress {:.0} %", 100.0 * share);
-        eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::ProgressIndicator, true, label)
-    });
 }

@@ -9,8 +9,7 @@ use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
         widgets::{
-            ColumnWidth, TableCell, TableClick, TableColumn, TableRow, dim_ui, note_ui, placeholder_ui,
-            scrolled_table_ui,
+            ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, note_ui, placeholder_ui,
         },
     },
     evaluation::TargetErrors,
@@ -43,7 +42,7 @@ pub(super) fn runs_ui(ui: &mut Ui, view: &mut OwnDataView) {
         });
     });
     match click {
-        Some(TableClick::Mark(place)) => {
+        Some(TableClick::Select(place)) => {
             view.runs.marked = (view.runs.marked != Some(place)).then_some(place);
             view.runs.is_removing = false;
             ui.request_repaint();
@@ -111,44 +110,31 @@ fn list_ui(ui: &mut Ui, runs: &Runs, is_shown: impl Fn(&Trained) -> bool) -> Opt
         }
     }
     let headings = Vec::from_iter(targets.iter().map(|name| format!("RMSE {name}")));
-    let figure = |heading, text| TableColumn {
-        heading,
-        is_figure: true,
-        width: ColumnWidth::Fits(text),
-    };
-    let name = TableColumn {
-        heading: "network",
-        is_figure: false,
-        width: ColumnWidth::Rest,
-    };
+    let figure = |heading, text| TableColumn::figure(heading).width(ColumnWidth::Fits(text));
+    let name = TableColumn::text("network").width(ColumnWidth::Rest);
     let mut columns = vec![name, figure("split", "random"), figure("epochs", "10000")];
     columns.extend(headings.iter().map(|heading| figure(heading.as_str(), "0.00012")));
     let row = |place: usize| {
         let run = &runs.runs[place].trained;
-        let cell = |text: String| TableCell::plain(text, palette.text);
         let rmse = |title: &String| {
             let index = run.file.targets.iter().position(|target| target.title() == *title);
             let errors: Option<&TargetErrors> = index.and_then(|index| run.file.errors.get(index));
-            cell(format_number(errors.map(|errors| errors.rmse)))
+            TableCell::new(format_number(errors.map(|errors| errors.rmse)))
         };
         let mut cells = vec![
-            TableCell {
-                is_strong: is_shown(run),
-                ..cell(run.name.clone())
-            },
-            cell(split(&run.file.plan)),
-            cell(run.epochs_run.to_string()),
+            TableCell::new(&run.name).strong(is_shown(run)),
+            TableCell::new(split(&run.file.plan)),
+            TableCell::new(run.epochs_run.to_string()),
         ];
         cells.extend(targets.iter().map(rmse));
-        TableRow {
-            label: run.name.clone(),
-            is_marked: runs.marked == Some(place),
-            meaning: "Click to compare, double-click to show.",
-            dot: is_shown(run).then_some(palette.accent),
-            cells,
-        }
+        TableRow::new(cells)
+            .labelled(&run.name)
+            .selected(runs.marked == Some(place))
+            .meaning("Click to compare, double-click to show.")
+            .dot(is_shown(run).then_some(palette.accent))
     };
-    scrolled_table_ui(ui, "own data runs", &columns, None, runs.runs.len(), row)
+    let table = TableView::new("own data runs", &columns).clickable();
+    table.show(ui, runs.runs.len(), row)
 }
 
 fn split(plan: &Plan) -> String {

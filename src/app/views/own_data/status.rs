@@ -1,11 +1,11 @@
-use eframe::egui::{Align, Layout, RichText, Ui};
+use eframe::egui::{RichText, Ui};
 
 use super::state::OwnDataView;
 use crate::{
     app::{
         shared::{Phase, phase_in_words},
-        theme::{Theme, space, type_size},
-        widgets::{progress_bar_ui, state_ui},
+        theme::{Theme, type_size},
+        widgets::{state_ui, status_progress_ui},
     },
     export::{format_duration, format_number},
     import::Progress,
@@ -48,7 +48,7 @@ pub(super) fn status_ui(ui: &mut Ui, view: &OwnDataView) {
             ui.label(RichText::new(part).size(type_size().note).color(palette.dim));
         }
         if view.phase.is_busy() {
-            bar_ui(ui, "Training", shown.epochs_run as f32 / epochs.max(1) as f32);
+            status_progress_ui(ui, "Training", shown.epochs_run as f32 / epochs.max(1) as f32);
         }
     });
 }
@@ -58,14 +58,5 @@ fn reading_ui(ui: &mut Ui, progress: Option<Progress>) {
     let Some(Progress { bytes, of: Some(of) }) = progress else {
         return;
     };
-    bar_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
-}
-
-fn bar_ui(ui: &mut Ui, name: &str, share: f32) {
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.scope(|ui| {
-            ui.set_max_width(space(40));
-            progress_bar_ui(ui, name, share);
-        });
-    });
+    status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
 }

@@ -9,12 +9,12 @@ use crate::{
         theme::{Theme, space},
         views::own_data::{remarks::sentence, state::OwnDataView},
         widgets::{
-            ColumnWidth, TableCell, TableColumn, TableRow, dim_ui, ghost_button, invitation_ui, note_ui,
-            scrolled_table_ui, scrolled_ui,
+            ColumnWidth, TableCell, TableColumn, TableRow, TableView, dim_ui, ghost_button, invitation_ui, note_ui,
+            scrolled_ui,
         },
     },
     evaluation::TargetReport,
-    export::{format_duration, format_number},
+    export::{format_duration, format_number, format_r2},
     figure::{PlotFigure, decoders_figure, trade_words::frame_time},
 };
 
@@ -114,44 +114,31 @@ fn notes(decoders: &Decoders) -> Vec<String> {
 
 fn table_ui(ui: &mut Ui, decoders: &Decoders, target: usize) {
     let palette = &Theme::of(ui).palette;
-    let figure = |heading| TableColumn {
-        heading,
-        is_figure: true,
-        width: ColumnWidth::Points(space(24)),
-    };
-    let name = TableColumn {
-        heading: "decoder",
-        is_figure: false,
-        width: ColumnWidth::Rest,
-    };
     let error = format!("RMSE, {}", decoders.of.targets[target].title());
-    let error = TableColumn {
-        width: ColumnWidth::Fits(&error),
-        ..figure(&error)
-    };
-    let columns = [name, error, figure("R²"), figure("to decode"), figure("to fit")];
+    let columns = [
+        TableColumn::text("decoder").width(ColumnWidth::Rest),
+        TableColumn::figure(&error),
+        TableColumn::figure("R²"),
+        TableColumn::figure("to decode"),
+        TableColumn::figure("to fit"),
+    ];
     let row = |place: usize| {
         let report: &TargetReport = &decoders.reports[place];
         let name = report.kind.name(report.precision);
         let errors = &report.targets[target];
         let texts = [
             format_number(errors.rmse),
-            errors
-                .r2
-                .map_or_else(|| format_number(None), |r2| format!("{r2:.4}").replace('-', "−")),
+            format_r2(errors.r2),
             frame_time(report.cost.frame_us),
             fit_time(report),
         ];
-        let cell = |text: String| TableCell::plain(text, palette.text);
-        TableRow {
-            label: format!("{name}: {}", texts.join(", ")),
-            is_marked: false,
-            meaning: report.kind.meaning(),
-            dot: Some(hue_colour(report.kind.colour().into(), palette)),
-            cells: std::iter::once(name.to_owned()).chain(texts).map(cell).collect(),
-        }
+        let label = format!("{name}: {}", texts.join(", "));
+        TableRow::new(std::iter::once(name.to_owned()).chain(texts).map(TableCell::new))
+            .labelled(label)
+            .meaning(report.kind.meaning())
+            .dot(hue_colour(report.kind.colour().into(), palette))
     };
-    scrolled_table_ui(ui, "decoders", &columns, None, decoders.reports.len(), row);
+    TableView::new("decoders", &columns).show(ui, decoders.reports.len(), row);
 }
 
 /// Time to fit a decoder; a network was trained before.

@@ -6,7 +6,7 @@ use crate::{
         shared::Shared,
         theme::{Theme, semibold, type_size},
         views::train::state::TrainView,
-        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, dim_ui, scrolled_table_ui},
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui},
     },
     evaluation::NodeAddress,
     export::format_number,
@@ -22,11 +22,7 @@ const COLUMNS: [TableColumn<'static>; 4] = [
 ];
 
 const fn figure(heading: &'static str, widest: &'static str) -> TableColumn<'static> {
-    TableColumn {
-        heading,
-        is_figure: true,
-        width: ColumnWidth::Fits(widest),
-    }
+    TableColumn::figure(heading).width(ColumnWidth::Fits(widest))
 }
 
 /// The nodes whose errors the chosen bar of the histogram holds. The one under the pointer lights up; a click goes to its
@@ -60,29 +56,19 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         let texts = [snapshot + 1, row + 1, node + 1].map(|number| number.to_string());
         let error = format_number(error_mm).replace('-', "−");
         let is_lit = snapshot == view.snapshot && test.node(address) == view.lights.node;
-        TableRow {
-            label: format!("Snapshot {}, row {}, node {}: {error} mm", texts[0], texts[1], texts[2]),
-            is_marked: is_lit,
-            meaning: "",
-            dot: None,
-            cells: texts
-                .into_iter()
-                .chain([error])
-                .map(|text| TableCell {
-                    text,
-                    colour: if snapshot == view.snapshot {
-                        palette.text
-                    } else {
-                        palette.dim
-                    },
-                    is_strong: false,
-                    label: None,
-                    meaning: "",
-                })
-                .collect(),
-        }
+        let label = format!("Snapshot {}, row {}, node {}: {error} mm", texts[0], texts[1], texts[2]);
+        let colour = if snapshot == view.snapshot {
+            palette.text
+        } else {
+            palette.dim
+        };
+        TableRow::new(texts.into_iter().chain([error]).map(TableCell::new))
+            .labelled(label)
+            .selected(is_lit)
+            .colour(colour)
     };
-    match scrolled_table_ui(ui, "nodes in bar", &COLUMNS, None, nodes.len(), row) {
+    let table = TableView::new("nodes in bar", &COLUMNS).clickable();
+    match table.show(ui, nodes.len(), row) {
         Some(TableClick::Point(place)) => {
             let here = nodes
                 .get(place)
@@ -93,7 +79,7 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
                 ui.request_repaint();
             }
         }
-        Some(TableClick::Mark(place) | TableClick::Open(place)) => {
+        Some(TableClick::Select(place) | TableClick::Open(place)) => {
             if let Some((address, _)) = nodes.get(place) {
                 view.go_to(*address, shared);
                 ui.request_repaint();

@@ -5,21 +5,21 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        glossary::{self, Term},
+        glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
-        theme::{Theme, semibold, space, type_size},
+        theme::{Theme, space, type_size},
         views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
         widgets::{
-            Column, Landmark, Row, TableWidths, captioned_table_ui, dim_ui, ghost_button, note_ui, scrolled_ui,
-            section_heading_ui, table_ui,
+            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
     decoupling::DecoderKind,
     evaluation::{
-        Baselines, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores,
-        SimulatedSettings, TestErrors, error_remarks,
+        Baselines, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings,
+        TestErrors, error_remarks,
     },
     export::{format_duration, format_number},
+    figure::trade_words::frame_time,
     training::StopReason,
 };
 
@@ -111,7 +111,7 @@ fn is_in_table(measure: ErrorMeasure) -> bool {
     measure != ErrorMeasure::WorstMm
 }
 
-fn heading(measure: ErrorMeasure) -> Column {
+fn column(measure: ErrorMeasure) -> TableColumn<'static> {
     let term = match measure {
         ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
         ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
@@ -124,57 +124,43 @@ fn heading(measure: ErrorMeasure) -> Column {
         ErrorMeasure::RangePercent => "% of range",
         measure => measure.heading().0,
     };
-    Column {
-        heading: term.map_or(heading, |term| term.name),
-        meaning: term.map_or(measure.definition(), |term| term.hint),
-    }
+    let heading = term.map_or(heading, |term| term.name);
+    TableColumn::figure(heading).meaning(term.map_or(measure.definition(), |term| term.hint))
 }
 
 fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     let palette = Theme::of(ui).palette;
     let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let columns = Vec::from_iter(shown.iter().map(|&place| heading(table.measures[place])));
+    let measures = shown.iter().map(|&place| column(table.measures[place]));
+    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
     // The error by which the network is judged.
     let judged = table
         .measures
         .iter()
         .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
-    let rows_of = |block: &ErrorBlock| -> Vec<Row> {
+    let mut rows = Vec::new();
+    for block in &table.blocks {
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
         let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
-        let row = |row: &ErrorRow| Row {
-            name: row.name,
-            meaning: row_meaning(row.name),
-            cells: shown.iter().map(|&place| format_number(row.errors[place])).collect(),
-            colour: match row.name {
-                NETWORK => palette.accent,
-                "published" | "reference" => palette.dim,
-                _ => palette.text,
-            },
-            is_strong: row.name == NETWORK,
-            mark: if beats(row.name, judged(row), of_network) {
-                BETTER
-            } else {
-                ""
-            },
+        let row = |row: &ErrorRow| {
+            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+                .meaning(row_meaning(row.name))
+                .colour(match row.name {
+                    NETWORK => palette.accent,
+                    "published" | "reference" => palette.dim,
+                    _ => palette.text,
+                })
+                .strong(row.name == NETWORK)
+                .mark(if beats(row.name, judged(row), of_network) {
+                    BETTER
+                } else {
+                    ""
+                })
         };
-        block.rows.iter().map(row).collect()
-    };
-    let blocks = Vec::from_iter(table.blocks.iter().map(|block| (block, rows_of(block))));
-    let widths = TableWidths::fitting(ui, &columns, &Vec::from_iter(blocks.iter().flat_map(|(_, rows)| rows)));
-    for (block, rows) in &blocks {
-        match &block.target {
-            None => {
-                ui.scope(|ui| table_ui(ui, &columns, rows));
-            }
-            Some(target) => {
-                ui.add_space(space(1));
-                ui.label(RichText::new(target.title()).font(semibold(type_size().body)));
-                ui.scope(|ui| captioned_table_ui(ui, &target.title(), &columns, rows, &widths));
-                ui.add_space(space(2));
-            }
-        }
+        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
+        rows.extend(block.rows.iter().map(row));
     }
+    TableView::new("errors", &columns).show_all(ui, rows);
 }
 
 /// Definition of a row of the error table.
@@ -321,22 +307,13 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", format_short_time(time)));
+        rows.push(("Decoding a snapshot", frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
         });
-    }
-}
-
-/// As [`format_duration`], with microseconds below a millisecond.
-fn format_short_time(time: Duration) -> String {
-    if time < Duration::from_millis(1) {
-        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
-    } else {
-        format_duration(time)
     }
 }
 
