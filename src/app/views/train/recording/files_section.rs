@@ -55,7 +55,7 @@ impl RecordingEditor {
             dim_ui(ui, &format!("Reading {name}…"));
             let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
             if let Some(share) = share {
-                progress_bar_ui(ui, "Reading", share);
+                progress_bar_ui(ui, "Reading", share, "");
             }
         }
         self.buttons_ui(ui, effects);
