@@ -15,9 +15,9 @@ use crate::export::{
 
 /// Write a decoder for other programs, and verify what was written
 ///
-/// The exported decoder of a simulated sensor takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
+/// The exported decoder of a simulated array takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
 /// the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; scaling, conductances or logarithms, and
-/// constant coordinates are part of it. A decoder of own data (train --data) takes its inputs and gives its targets, in their
+/// constant coordinates are part of it. The decoder of a recording (train --data) takes its inputs and gives its targets, in their
 /// units. Decoders of known rows leave as one, which also takes the number of the row-wire,
 /// from 1.
 ///
