@@ -10,7 +10,6 @@ use super::{
     failure::Failure,
     findings::StudyArguments,
     import_arguments::{ImportArguments, with_bar},
-    measured_files::format_words,
     output::{print, print_object},
 };
 use crate::{
@@ -57,7 +56,7 @@ impl Inspect {
         if self.json {
             return print_object(&Report {
                 file: data,
-                format: format_words(&table.format),
+                format: table.format.to_string(),
                 dialect: table.dialect(),
                 inspection: &inspection,
             });
@@ -70,7 +69,7 @@ impl Inspect {
                 counted(inspection.rows, "row"),
                 counted(inspection.columns.len(), "column")
             )?;
-            writeln!(out, "{}\n", format_words(&table.format))?;
+            writeln!(out, "{}\n", table.format)?;
             write_columns(&inspection.columns, out)?;
             if let Some(time) = &inspection.time {
                 write_time(time, out)?;

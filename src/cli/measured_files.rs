@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::{
     export::format_number,
-    import::{Dropped, FileReport, Format, JoinReport, Recording},
+    import::{Dropped, FileReport, JoinReport, Recording},
 };
 
 /// A file as it was found.
@@ -26,21 +26,11 @@ impl FileFound {
     fn of(report: &FileReport) -> Self {
         Self {
             path: report.path.clone(),
-            format: format_words(&report.format),
+            format: report.format.to_string(),
             rows: report.rows,
             columns: report.columns,
             join: report.join,
         }
-    }
-}
-
-/// Says what kind of file it is, and its layout.
-pub(super) fn format_words(format: &Format) -> String {
-    match format {
-        Format::Text(dialect) => format!("text: {dialect}"),
-        Format::Npy => "NumPy array".to_owned(),
-        Format::Npz => "archive of NumPy arrays".to_owned(),
-        Format::Matlab => "MATLAB file".to_owned(),
     }
 }
 

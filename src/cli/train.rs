@@ -13,7 +13,6 @@ use super::{
     import_arguments::ImportArguments,
     interruption::Graceful,
     output::{print_object, progress_bar},
-    shell::quoted,
     train_report::{print_text, report},
     training_arguments::TrainingArguments,
 };
@@ -22,7 +21,8 @@ use crate::{
     evaluation::{DecoderReport, DecoderSet, Run, RunError},
     export::{
         CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, SensorFile, check_writable, format_number,
-        is_same, report::RunReport,
+        is_same,
+        report::{RunReport, quoted},
     },
     training::TrainingSettings,
 };
@@ -108,6 +108,7 @@ impl Train {
                 file: &file,
                 flaw: flaw.as_ref(),
                 decoders: &decoders,
+                test: run.test(),
             };
             report.save(path)
         });

@@ -44,7 +44,7 @@ pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::NetworkFile;
-pub use recipe_file::RecipeFile;
+pub use recipe_file::{RecipeFile, RecipeSource};
 pub use recorded_words::{
     describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
 };

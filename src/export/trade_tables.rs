@@ -5,7 +5,7 @@ use crate::{
     figure::trade_words::point_name,
 };
 
-/// Every point of every level, with all its figures: for programs.
+/// Returns every point of every level, with all its figures: for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     const FIELDS: [&str; 16] = [
         "noise",
@@ -59,13 +59,15 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         };
         points.map(row).collect::<Vec<_>>()
     };
-    Table {
+    let table = Table {
         columns: FIELDS.map(TableColumn::field).to_vec(),
         rows: levels.iter().flat_map(of_level).collect(),
-    }
+    };
+    let mut points = levels.iter().flat_map(|level| &level.points);
+    for_source(table, points.all(is_of_array))
 }
 
-/// The points of one level, fastest first: for readers.
+/// Returns the points of one level, fastest first: for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let row = |point: &TradeOffPoint| {
         vec![
@@ -93,6 +95,34 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     // Without noise there is no limit to compare with.
     if level.points.iter().all(|point| point.to_reference().is_none()) {
         table.remove_column("times_reference");
+    }
+    for_source(table, level.points.iter().all(is_of_array))
+}
+
+fn is_of_array(point: &TradeOffPoint) -> bool {
+    point.settings.source.simulation().is_some()
+}
+
+/// Returns the table of an array, or for a recording the same table without columns that need a sensor model.
+fn for_source(mut table: Table, is_array: bool) -> Table {
+    const OF_ARRAYS: [&str; 7] = [
+        "noise",
+        "preset",
+        "samples",
+        "z_mm",
+        "residual",
+        "reference_z_percent",
+        "reference_z_mm",
+    ];
+    if is_array {
+        return table;
+    }
+    OF_ARRAYS.iter().for_each(|field| table.remove_column(field));
+    for column in table.columns.iter_mut().filter(|column| column.field == "z_percent") {
+        *column = match column.heading.as_str() {
+            "Z" => TableColumn::new("percent_of_range", "MAE", "% of range"),
+            _ => TableColumn::field("percent_of_range"),
+        };
     }
     table
 }

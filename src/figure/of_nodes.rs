@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
-    evaluation::{NodeAddress, format::format_number},
+    evaluation::{Channel, NodeAddress, format::format_number},
 };
 
 /// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
@@ -98,8 +98,25 @@ impl ErrorBins {
 
 /// Distribution of the errors of z (decoupled − actual), in [`ErrorBins`]; the bar `chosen` stands out.
 pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) -> PlotFigure {
-    let bins = ErrorBins::new(pairs_mm);
-    let counts = bins.counts(pairs_mm);
+    histogram(
+        pairs_mm,
+        chosen,
+        "nodes",
+        "error of z (mm), decoupled − actual".to_owned(),
+    )
+}
+
+/// Distribution of the errors of a target (decoded − actual) in pairs of actual and decoded values, in [`ErrorBins`]; the
+/// bar `chosen` stands out.
+pub fn target_error_histogram_figure(pairs: &[(f64, f64)], target: &Channel, chosen: Option<usize>) -> PlotFigure {
+    let title = format!("error of {}, decoded − actual", target.title());
+    histogram(pairs, chosen, "samples", title)
+}
+
+/// Histogram of the errors of pairs, which are `items` of the test set.
+fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, items: &str, title: String) -> PlotFigure {
+    let bins = ErrorBins::new(pairs);
+    let counts = bins.counts(pairs);
     let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| Series {
         bar_width: Some(0.92 * bins.width_mm),
         points: (0..BINS)
@@ -111,13 +128,13 @@ pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) ->
             .collect(),
         ..Series::new(name, Look::area(hue), [])
     };
-    let mut series = vec![bars("nodes", Hue::Blue, &|bin| Some(bin) != chosen)];
+    let mut series = vec![bars(items, Hue::Blue, &|bin| Some(bin) != chosen)];
     if let Some(chosen) = chosen {
-        series.push(bars("chosen nodes", Hue::Orange, &|bin| bin == chosen));
+        series.push(bars(&format!("chosen {items}"), Hue::Orange, &|bin| bin == chosen));
     }
     let plot = Plot::new(
-        PlotAxis::linear("error of z (mm), decoupled − actual"),
-        PlotAxis::linear("nodes of the test set").including([0.0]),
+        PlotAxis::linear(title),
+        PlotAxis::linear(format!("{items} of the test set")).including([0.0]),
         series,
     );
     let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);

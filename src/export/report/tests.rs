@@ -1,11 +1,11 @@
-use std::collections::HashSet;
+use std::{collections::HashSet, path::Path};
 
 use resvg::usvg::roxmltree::{Document, ParsingOptions};
 
 use super::*;
 use crate::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{DecoderSet, Run, SimulatedSettings, error_rows},
+    evaluation::{DecoderSet, Run, SimulatedSettings},
     export::{NetworkFile, format_number},
     scene::{Indenter, Loading},
 };
@@ -22,7 +22,7 @@ fn run() -> Run {
 
 /// The report under `name`, as a program reads it.
 fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
-    let set = DecoderSet::new(&file.settings, Some(file.network.clone())).unwrap();
+    let set = DecoderSet::new(&file.settings.simulated().unwrap(), Some(file.network.clone())).unwrap();
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
     let (flaw, decoders) = (run.flaw(), [ridge.unwrap()]);
     let report = RunReport {
@@ -30,8 +30,9 @@ fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
         file,
         flaw: flaw.as_ref(),
         decoders: &decoders,
+        test: run.test(),
     };
-    report.html().unwrap()
+    report.html(Path::new(""))
 }
 
 fn parsed(html: &str) -> Document<'_> {
@@ -45,7 +46,7 @@ fn parsed(html: &str) -> Document<'_> {
 #[test]
 fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
     let run = run();
-    let file = NetworkFile::from_run(&run).unwrap();
+    let file = NetworkFile::from_run(&run, None).unwrap();
     let name = "</title><script>alert(1)</script> & \"50 %\" 'ü' \u{7}";
     let html = report(name, &file, &run);
     let document = parsed(&html);
@@ -84,7 +85,7 @@ fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
 #[test]
 fn a_report_holds_the_figures_of_its_run() {
     let run = run();
-    let file = NetworkFile::from_run(&run).unwrap();
+    let file = NetworkFile::from_run(&run, None).unwrap();
     let html = report("a run", &file, &run);
     let document = parsed(&html);
     let rows = document.descendants().filter(|node| node.has_tag_name("tr"));
@@ -95,10 +96,9 @@ fn a_report_holds_the_figures_of_its_run() {
                 .collect()
         })
         .collect();
-    let scores = run.node_scores().unwrap();
-    for row in error_rows(&scores.network, &scores.baselines, None) {
+    for row in &file.error_table().blocks[0].rows {
         let mut expected = vec![row.name.to_owned()];
-        expected.extend(row.values().map(format_number));
+        expected.extend(row.errors.iter().map(|error| format_number(*error)));
         assert!(rows.contains(&expected), "{expected:?} is not among {rows:#?}");
     }
     for (number, start) in run.starts().iter().enumerate() {
@@ -108,7 +108,7 @@ fn a_report_holds_the_figures_of_its_run() {
     let command = document.descendants().find(|node| node.has_tag_name("pre")).unwrap();
     assert_eq!(
         command.text(),
-        Some("decoupler train --array 4x4_2x12 --hidden 3 --starts 2 --epochs 5 --samples 60")
+        Some("decoupler train --array 4x4_2x12 --samples 60 --hidden 3 --starts 2 --epochs 5")
     );
     assert!(html.contains(crate::export::document::PROGRAM));
 }
@@ -118,11 +118,12 @@ fn settings_that_the_terminal_lacks_are_named_instead_of_a_command_that_trains_s
     let mut settings = SimulatedSettings::default();
     settings.source.sensor.geometry.height_mm = 6.0;
     settings.source.scene.largest_compression = 0.1;
-    let gap = train_command(&settings).unwrap_err().to_string();
+    let gap = train_command(&settings.into(), None).unwrap_err().to_string();
     assert!(gap.contains("geometry") && gap.contains("compression"), "{gap}");
     let mut indenter = Indenter::default();
     indenter.spread_mm *= 2.0;
     let mut settings = SimulatedSettings::default();
     settings.source.scene.loading = Loading::Indenter(indenter);
-    assert!(train_command(&settings).unwrap_err().to_string().contains("indenter"));
+    let gap = train_command(&settings.into(), None).unwrap_err().to_string();
+    assert!(gap.contains("indenter"), "{gap}");
 }

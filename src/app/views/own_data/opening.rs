@@ -240,7 +240,7 @@ fn open_document(
 ) -> Result<Opened, String> {
     match kind {
         DocumentKind::Recipe => {
-            let plan = RecipeFile::load(path).map_err(|error| error.to_string())?;
+            let plan = RecipeFile::load_recording(path).map_err(|error| error.to_string())?;
             Ok(Opened::Import(inspected(plan, Draft::of_recipe, watch)?))
         }
         DocumentKind::MeasuredNetwork => {
