@@ -2,7 +2,10 @@
 //!
 //! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
 //! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
-//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files.
+//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files. A [`Setup`]
+//! is a plan or a simulated array with the settings of a run: everything that gives its samples again.
+//!
+//! [`Format`] lists the kinds of files. A further one is an entry there and a module that reads its arrays.
 
 mod arrays;
 mod column;

@@ -109,3 +109,63 @@ fn check_answer(network: &DecouplingNetwork, readings_ohm: &[f64], height_mm: f6
     };
     assert!(is_flagged || is_refused || is_near(), "{answer:?}");
 }
+
+#[test]
+fn zz_write_valid() {
+    use decoupler::{evaluation::*, export::*, import::*, scene::RowModel};
+    let out = Path::new("/tmp/corpus");
+    fs::create_dir_all(out).unwrap();
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "2x2_2x6".parse().unwrap();
+    (settings.source.samples, settings.source.validation_samples) = (40, 10);
+    settings.source.test_samples = 10;
+    settings.hidden = 3;
+    settings.training.stopping.epochs = 3;
+    let mut run = Run::prepare(settings).unwrap();
+    run.step();
+    CheckpointFile::from_run(&run, None)
+        .unwrap()
+        .save(&out.join("valid.checkpoint"))
+        .unwrap();
+    while run.step().is_none() {}
+    let file = NetworkFile::from_run(&run, None).unwrap();
+    file.save(&out.join("valid.json")).unwrap();
+    let mut text = "a,b,force (N)\n".to_owned();
+    for row in 0..30 {
+        let (a, b) = ((0.31 * f64::from(row)).sin(), (0.17 * f64::from(row)).cos());
+        text += &format!("{a:.3},{b:.3},{:.3}\n", a + b * b);
+    }
+    fs::write(out.join("data.csv"), text).unwrap();
+    let plan = Plan {
+        import: Recipe {
+            data: "data.csv".into(),
+            inputs: vec!["a".to_owned(), "b".to_owned()],
+            targets: vec!["force".to_owned()],
+            ..Recipe::default()
+        },
+        ..Plan::default()
+    };
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    (settings.hidden, settings.training.stopping.epochs) = (2, 3);
+    let setup = Setup::recording(settings, plan);
+    let sets = setup.sets(out, &|| false, &mut |_| ()).unwrap().unwrap();
+    let mut run = sets.run(&setup, &|| false).unwrap().unwrap();
+    run.step();
+    CheckpointFile::from_run(&run, sets.recorded())
+        .unwrap()
+        .save(&out.join("recording.checkpoint"))
+        .unwrap();
+    while run.step().is_none() {}
+    NetworkFile::from_run(&run, sets.recorded())
+        .unwrap()
+        .save(&out.join("recording.json"))
+        .unwrap();
+    let runs = out.join("runs");
+    let _ = fs::remove_dir_all(&runs);
+    let (mut kept, _) = RunFolder::open(&runs).unwrap();
+    kept.keep(std::sync::Arc::new(file)).unwrap();
+    let id = kept.runs().runs[0].id;
+    kept.pin([Some(id), None]).unwrap();
+    fs::copy(runs.join(format!("run-{id}.name.json")), out.join("name.json")).unwrap();
+    fs::copy(runs.join("pinned.json"), out.join("pinned.json")).unwrap();
+}

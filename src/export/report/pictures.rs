@@ -96,7 +96,7 @@ fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) ->
         column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends)
     });
     let range = surface.range_of(&Vec::from_iter(ranges));
-    let sample = worst.worst_sample;
+    let sample = Some(worst.worst_sample).filter(|&sample| sample < test.samples())?;
     let values = |rows: ArrayView2<'_, f64>| rows.row(sample).to_vec();
     let surfaces = surface.surfaces(&values(targets), &values(answers.view()), range);
     let top = |surface: Surface| Surface {
