@@ -170,7 +170,7 @@ fn with_noise_newton_comes_close_to_the_reference() {
         settings.source.scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
-        let limit = run.baselines().unwrap().reference.unwrap().percent().unwrap();
+        let limit = run.baselines().unwrap().reference.as_ref().unwrap().percent().unwrap();
         for kind in [DecoderKind::Newton, DecoderKind::Polish] {
             let ratio = z_percent(&run, kind, Precision::Double) / limit;
             let most = if loading == Loading::RandomNodes { 1.1 } else { 1.4 };

@@ -108,6 +108,11 @@ fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
         .unwrap();
     let bits = |file: &NetworkFile| file.network.decouple(&sets.sets.test).mapv(f64::to_bits);
     assert_eq!(bits(&read), bits(&file));
+    let test = read.test_set().unwrap();
+    assert_eq!(
+        TestErrors::of_targets(&test, read.network.decouple(&test).view()),
+        read.scores.network
+    );
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("force", "farce", 1)).unwrap();
     let error = NetworkFile::load(&path).unwrap_err().to_string();
@@ -151,6 +156,8 @@ fn a_checkpoint_of_a_recording_resumes_with_the_same_bits_or_says_that_the_recor
     // Another digit of a sample.
     let data = folder.path().join("data.csv");
     fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
+    let error = whole.test_set().err().unwrap();
+    assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
     let error = read.resume().err().unwrap();
     assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
     assert!(error.to_string().contains("data.csv' has other samples"), "{error}");

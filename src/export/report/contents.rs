@@ -33,7 +33,7 @@ pub struct RunReport<'a> {
     pub flaw: Option<&'a RunFlaw>,
     /// Other decoders on its test set, as far as they were measured.
     pub decoders: &'a [DecoderReport],
-    /// Its test set: [`Run::test`](crate::evaluation::Run::test), or as [`Setup::sets`] draws or reads it again.
+    /// Its test set: [`Run::test`](crate::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
     pub test: &'a Dataset,
 }
 
