@@ -126,3 +126,60 @@ fn for_source(mut table: Table, is_array: bool) -> Table {
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+    use crate::{
+        dataset::{Dataset, Split},
+        decoupling::DecoderKind,
+        evaluation::{Measured, RunSets, RunSettings, measure_trade_off},
+        scene::RowModel,
+    };
+
+    #[test]
+    fn points_of_a_recording_have_no_columns_of_a_sensor_model() {
+        let set = |from: usize| {
+            let readings = Array2::from_shape_fn((40, 2), |(row, channel)| {
+                ((from + row) as f64 * [0.3, 0.7][channel]).sin()
+            });
+            let targets = Array2::from_shape_fn((40, 1), |(row, _)| readings[[row, 0]] * readings[[row, 1]]);
+            Dataset::new(readings, targets, None, (0..40).collect()).unwrap()
+        };
+        let split = Split {
+            training: set(0),
+            validation: None,
+        };
+        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        settings.training.stopping.epochs = 3;
+        let mut points = Vec::new();
+        let keep = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
+        let kinds = [DecoderKind::Ridge, DecoderKind::Network];
+        measure_trade_off(&settings, &RunSets::new(split, set(40)), &[2], &kinds, || false, keep).unwrap();
+        let level = TradeOffLevel { noise: None, points };
+        let fields = |table: &Table| Vec::from_iter(table.columns.iter().map(|column| column.field.clone()));
+        let summary = trade_off_summary(&level);
+        assert_eq!(
+            fields(&summary),
+            ["decoder", "percent_of_range", "frame_us", "training_s"]
+        );
+        assert_eq!(summary.columns[1].title(), "MAE (% of range)");
+        let table = trade_off_points(&[level]);
+        let expected = [
+            "decoder",
+            "precision",
+            "hidden",
+            "epochs",
+            "percent_of_range",
+            "frame_us",
+            "training_s",
+            "on_decoding_front",
+            "on_training_front",
+        ];
+        assert_eq!(fields(&table), expected);
+        assert_eq!(table.rows.len(), 3, "ridge, and the network in two precisions");
+        assert!(table.rows.iter().all(|row| row.len() == expected.len()));
+    }
+}
