@@ -90,7 +90,7 @@ impl RecipeFile {
         match document.source {
             RecipeSource::Recording(plan) => Ok(RecipeSource::Recording(plan.restored(folder_of(path)))),
             RecipeSource::Simulated(simulation) => {
-                check(simulation).map_err(|flaw| KIND.damaged(path, flaw))?;
+                check(simulation).map_err(|error| KIND.damaged(path, error))?;
                 Ok(RecipeSource::Simulated(simulation))
             }
         }
@@ -110,11 +110,11 @@ impl RecipeFile {
 
 /// Describes what is impossible in a simulation.
 fn check(source: Simulation) -> Result<(), String> {
-    source.sensor.check().map_err(|flaw| flaw.to_string())?;
-    source.scene.check().map_err(|flaw| flaw.to_string())?;
+    source.sensor.check().map_err(|error| error.to_string())?;
+    source.scene.check().map_err(|error| error.to_string())?;
     let settings = SimulatedSettings {
         source,
         ..SimulatedSettings::default()
     };
-    settings.check_counts().map_err(|flaw| flaw.to_string())
+    settings.check_counts().map_err(|error| error.to_string())
 }

@@ -13,9 +13,9 @@ pub(super) fn stored(path: &Path, folder: &Path) -> PathBuf {
 /// file.
 pub(super) fn restored(stored: &Path, folder: &Path) -> PathBuf {
     let path = normal(&folder.join(stored));
-    let beside = path.file_name().map(|name| folder.join(name));
-    match beside {
-        Some(beside) if !path.exists() && beside.exists() => beside,
+    let neighbour = path.file_name().map(|name| folder.join(name));
+    match neighbour {
+        Some(neighbour) if !path.exists() && neighbour.exists() => neighbour,
         _ => path,
     }
 }

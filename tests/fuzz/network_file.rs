@@ -50,7 +50,7 @@ fn what_is_accepted_answers_in_numbers_or_is_flagged() {
     for run in trained() {
         NetworkFile::from_run(&run, None).unwrap().save(&path).unwrap();
         let valid = fs::read(&path).unwrap();
-        for_each_seed(150, |rng| {
+        for_each_seed(300, |rng| {
             let Some(damaged) = resealed(&mutated(&valid, rng)) else {
                 return;
             };

@@ -21,7 +21,7 @@ impl Html {
         self.text += "</section>\n";
     }
 
-    /// Adds a table. Rows of this name, in the first or second column, stand out.
+    /// Adds a table. Rows with the name `own` in the first or second column are highlighted.
     pub fn table(&mut self, table: &Table, own: &str) {
         self.text += "<div class=\"scrolled\"><table>\n<thead><tr>";
         for column in &table.columns {

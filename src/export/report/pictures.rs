@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Largest number of targets of a recording with figures of their own.
-const MOST_TARGETS: usize = 8;
+const MAX_TARGETS: usize = 8;
 
 /// Captions and figures of a run: `answers` are those of its network to `test`.
 pub(super) fn pictures(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
@@ -60,7 +60,7 @@ fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure)
 
 /// Errors of the targets of a recording, of the first if there are many.
 fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
-    let targets = file.problem.targets.iter().enumerate().take(MOST_TARGETS);
+    let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
     let of_target = |(index, target): (usize, &Channel)| {
         let actual = test.targets();
         let pairs =
@@ -167,7 +167,7 @@ fn array_surfaces(
     };
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
     let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
-    // Nothing finer than a nanometre is told apart.
+    // Errors below a nanometre have no colour of their own.
     let largest_mm = errors_mm.fold(1e-6, f64::max);
     let place = rows.iter().position(|&row| row == worst.row)?;
     let caption = format!(
