@@ -29,7 +29,7 @@ mod window;
 
 use crate::figure::ticks;
 
-pub use shared::{Effect, Matter, Notice, Phase, Shared};
+pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
 pub use views::{
     Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, TradeOffEnding, TradeOffPlan, Views,
 };

@@ -6,23 +6,17 @@ use super::scene_words::{inputs_words, loading_words, movement_words, noise_word
 use crate::{
     app::{
         shared::{PLACES, RunList},
-        theme::Theme,
-        widgets::{Column, Row, fact_ui, fields::capitalised, note_ui, table_ui},
+        widgets::{TableColumn as Column, TableRow, TableView, fields::capitalised, note_ui},
     },
     evaluation::{Channel, Errors, Simulation, TargetErrors},
     export::{KeptRun, Table, TableColumn, format_duration, format_number},
     import::Plan,
 };
 
-const COLUMNS: [Column; 2] = [
-    Column {
-        heading: "A",
-        meaning: "The run chosen as A",
-    },
-    Column {
-        heading: "B",
-        meaning: "The run chosen as B",
-    },
+const COLUMNS: [Column<'_>; 3] = [
+    Column::text(""),
+    Column::figure("A").meaning("The run chosen as A"),
+    Column::figure("B").meaning("The run chosen as B"),
 ];
 
 const OTHER_SAMPLES: &str =
@@ -147,7 +141,7 @@ fn split_words(plan: &Plan) -> String {
     }
 }
 
-/// The same figures for other documents, under the names of the runs.
+/// The figures of both runs, under their names.
 pub fn compared_table(runs: &RunList) -> Table {
     let name = |place: usize| {
         let run = runs.pinned(place).map_or("", |run| &run.name);
@@ -164,27 +158,8 @@ pub fn compared_table(runs: &RunList) -> Table {
 
 /// Errors, configuration and cost of both runs.
 pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
-    let colour = Theme::of(ui).palette.text;
-    let cell = |words: Option<String>| words.unwrap_or_else(|| format_number(None));
-    let row = |(name, words): (&'static str, [Option<String>; 2])| Row {
-        name,
-        meaning: "",
-        cells: words.map(cell).into(),
-        colour,
-        is_strong: false,
-        mark: "",
-    };
-    let rows: Vec<Row> = figures(runs).map(row).collect();
     if are_other_samples(runs) {
         note_ui(ui, OTHER_SAMPLES);
     }
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
-    for (name, [a, b]) in target_figures(runs) {
-        fact_ui(
-            ui,
-            &name,
-            "",
-            &format!("{}: {}, {}: {}", PLACES[0], cell(a), PLACES[1], cell(b)),
-        );
-    }
+    TableView::new("compared", &COLUMNS).show_all(ui, TableRow::of_table(&compared_table(runs)));
 }

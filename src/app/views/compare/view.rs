@@ -36,7 +36,7 @@ impl View for CompareView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
-        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, self.snapshots()) {
+        if let Some(snapshot) = snapshot_ui(ui, "snapshot", self.snapshot, self.snapshots()) {
             self.show_snapshot(snapshot);
         }
     }

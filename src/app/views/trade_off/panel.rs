@@ -161,11 +161,11 @@ fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
     };
     ui.add_space(space(1));
     let (done, all) = outcome.points();
-    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32);
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
     let noise = outcome.levels.get(level.unwrap_or(0)).and_then(|level| level.noise);
     let noise = noise.map_or_else(String::new, |noise| format!(", at noise {}", noise_name(noise)));
-    dim_ui(ui, &format!("{done} of {all} points{noise}"));
+    let text = format!("{done} of {all} points{noise}");
+    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32, &text);
     if !trade.is_quiet(shared) {
         note_ui(
             ui,

@@ -1,28 +1,27 @@
 //! Sentences about splits and imports.
 
 use crate::{
-    app::widgets::fields::capitalised,
     dataset::SplitBy,
     import::{Cure, ImportError},
 };
 
-/// What a rule of division does to the errors.
-pub(super) fn flattery(by: SplitBy) -> &'static str {
+/// Returns a sentence on the bias of test errors by a rule of division.
+pub(super) fn bias(by: SplitBy) -> &'static str {
     match by {
-        SplitBy::Time => "The last part of the recording tests: nothing of its time was trained on.",
-        SplitBy::Group => "Whole groups test: nothing of their press or session was trained on.",
+        SplitBy::Time => "The last part of the recording is held out for testing.",
+        SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",
         SplitBy::Random => {
-            "A random split flatters where neighbouring rows are alike: the test has neighbours of what was trained. \
-             Compare with a split by group, or by time if there are no groups."
+            "A random split is optimistic when neighbouring rows are similar. Compare with a split by group, or by time \
+             if there are no groups."
         }
     }
 }
 
-/// An error of the import, with its cure in the fields of the window.
+/// Returns an error of the import, with its cure in terms of the window.
 pub(super) fn in_window(error: &ImportError) -> String {
     error.with_cure(|cure| match cure {
         Cure::CallMissing(text) => {
-            format!("correct it, or say under “Rows” that it means missing: \"{text}\"")
+            format!("correct it, or add it to the missing cells under “Filter”: \"{text}\"")
         }
         Cure::NameTimes => "make the columns of their times “time” in both".to_owned(),
         Cure::NameJoinedTime => "make the column of its times “time”".to_owned(),
@@ -30,22 +29,6 @@ pub(super) fn in_window(error: &ImportError) -> String {
         Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
         other => other.to_string(),
     })
-}
-
-/// The text with a full stop, and with a capital unless it begins with the name of a column or file.
-pub(super) fn sentence(text: &str) -> String {
-    const WORDS: [&str; 11] = [
-        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too", "twice",
-    ];
-    let first = text.split_whitespace().next().unwrap_or_default();
-    let mut sentence = text.to_owned();
-    if WORDS.contains(&first) {
-        sentence = capitalised(&sentence);
-    }
-    if !sentence.ends_with(['.', '!', '?']) {
-        sentence.push('.');
-    }
-    sentence
 }
 
 #[cfg(test)]
@@ -95,7 +78,7 @@ mod tests {
         ];
         for text in cases {
             assert!(
-                !text.contains("--") && (text.contains("“") || text.contains("“Rows”")),
+                !text.contains("--") && (text.contains("“") || text.contains("“Filter”")),
                 "{text}"
             );
         }
