@@ -19,6 +19,7 @@ mod error;
 mod format;
 mod gather;
 mod importing;
+mod input_lines;
 mod inputs;
 mod inspected;
 mod inspection;
@@ -51,7 +52,11 @@ pub use condition::Condition;
 pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
+<<<<<<< HEAD
 pub use format::Format;
+=======
+pub use input_lines::{InputLine, InputLineError, InputLines};
+>>>>>>> w-other
 pub use inputs::{InputColumns, InputError, InputTable};
 pub use inspected::InspectedFile;
 pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
