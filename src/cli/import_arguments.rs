@@ -321,7 +321,7 @@ impl ImportArguments {
                     let message = "--inputs: the recipe names the inputs; leave it out, or give --data";
                     return Err(Failure::Arguments(message.to_owned()));
                 }
-                RecipeFile::load(path)?
+                RecipeFile::load_recording(path)?
             }
             None => {
                 let mut plan = Plan {

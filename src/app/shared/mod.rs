@@ -3,6 +3,7 @@
 
 mod colour_scale;
 mod effect;
+mod error_table;
 mod export;
 mod file_in_use;
 mod file_task;
@@ -26,6 +27,7 @@ mod view;
 pub use super::training_worker::RunResult;
 pub use colour_scale::colour_scale_ui;
 pub use effect::Effect;
+pub use error_table::error_table_ui;
 pub use export::{
     Ask, Export, ExportGroup, copy_exports, csv_export, error_table_export, loss_export, picture_exports,
 };

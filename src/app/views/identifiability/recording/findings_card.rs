@@ -1,14 +1,14 @@
-use eframe::egui::{Grid, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{Ui, vec2};
 
 use super::{RecordingStudy, work::RecordingFindings};
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
         shared::{sentence, target_choice_ui},
-        theme::{Theme, semibold, space, type_size},
-        widgets::{dim_ui, note_ui, section_heading_ui},
+        theme::{Theme, space},
+        widgets::{TableCell, TableColumn, TableRow, TableView, dim_ui, note_ui, section_heading_ui},
     },
-    evaluation::recorded::FittedModel,
+    evaluation::{Channel, recorded::FittedModel},
     export::{describe_target, describe_warnings, format_duration, format_number},
     figure::{PlotFigure, learning_curve_figure},
 };
@@ -68,33 +68,25 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
         ),
     );
     let palette = Theme::of(ui).palette;
-    ScrollArea::horizontal().id_salt("channels").show(ui, |ui| {
-        Grid::new("worth of the channels")
-            .spacing(vec2(space(5), space(1)))
-            .show(ui, |ui| {
-                let heading = |text: &str| RichText::new(text).font(semibold(type_size().note)).color(palette.dim);
-                ui.label(heading("channel"));
-                for target in &found.targets {
-                    ui.label(heading(&target.title()));
-                }
-                ui.end_row();
-                for channel in &found.findings.importance {
-                    let colour = if channel.is_dispensable() {
-                        palette.dim
-                    } else {
-                        palette.text
-                    };
-                    let cell = |text: &str| RichText::new(text).size(type_size().note).color(colour);
-                    ui.label(cell(&found.inputs[channel.channel].title()));
-                    for growth in &channel.growth {
-                        ui.label(cell(
-                            &growth.map_or_else(|| format_number(None), |growth| growth.to_string()),
-                        ));
-                    }
-                    ui.end_row();
-                }
-            });
+    let titles: Vec<String> = found.targets.iter().map(Channel::title).collect();
+    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text("channel"))
+        .chain(titles.iter().map(|title| TableColumn::figure(title)))
+        .collect();
+    let rows = found.findings.importance.iter().map(|channel| {
+        let colour = if channel.is_dispensable() {
+            palette.dim
+        } else {
+            palette.text
+        };
+        let name = found.inputs[channel.channel].title();
+        let growth = channel.growth.iter().map(|growth| match growth {
+            Some(growth) => growth.to_string(),
+            None => format_number(None),
+        });
+        let cells = std::iter::once(name.clone()).chain(growth).map(TableCell::new);
+        TableRow::new(cells).named(name).colour(colour)
     });
+    TableView::new("channels", &columns).show_all(ui, rows.collect());
 }
 
 /// The learning curve of a target, and the gain from more samples in words.

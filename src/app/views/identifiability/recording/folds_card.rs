@@ -1,13 +1,10 @@
-use eframe::egui::{Grid, RichText, Ui, vec2};
+use eframe::egui::{RichText, Ui};
 
 use super::work::FoldsResult;
-use crate::{
-    app::{
-        shared::sentence,
-        theme::{Theme, semibold, space, type_size},
-        widgets::{dim_ui, section_heading_ui},
-    },
-    export::error_table,
+use crate::app::{
+    shared::{error_table_ui, sentence},
+    theme::{space, type_size},
+    widgets::{dim_ui, section_heading_ui},
 };
 
 /// Held-out errors of the cross-validation, and its remarks.
@@ -20,23 +17,7 @@ pub fn folds_ui(ui: &mut Ui, validated: &FoldsResult) {
             validated.samples, validated.folds
         ),
     );
-    let table = error_table(&validated.table);
-    let palette = Theme::of(ui).palette;
-    Grid::new("held-out errors")
-        .spacing(vec2(space(4), space(1)))
-        .show(ui, |ui| {
-            for column in &table.columns {
-                let heading = RichText::new(column.title()).font(semibold(type_size().note));
-                ui.label(heading.color(palette.dim));
-            }
-            ui.end_row();
-            for row in &table.rows {
-                for cell in row {
-                    ui.label(RichText::new(cell.rounded()).size(type_size().note));
-                }
-                ui.end_row();
-            }
-        });
+    error_table_ui(ui, &validated.table);
     ui.add_space(space(1));
     for remark in &validated.remarks {
         ui.label(RichText::new(sentence(remark)).size(type_size().note));
