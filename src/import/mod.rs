@@ -52,11 +52,8 @@ pub use condition::Condition;
 pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
-<<<<<<< HEAD
 pub use format::Format;
-=======
 pub use input_lines::{InputLine, InputLineError, InputLines};
->>>>>>> w-other
 pub use inputs::{InputColumns, InputError, InputTable};
 pub use inspected::InspectedFile;
 pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
