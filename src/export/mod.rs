@@ -41,7 +41,9 @@ pub use crate::evaluation::format::{format_duration, format_number, format_perce
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};
-pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
+pub use experiment_tables::{
+    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, trials_table, write_experiment_markdown,
+};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::NetworkFile;
 pub use recipe_file::RecipeFile;
