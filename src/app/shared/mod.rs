@@ -30,14 +30,14 @@ pub use export::{
 pub use file_in_use::{FileInUse, refuse_in_use};
 pub use file_task::{Contents, FileTask, FileWords, Purpose};
 pub use look::{Look, RightCard};
-pub use network_exports::{NetworkSource, file_stem, network_exports, own_network_exports};
+pub use network_exports::{NetworkSource, file_stem, network_exports};
 pub use notice::{Matter, Notice};
 pub use offers::{Action, Offers};
 pub use opening::opening_settings;
 pub use run_buttons::{RunWish, run_buttons_ui};
 pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;
-pub use state::{Phase, Preview, Shared};
+pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind};
 pub use surfaces::{follow_surface, view_mode_ui};
 pub use training_form::{method_choice_ui, method_settings_ui, stopping_ui};
 pub use training_status::phase_in_words;

@@ -51,21 +51,22 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     let (Some(latest), Some(result)) = (run.latest(), &run.result) else {
         return Vec::new();
     };
-    let (epochs, epochs_run) = (run.settings.training.stopping.epochs, result.epochs_run);
+    let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
     let mut parts = vec![
         format!("Epoch {epochs_run} of {epochs}"),
-        format!("z error {}", format_percent(result.errors.z_percent)),
+        format!("z error {}", format_percent(result.errors.percent())),
         format!("mse {}", format_number(latest.training_mse)),
         format!(
             "{} {}",
-            run.settings.training.method.parameter_name(),
+            run.settings().training.method.parameter_name(),
             format_number(latest.parameter)
         ),
     ];
-    if run.settings.starts > 1 && phase.is_busy() {
+    if run.settings().starts > 1 && phase.is_busy() {
         parts.push(format!(
             "{} of {} starts ended",
-            result.starts_ended, run.settings.starts
+            result.starts_ended,
+            run.settings().starts
         ));
     }
     if let Some(time) = result.wall_time
@@ -92,7 +93,7 @@ fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
 fn progress_bar_ui(ui: &mut Ui, run: &RunView) {
     let palette = Theme::of(ui).palette;
     let share = run.result.as_ref().map_or(0.0, |result| {
-        result.epochs_run as f32 / run.settings.training.stopping.epochs as f32
+        result.epochs_run as f32 / run.settings().training.stopping.epochs as f32
     });
     let (rect, response) = ui.allocate_exact_size(Vec2::new(space(40), space(1)), Sense::hover());
     let radius = 0.5 * space(1);

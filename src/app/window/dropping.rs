@@ -47,7 +47,7 @@ impl DecouplerWindow {
             StrokeKind::Inside,
         );
         let font = FontId::proportional(type_size().title);
-        let text = "Drop to open in the Own data view";
+        let text = "Drop to open as a recording";
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
     }
 }

@@ -78,6 +78,8 @@ impl DecouplerWindow {
         let Some(memory) = &mut self.memory else { return };
         self.remembered.view = Some(self.names[self.shown].1.to_owned());
         self.remembered.draft = Some(self.shared.draft);
+        self.remembered.source = Some(self.shared.source);
+        self.remembered.recording = Some(self.shared.recording.settings);
         let (is_usual_size, is_held) = self.ctx.input(|input| {
             let viewport = input.viewport();
             let is_unusual = [viewport.maximized, viewport.fullscreen, viewport.minimized].contains(&Some(true));

@@ -6,7 +6,8 @@ use std::{
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
 use crate::{
-    evaluation::{SimulatedSettings, Workload},
+    app::shared::SourceKind,
+    evaluation::{RunSettings, SimulatedSettings, Workload},
     export::{WriteError, atomic_write},
     figure::SequentialMap,
 };
@@ -38,6 +39,12 @@ pub(super) struct Remembered {
     /// The settings of the next training.
     #[serde(deserialize_with = "if_readable")]
     pub(super) draft: Option<SimulatedSettings>,
+    /// Source of the next training.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) source: Option<SourceKind>,
+    /// Settings of the next training on a recording.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) recording: Option<RunSettings>,
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,

@@ -50,9 +50,13 @@ pub struct Compared {
     pub frames: [Frame; 3],
 }
 
+/// Reason for which a run on a recording has no surfaces here.
+const NO_SURFACES: &str = "Surfaces of recordings are shown in the Train view.";
+
 impl Compared {
     fn new(file: &NetworkFile) -> Result<Self, String> {
-        let test = TestView::draw(&file.settings).map_err(|error| error.to_string())?;
+        let settings = file.settings.simulated().ok_or(NO_SURFACES)?;
+        let test = TestView::draw(&settings).map_err(|error| error.to_string())?;
         let decoupled_mm = Arc::new(file.network.decouple(&test.set));
         let mut compared = Self {
             test,

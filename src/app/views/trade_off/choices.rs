@@ -65,7 +65,7 @@ fn answer_ui(
     let text = format!(
         "{}: {}, {}",
         point_name(point),
-        format_percent(point.report.errors.z_percent),
+        format_percent(point.report.errors.percent()),
         frame_time(point.report.cost.frame_us)
     );
     let accent = Theme::of(ui).palette.accent;
@@ -100,8 +100,13 @@ fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
         });
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
-    let samples = counted(point.settings.source.samples, "training sample");
     let epochs = counted(point.settings.training.stopping.epochs, "epoch");
-    dim_ui(ui, &format!("{samples}, at most {epochs}."));
+    match point.settings.source.simulation() {
+        Some(array) => dim_ui(
+            ui,
+            &format!("{}, at most {epochs}.", counted(array.samples, "training sample")),
+        ),
+        None => dim_ui(ui, &format!("At most {epochs}.")),
+    };
     is_loaded
 }

@@ -121,7 +121,7 @@ impl TradeOffView {
     /// Makes room for the points of `plan`.
     fn begin(&mut self, plan: TradeOffPlan) {
         let level = |&noise: &f64| TradeOffLevel {
-            noise,
+            noise: Some(noise),
             points: Vec::new(),
         };
         self.look.level = self.look.level.min(plan.noises.len() - 1);

@@ -37,7 +37,7 @@ impl Figure {
 
     fn text(self, point: &TradeOffPoint) -> String {
         match self {
-            Self::Error => format_number(point.report.errors.z_percent),
+            Self::Error => format_number(point.report.errors.percent()),
             Self::ToLimit => format_number(point.to_reference()),
             Self::Frame => frame_time(point.report.cost.frame_us),
             Self::Training => training_time(point.training_seconds),

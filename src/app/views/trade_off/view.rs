@@ -133,7 +133,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
         });
     });
     ui.allocate_rect(whole, Sense::hover());
-    let settings = loaded.and_then(|point| Some(level.points.get(point)?.settings));
+    let settings = loaded.and_then(|point| level.points.get(point)?.settings.simulated());
     trade.look = look;
     if let Some(settings) = settings {
         effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);

@@ -5,7 +5,7 @@ use super::TradeOffPlan;
 use crate::evaluation::TradeOffPoint;
 use crate::{
     app::job::{Job, Report},
-    evaluation::{RunError, measure_trade_off},
+    evaluation::{RunError, Workload, measure_trade_off},
 };
 
 /// News of the measurement begun last.
@@ -33,14 +33,28 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
     for (level, &noise) in plan.noises.iter().enumerate() {
         for &preset in &plan.presets {
             let settings = plan.settings(preset, noise);
+            let is_cancelled = || report.is_cancelled();
+            Workload::of_trade_off(&settings, &plan.hidden, &plan.decoders)?.check_memory()?;
+            let Some(sets) = settings.checked_sets_unless(&is_cancelled)? else {
+                return Ok(());
+            };
+            let mut refused = Ok(());
             let is_whole = measure_trade_off(
-                preset,
-                &settings,
+                &settings.into(),
+                &sets,
                 &plan.hidden,
                 &plan.decoders,
-                || report.is_cancelled(),
-                |point| report.send(TradeOffEvent::Measured(level, Box::new(point))),
+                is_cancelled,
+                |_, point| match point {
+                    Ok(point) => {
+                        let preset = Some(preset);
+                        let point = Box::new(TradeOffPoint { preset, ..point });
+                        report.send(TradeOffEvent::Measured(level, point));
+                    }
+                    Err(error) => refused = Err(error),
+                },
             )?;
+            refused?;
             if !is_whole {
                 return Ok(());
             }

@@ -57,7 +57,7 @@ impl Drawn {
     pub(super) fn follow(&mut self, shared: &Shared, result: Option<&RunResult>, snapshot: usize) -> usize {
         let Some(test) = shared.test() else { return snapshot };
         let snapshot = test.nearest_snapshot(snapshot);
-        let decoupled_mm = result.map(|result| &result.decoupled_mm);
+        let decoupled_mm = result.map(|result| &result.answers);
         let is_same = self.of.as_ref().is_some_and(|of| of.is(test, decoupled_mm));
         if is_same && self.snapshot == snapshot {
             return snapshot;
@@ -79,7 +79,7 @@ impl Drawn {
         let actual = actual.unwrap_or_else(|| test.frame(test.set.targets(), snapshot));
         let decoupled = result.map(|result| match &result.frame {
             Some((of, frame)) if *of == snapshot => frame.clone(),
-            _ => test.frame(result.decoupled_mm.view(), snapshot),
+            _ => test.frame(result.answers.view(), snapshot),
         });
         self.frames = Frames {
             decoupled: decoupled.map(|decoupled| {

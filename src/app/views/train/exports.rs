@@ -6,8 +6,8 @@ use crate::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
         RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
     },
-    evaluation::{DecoderReport, error_rows},
-    export::{CheckpointFile, decoder_table, error_table},
+    evaluation::{DecoderReport, TestErrors},
+    export::{decoder_table, error_table},
     figure::{Figure, surface::ViewMode},
 };
 
@@ -27,18 +27,21 @@ const OPENED: FileWords = FileWords {
 
 /// Task of saving the checkpoint of `run`.
 pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
-    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.settings), run.id, |run| {
-        let file = CheckpointFile::from_run(run).map_err(|error| error.to_string())?;
+    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.setup), run.id, |run| {
+        let file = run.checkpoint_file()?;
         Ok(Contents::new(move |path| file.save(path)))
     })
 }
 
 /// Task of opening a checkpoint.
 pub(super) fn open_task(shared: &Shared) -> FileTask {
-    let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
+    let setup = shared
+        .run
+        .as_ref()
+        .map_or_else(|| shared.draft.into(), |run| run.setup.clone());
     FileTask {
         words: OPENED,
-        suggestion: OPENED.file_name(&file_stem("training", settings)),
+        suggestion: OPENED.file_name(&file_stem("training", &setup)),
         purpose: Purpose::Open,
     }
 }
@@ -50,7 +53,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     let run = shown.clone().map(|(run, _)| run);
     let stem = |what: &str| {
         run.as_ref()
-            .map_or_else(|_| String::new(), |run| file_stem(what, &run.settings))
+            .map_or_else(|_| String::new(), |run| file_stem(what, &run.setup))
     };
     let mut exports = networks(view, &shown);
     let what = match shared.look.mode {
@@ -66,7 +69,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
     let errors = shown.clone().map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
-        move || error_table(&error_rows(&result.errors, &run.baselines, run.published.as_ref()))
+        move || error_table(&run.error_table(result))
     });
     let of_epoch = view.scrub.result().map(|past| format!("-epoch{}", past.epochs_run));
     let of_errors = stem("errors") + &of_epoch.unwrap_or_default();
@@ -78,7 +81,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         if reports.is_empty() {
             return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
-        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref()))
+        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref().and_then(TestErrors::nodes)))
     });
     exports.extend(copy_exports("Decoder table", decoders));
     let standing = run.and_then(|run| match shared.phase {
@@ -100,7 +103,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
 fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
     let source = shown
         .as_ref()
-        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.settings)));
+        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
     let mut exports = network_exports("", &source.map_err(String::clone), move || measured(view));
     let Ok((run, latest)) = shown else { return exports };
     let in_group = |group: ExportGroup| {
@@ -116,7 +119,7 @@ fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult)
         .map(in_group(ExportGroup::BestNetwork(latest.best_epoch)))
         .collect();
     if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
-        let source = NetworkSource::Past(run.id, Box::new(run.settings), epoch, run.past.clone());
+        let source = NetworkSource::Past(run.id, Box::new(run.setup.clone()), epoch, run.past.clone());
         // The decoders were measured beside the best network.
         let past = network_exports("", &Ok(source), Vec::new).into_iter();
         let past = past

@@ -17,6 +17,7 @@ use crate::{
         shared::{Effect, Look, RightCard, RunResult, RunView, Shared},
     },
     evaluation::NodeAddress,
+    import::Setup,
     training::StopReason,
 };
 
@@ -123,7 +124,7 @@ impl TrainView {
         }
         let is_complete = |run: &RunView| {
             let was_stopped = run.stop_reason == Some(StopReason::Stopped);
-            run.asked == settings && run.stop_reason.is_some() && !was_stopped
+            run.asked == Setup::from(settings) && run.stop_reason.is_some() && !was_stopped
         };
         if !shared.run.as_ref().is_some_and(is_complete) {
             effects.push(Effect::Train);

@@ -148,7 +148,7 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
         Phase::Preparing => Some(training("its samples are being drawn".to_owned(), None)),
         Phase::Training | Phase::Paused => {
             let run = run.filter(|run| !run.is_saved)?;
-            let epochs = run.settings.training.stopping.epochs;
+            let epochs = run.settings().training.stopping.epochs;
             let epoch = run.latest().map_or(0, |latest| latest.epoch);
             Some(training(
                 format!("epoch {epoch} of {epochs}"),

@@ -94,8 +94,8 @@ pub fn configuration_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>)
 /// Returns the outlook of the scene of the draft, where it is known.
 fn outlook(shared: &Shared) -> Option<&Outlook> {
     let (settings, test) = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => (&preview.settings, &preview.test),
-        (None, Some(run)) => (&run.settings, &run.test),
+        (Some(preview), _) => (preview.settings, &preview.test),
+        (None, Some(run)) => (run.simulated()?, run.test.array()?),
         (None, None) => return None,
     };
     let is_same =

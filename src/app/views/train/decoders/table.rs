@@ -112,10 +112,11 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
 
 /// In the order of [`COLUMNS`], without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
-    let ratio = limit.map(|limit| report.errors.times(limit));
-    let figures = [Some(report.errors.z_percent)].into_iter().chain([
+    let nodes = report.errors.nodes();
+    let ratio = limit.map(|limit| nodes.and_then(|errors| errors.times(limit)));
+    let figures = [Some(report.errors.percent())].into_iter().chain([
         ratio,
-        Some(Some(report.residual)),
+        nodes.map(|_| report.residual),
         Some(Some(report.cost.frame_us)),
     ]);
     figures.flatten().map(format_number).collect()

@@ -171,7 +171,7 @@ impl PressState {
         match shared.shown_run().zip(result) {
             Some((run, result)) => Some(Subject {
                 networks: Arc::clone(&result.networks),
-                settings: run.settings,
+                settings: run.simulated()?,
                 is_ready_made: false,
                 is_standing: result.is_standing,
             }),

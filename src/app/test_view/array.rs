@@ -11,6 +11,7 @@ use crate::{
         SequentialMap,
         surface::{Quantity, Surface, ViewMode},
     },
+    import::SetupError,
     scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
@@ -190,15 +191,15 @@ fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
 }
 
 /// Reasons for which there is nothing to draw.
-#[derive(Clone, Debug, PartialEq, Error)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TestViewError {
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A run on measured samples.
-    #[error("measured samples have no surface to show")]
-    Measured,
+    /// The samples cannot be read or drawn.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
     /// No surface can be laid through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
