@@ -3,22 +3,25 @@
 use eframe::egui::Ui;
 
 use super::{ExperimentLook, Outcome, open_cell::open_cell};
-use crate::app::{
-    shared::{Effect, Shared},
-    theme::Theme,
-    widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::Theme,
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
+    },
+    export::ExperimentColumnKind,
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
 pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, shared: &Shared, effects: &mut Vec<Effect>) {
     let palette = &Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
-    let headings = &outcome.table.headings;
+    let headings = &outcome.table.columns;
     let columns: Vec<TableColumn<'_>> = headings
         .iter()
         .enumerate()
-        .map(|(column, heading)| TableColumn {
-            heading,
+        .map(|(column, of_table)| TableColumn {
+            heading: of_table.heading,
             is_figure: column >= axes,
             width: ColumnWidth::of_longest(outcome.table.rows.iter().map(|row| row[column].as_str())),
         })
@@ -31,26 +34,31 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
         let texts = &outcome.table.rows[number];
         let name = texts[..axes].join(", ");
         let loses = loses_to_linear_map(outcome, number);
-        let cells = headings.iter().zip(texts).enumerate().map(|(column, (heading, text))| {
-            let is_median = heading.starts_with("Z") && heading.ends_with("median");
-            let is_beaten = loses && heading.starts_with("linear");
-            TableCell {
-                text: text.clone(),
-                colour: match *heading {
-                    _ if is_median => palette.accent,
-                    heading if heading.ends_with("publ.") => palette.dim,
-                    _ if is_beaten => palette.warning,
-                    _ => palette.text,
-                },
-                is_strong: is_median || column < axes,
-                label: (column >= axes).then(|| format!("{name}, {heading}: {text}")),
-                meaning: if is_beaten {
-                    "The linear map is more accurate here than the network."
-                } else {
-                    ""
-                },
-            }
-        });
+        let cells = headings
+            .iter()
+            .zip(texts)
+            .enumerate()
+            .map(|(column, (of_table, text))| {
+                let heading = of_table.heading;
+                let is_median = of_table.kind == ExperimentColumnKind::Ranking;
+                let is_beaten = loses && of_table.kind == ExperimentColumnKind::Linear;
+                TableCell {
+                    text: text.clone(),
+                    colour: match of_table.kind {
+                        ExperimentColumnKind::Ranking => palette.accent,
+                        ExperimentColumnKind::Published => palette.dim,
+                        _ if is_beaten => palette.warning,
+                        _ => palette.text,
+                    },
+                    is_strong: is_median || column < axes,
+                    label: (column >= axes).then(|| format!("{name}, {heading}: {text}")),
+                    meaning: if is_beaten {
+                        "The linear baseline is more accurate here than the network."
+                    } else {
+                        ""
+                    },
+                }
+            });
         TableRow {
             label: format!("Cell {name}"),
             is_marked: look.marked == Some(number),
@@ -72,6 +80,6 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
 
 fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {
     let summary = &outcome.summaries[cell];
-    let both = summary.z_percent.median.zip(summary.linear_z_percent);
+    let both = summary.percent.median.zip(summary.linear_percent);
     both.is_some_and(|(network, linear)| network > linear)
 }
