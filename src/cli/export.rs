@@ -1,7 +1,4 @@
-use std::{
-    io::{Write, stderr},
-    path::PathBuf,
-};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -10,8 +7,8 @@ use super::{
     failure::Failure,
 };
 use crate::export::{
-    DocumentError, MeasuredNetworkFile, NetworkFile,
-    bundle::{BundleFormat, BundlePrecision, ExportedNetwork, export_bundle},
+    NetworkFile,
+    bundle::{BundleFormat, BundlePrecision, export_bundle},
     is_same,
 };
 
@@ -57,21 +54,8 @@ impl Export {
             let message = "--network and --out name the same file: give --out another name";
             return Err(Failure::Arguments(message.to_owned()));
         }
-        match MeasuredNetworkFile::load(&self.network) {
-            // It is of another kind.
-            Err(DocumentError::Other { .. }) => {}
-            file => return self.export(&file?),
-        }
         let file = NetworkFile::load(&self.network)?;
-        if let Some(warning) = file.old_version_warning() {
-            // Nobody is left to tell if this fails.
-            let _ = writeln!(stderr(), "warning: '{}': {warning}", self.network.display());
-        }
-        self.export(&file)
-    }
-
-    fn export<'a>(&self, network: impl Into<ExportedNetwork<'a>>) -> Result<(), Failure> {
-        let report = export_bundle(network, self.format, self.precision, &self.out)?;
+        let report = export_bundle(&file, self.format, self.precision, &self.out)?;
         if self.json {
             print_json(&report)
         } else {

@@ -8,9 +8,10 @@ use clap::{
 use super::{
     failure::Failure,
     findings_report::Report,
-    import_arguments::{ImportArguments, with_bar, working_folder},
+    import_arguments::ImportArguments,
     output::progress_bar,
     parsers::{count, seed},
+    samples::{with_bar, working_folder},
 };
 use crate::{
     dataset::Seed,
@@ -62,7 +63,7 @@ impl StudyArguments {
             return Err(Failure::Arguments(message.to_owned()));
         }
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
-        import.save_recipe(&plan)?;
+        import.save_recipe(Some(&plan))?;
         let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
         settings.hidden = self.hidden.unwrap_or(settings.hidden);
         settings.seed = self.seed.map_or(settings.seed, Seed);

@@ -4,9 +4,8 @@ use serde::Serialize;
 
 use super::{
     failure::Failure,
-    measured_files::{FileFound, files, write_files},
-    measured_table::write_warnings,
     output::{print, print_object},
+    recording_report::{FileFound, files, write_files, write_warnings},
 };
 use crate::{
     evaluation::Channel,

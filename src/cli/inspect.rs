@@ -9,9 +9,10 @@ use serde::Serialize;
 use super::{
     failure::Failure,
     findings::StudyArguments,
-    import_arguments::{ImportArguments, with_bar},
-    measured_files::format_words,
+    import_arguments::ImportArguments,
     output::{print, print_object},
+    recording_report::format_words,
+    samples::with_bar,
 };
 use crate::{
     export::format_number,

@@ -9,7 +9,7 @@ use crate::{
 const WIDTH: usize = 64;
 
 /// Writes the spread of the results of several starts: a table, and a box plot of Z % above a strip of the starts.
-pub(super) fn write_starts(starts: &[StartRecord], out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write_starts(starts: &[StartRecord], out: &mut dyn Write) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if held_out { "validation mse" } else { "training mse" };

@@ -1,4 +1,4 @@
-//! Networks of own data, exported in the terminal under the names and units of their columns.
+//! Networks of recordings, exported in the terminal under the names and units of their columns.
 
 use std::{fs, path::Path};
 
@@ -28,7 +28,7 @@ fn trained(rows: &str) -> TempDir {
     }
     fs::write(folder.path().join("own.csv"), text).unwrap();
     // A recipe, because the terminal of a test splits arguments at spaces.
-    let recipe = r#"{"format": "decoupler import", "version": 1, "program": "a test", "plan": {"import": {"data": "own.csv",
+    let recipe = r#"{"format": "decoupler recipe", "version": 1, "program": "a test", "plan": {"import": {"data": "own.csv",
         "inputs": ["hall, a", "b */ x", "c"], "targets": ["force", "torque"], "row_wire": "row"}}}"#;
     fs::write(folder.path().join("recipe.json"), recipe).unwrap();
     let arguments = format!("train --recipe recipe.json {rows} --hidden 4 --epochs 20 --out n.json --json");

@@ -248,7 +248,7 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
 
     // Faster than the worker draws the other array.
     assert!(driver.comes_to_rest());
-    let run = driver.state().run.as_ref().unwrap().settings;
+    let run = driver.state().run.as_ref().unwrap().simulated().unwrap();
     let mut other = run;
     other.source.sensor.scale = ArrayScale::PRESETS[1];
     driver.window_mut().apply(Effect::Configure(Box::new(other)));

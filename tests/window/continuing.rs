@@ -168,7 +168,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
     save(&mut driver, "Network file, JSON", &network);
     let mut whole = stepped(momentum(1_000_000), driver.epochs());
     whole.stop();
-    let mut expected = NetworkFile::from_run(&whole).unwrap();
+    let mut expected = NetworkFile::from_run(&whole, None).unwrap();
     let found = NetworkFile::load(&network).unwrap();
     // Only the time it took differs.
     expected.training.seconds = found.training.seconds;
@@ -189,7 +189,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     let folder = tempfile::tempdir().unwrap();
     let [terminal, window] = ["terminal", "window"].map(|name| folder.path().join(name));
     let settings = SimulatedSettings { starts: 3, ..small() };
-    CheckpointFile::from_run(&stepped(settings, 7))
+    CheckpointFile::from_run(&stepped(settings, 7), None)
         .unwrap()
         .save(&terminal)
         .unwrap();
@@ -208,7 +208,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     while run.step().is_none() {}
     assert_eq!(run.starts(), whole.starts());
     // One that has ended opens as ended, and can be given more epochs.
-    CheckpointFile::from_run(&run).unwrap().save(&terminal).unwrap();
+    CheckpointFile::from_run(&run, None).unwrap().save(&terminal).unwrap();
     give_path(&mut driver, OPEN, &terminal);
     driver.wait("the ended training", |driver| {
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
@@ -221,7 +221,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
 fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
-    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6)).unwrap();
+    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6), None).unwrap();
     for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();
@@ -247,7 +247,7 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
     driver.configure_small();
     driver.train();
     let (table, phase, draft) = (driver.table(), driver.state().phase, driver.state().draft);
-    CheckpointFile::from_run(&stepped(momentum(50), 3))
+    CheckpointFile::from_run(&stepped(momentum(50), 3), None)
         .unwrap()
         .save(&path)
         .unwrap();

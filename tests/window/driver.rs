@@ -9,7 +9,7 @@ use std::{
 };
 
 use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, Views, WindowFile};
-use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
+use decoupler::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
 use egui_kittest::{
@@ -505,10 +505,10 @@ pub(crate) fn trained(settings: SimulatedSettings) -> Run {
 /// The error table that the library gives for `run`, in the window's words.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
-    let rows = error_rows(&run.node_scores().unwrap().network, run.baselines().unwrap(), None);
-    let cells = rows.iter().flat_map(|row| {
-        let named = columns.iter().zip(row.values());
-        named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(value)))
+    let table = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
+    let cells = table.blocks[0].rows.iter().flat_map(|row| {
+        let named = columns.iter().zip(&row.errors);
+        named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(*value)))
     });
     cells.collect()
 }

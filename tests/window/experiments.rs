@@ -100,7 +100,7 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     assert_eq!(driver.state().draft, experiment.cells()[1].settings);
     assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
     let z = results.cells[1].trials[0].errors.z_percent;
-    let shown = driver.state().result().unwrap().errors.z_percent;
+    let shown = driver.state().result().unwrap().errors.percent();
     assert_eq!(shown.map(f64::to_bits), z.map(f64::to_bits), "it is the cell's network");
 }
 

@@ -38,7 +38,7 @@ fn a_saved_network_gives_the_same_outputs_bit_by_bit() {
     assert_eq!(names(folder.path()), ["network.json"]);
     let file = NetworkFile::load(&path).unwrap();
     let run = trained(small());
-    assert_eq!(file.settings, small());
+    assert_eq!(file.settings, small().into());
     let bits = |network: &Networks| network.decouple(run.test()).mapv(f64::to_bits);
     assert_eq!(bits(&file.network), bits(&run.network()));
     driver.click("Dismiss");
@@ -240,7 +240,7 @@ fn tables_are_copied_as_they_are_shown() {
         let (percent, mm) = (cell("Z %"), cell("mm"));
         match form {
             "tab-separated" => {
-                let error = driver.state().result().unwrap().errors;
+                let error = *driver.state().result().unwrap().errors.nodes().unwrap();
                 let cells: Vec<&str> = line.split('\t').collect();
                 assert_eq!(cells[1].parse(), Ok(error.z_percent.unwrap()));
                 assert_eq!(cells[4].parse(), Ok(error.z_mm));
@@ -312,7 +312,7 @@ fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
     driver.save("A: Network file, JSON", &network);
     driver.click("Dismiss");
     driver.save("A: Report, HTML", &of_kept);
-    assert_eq!(NetworkFile::load(&network).unwrap().settings, small());
+    assert_eq!(NetworkFile::load(&network).unwrap().settings, small().into());
     assert!(fs::read_to_string(of_kept).unwrap().contains(&format!("<h1>{name}: ")));
 }
 
@@ -353,14 +353,14 @@ fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
     let stopped = trained(stopped);
     let file = NetworkFile::load(&past).unwrap();
     assert_eq!(file.network, stopped.network());
-    assert_eq!(file.errors, stopped.node_scores().unwrap().network);
+    assert_eq!(file.scores, stopped.scores().unwrap());
     assert_eq!(file.training.best_epoch, stopped.leader().best_epoch());
     assert_eq!(file.training.history, stopped.leader().history());
     assert_eq!(file.training.stages, stopped.leader().stages());
-    assert_eq!(file.settings, small());
+    assert_eq!(file.settings, small().into());
     assert_eq!(NetworkFile::load(&best).unwrap().network, trained(small()).network());
     let table = fs::read_to_string(&errors).unwrap();
-    let z_percent = file.errors.z_percent.unwrap().to_string();
+    let z_percent = file.scores.network.percent().unwrap().to_string();
     assert!(
         table.contains(&z_percent),
         "the table of the network on show, {z_percent}: {table}"
