@@ -64,7 +64,7 @@ pub(crate) use sweep::sweep_specification;
 #[cfg(feature = "cli")]
 pub(crate) use sweep::{
     PlanAxis, SweepFolderError, SweepPlan, SweepTableFormat, Trial, TrialId, TrialOptions, decoders_in_order,
-    train_options,
+    recording_options, train_options,
 };
 #[cfg(feature = "gui")]
 pub(crate) use sweep::{SweepFiles, SweepRow};

@@ -55,6 +55,8 @@ pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::{PositionsError, holds_positions};
 pub use read::read_table;
 pub use recipe::{Joined, Recipe};
+#[cfg(feature = "cli")]
+pub(crate) use recorded::relative_path;
 pub use recorded::{FileChecksum, Recorded, file_crc32};
 pub use recording::{Dropped, FileReport, JoinReport, Recording};
 pub use setup::{Recordings, Setup, SetupError, SetupSets};

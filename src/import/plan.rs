@@ -149,6 +149,12 @@ impl Plan {
         self.with_paths(|path| folder.join(path))
     }
 
+    /// This plan with the names of its files in the place of their paths.
+    #[must_use]
+    pub fn named(&self) -> Self {
+        self.with_paths(|path| path.file_name().map_or_else(|| path.clone(), PathBuf::from))
+    }
+
     pub(super) fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {
         let mut plan = self.clone();
         plan.import.data = of(&plan.import.data);

@@ -59,8 +59,7 @@ impl Recorded {
     /// that the folder is not in, so that no file names the home of its author.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        self.with_paths(|path| relative(path, &folder, std::env::home_dir().as_deref()))
+        self.with_paths(|path| relative_path(path, folder))
     }
 
     /// Returns it with the paths of a file in `folder`: a recording that is missing where it was may lie next to the file.
@@ -123,6 +122,12 @@ fn samples_crc32(sets: [&Dataset; 2]) -> String {
         values.iter().for_each(|value| hasher.update(&value.to_le_bytes()));
     }
     format!("{:08x}", hasher.finalize())
+}
+
+/// Returns the path of a file, absolute, for a file in `folder`: see [`Recorded::relative_to`].
+pub(crate) fn relative_path(path: &Path, folder: &Path) -> PathBuf {
+    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    relative(path, &folder, std::env::home_dir().as_deref())
 }
 
 /// Path of a file as seen from `folder`, both absolute; the name alone if the way leads into or out of `home` or has no common

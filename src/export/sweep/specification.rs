@@ -3,6 +3,7 @@ use thiserror::Error;
 
 use super::train_options;
 use crate::{
+    dataset::Division,
     decoupling::DecoderKind,
     evaluation::experiments::{Axis, AxisKind, Experiment},
     export::report::{CommandGap, train_command},
@@ -56,7 +57,12 @@ pub(crate) fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) 
     train.retain(|option, value| !axes.contains_key(option) && *value != json!([]));
     let mut specification = json!({"train": train, "axes": axes});
     if let Some(plan) = plan {
-        specification["recording"] = json!(plan);
+        // The division is in the options.
+        let division = Division::default();
+        specification["recording"] = json!(Plan {
+            division,
+            ..plan.clone()
+        });
     }
     Ok(specification)
 }

@@ -4,6 +4,7 @@ use super::TrialOptions;
 use crate::{
     decoupling::DecoderKind,
     evaluation::{RunSettings, Simulation, Source},
+    import::Plan,
     scene::{NoisySets, RowModel, Rows},
     training::Method,
 };
@@ -44,6 +45,34 @@ pub(crate) fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) ->
             };
             options.insert("rows".to_owned(), text(&rows));
         }
+    }
+    options
+}
+
+/// Options that a recording adds: names and checksums of its files, meanings of their columns, and the division of its samples.
+/// The folders of the files are left out, so that a trial is the same wherever they are.
+pub(crate) fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
+    let named = plan.named();
+    let mut import = serde_json::to_value(&named.import).unwrap_or_default();
+    let mut taken = |field: &str| {
+        let fields = import.as_object_mut();
+        fields.and_then(|fields| fields.remove(field)).unwrap_or_default()
+    };
+    let mut options = TrialOptions::from([
+        ("data".to_owned(), taken("data")),
+        ("inputs".to_owned(), taken("inputs")),
+        ("targets".to_owned(), taken("targets")),
+        ("crc32".to_owned(), crc32.iter().cloned().collect()),
+        ("split".to_owned(), text(&plan.division.by)),
+        ("test-fraction".to_owned(), number(plan.division.test_fraction)),
+        (
+            "validation-fraction".to_owned(),
+            number(plan.division.validation_fraction),
+        ),
+    ]);
+    options.insert("import".to_owned(), import);
+    if let Some(test) = &named.test {
+        options.insert("test".to_owned(), serde_json::to_value(test).unwrap_or_default());
     }
     options
 }
