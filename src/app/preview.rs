@@ -58,5 +58,5 @@ fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> O
         training,
         ..*settings
     };
-    Run::prepare_unless(cheapest, is_cancelled).ok()??.baselines().copied()
+    Run::prepare_unless(cheapest, is_cancelled).ok()??.baselines().cloned()
 }

@@ -10,8 +10,8 @@ use clap::Args;
 use super::failure::Failure;
 use crate::{
     evaluation::Run,
-    export::{CheckpointFile, DocumentError, MeasuredCheckpointFile},
-    import::Plan,
+    export::{CheckpointFile, DocumentError},
+    import::Recorded,
 };
 
 /// Saving takes at most one part in this many of the time.
@@ -63,31 +63,19 @@ pub(super) struct Checkpointing {
     interval: Duration,
     next: Instant,
     has_warned: bool,
-    saving: Saving,
-}
-
-/// Kind of the checkpoints.
-pub(super) enum Saving {
-    /// Of a simulated sensor.
-    Simulated,
-    /// Of own data.
-    Measured {
-        /// Files and division of the samples.
-        plan: Box<Plan>,
-        /// Checksum of the samples.
-        samples_crc32: String,
-    },
+    /// Origin of recorded samples.
+    recorded: Option<Recorded>,
 }
 
 impl CheckpointArguments {
-    /// The checkpoints asked for.
-    pub(super) fn checkpointing(&self, saving: Saving) -> Option<Checkpointing> {
+    /// The checkpoints asked for; `recorded` is the origin of recorded samples.
+    pub(super) fn checkpointing(&self, recorded: Option<&Recorded>) -> Option<Checkpointing> {
         Some(Checkpointing {
             path: self.checkpoint.clone()?,
             interval: Duration::from_secs_f64(self.checkpoint_interval),
             next: Instant::now(),
             has_warned: false,
-            saving,
+            recorded: recorded.cloned(),
         })
     }
 
@@ -105,14 +93,14 @@ impl CheckpointArguments {
 }
 
 impl Checkpointing {
-    /// Saves in `path` every `interval`, for the first time after one.
-    pub(super) fn every(interval: Duration, path: PathBuf) -> Self {
+    /// Saves in `path` every `interval`, for the first time after one; `recorded` is the origin of recorded samples.
+    pub(super) fn every(interval: Duration, path: PathBuf, recorded: Option<&Recorded>) -> Self {
         Self {
             path,
             interval,
             next: Instant::now() + interval,
             has_warned: false,
-            saving: Saving::Simulated,
+            recorded: recorded.cloned(),
         }
     }
 
@@ -126,18 +114,13 @@ impl Checkpointing {
             && !self.has_warned
         {
             self.has_warned = true;
-            // Nobody is left to tell if this fails.
+            // There is no one to report to if this fails.
             let _ = writeln!(stderr(), "warning: {error}; training continues");
         }
         self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());
     }
 
     pub(super) fn save(&self, run: &Run) -> Result<(), DocumentError> {
-        match &self.saving {
-            Saving::Simulated => CheckpointFile::from_run(run)?.save(&self.path),
-            Saving::Measured { plan, samples_crc32 } => {
-                MeasuredCheckpointFile::from_run(run, plan, samples_crc32)?.save(&self.path)
-            }
-        }
+        CheckpointFile::from_run(run, self.recorded.as_ref())?.save(&self.path)
     }
 }

@@ -12,7 +12,7 @@ use crate::{
     dataset::{ReadError, SimulationError, SplitBy, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, InputError},
+    import::{Cure, ImportError, InputError, SetupError},
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::{CalibrationError, SensorError},
@@ -48,8 +48,12 @@ pub(super) enum Failure {
     },
     #[error("{}", .0.with_cure(in_arguments))]
     Import(#[from] ImportError),
-    #[error("'{}': the samples of '{}' are not those of the checkpoint; restore the file, or start a new training", .path.display(), .data.display())]
-    OtherSamples { path: PathBuf, data: PathBuf },
+    #[error(transparent)]
+    Setup(SetupError),
+    #[error("'{}': its recording '{}' is missing; give --data FILE, where it is now", .checkpoint.display(), .recording.display())]
+    MissingRecording { checkpoint: PathBuf, recording: PathBuf },
+    #[error("'{}' is the network of a recording: {reason}", .path.display())]
+    NoArray { path: PathBuf, reason: &'static str },
     #[error("{0}")]
     Interrupted(Interruption),
     #[error(
@@ -142,7 +146,7 @@ impl fmt::Display for Interruption {
         write!(f, "interrupted after epoch {}; ", self.epoch)?;
         match &self.resume {
             Some(command) => write!(f, "to resume: {command}"),
-            None => write!(f, "with --checkpoint FILE it could be resumed from here"),
+            None => write!(f, "use --checkpoint FILE to be able to resume"),
         }
     }
 }
@@ -155,6 +159,16 @@ fn joined(errors: &[PictureError]) -> String {
 impl From<SettingError> for Failure {
     fn from(error: SettingError) -> Self {
         Self::Arguments(error.to_string())
+    }
+}
+
+impl From<SetupError> for Failure {
+    fn from(error: SetupError) -> Self {
+        match error {
+            SetupError::Import(error) => error.into(),
+            SetupError::Run(error) => error.into(),
+            error => Self::Setup(error),
+        }
     }
 }
 

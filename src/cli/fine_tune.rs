@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Division, SplitBy, Stream},
-    evaluation::{Errors, fine_tune, press_limits},
+    evaluation::{Errors, TestErrors, fine_tune, press_limits},
     export::{NetworkFile, check_writable, format_number, is_same},
     network::Networks,
     training::StoppingRules,
@@ -60,7 +60,11 @@ impl FineTune {
             return Err(Failure::Arguments(message.to_owned()));
         }
         let mut file = NetworkFile::load(&self.network)?;
-        let settings = file.settings;
+        let no_array = || Failure::NoArray {
+            path: self.network.clone(),
+            reason: "frames of known presses need a model of the sensor; give a network of train --sensor",
+        };
+        let settings = file.settings.simulated().ok_or_else(no_array)?;
         let limits = press_limits(&settings.source);
         let frames = self.frames.read(&settings.source.sensor, limits, self.json)?;
         let read = settings.source.scene.rows.read(settings.source.sensor.scale.rows());
@@ -91,11 +95,11 @@ impl FineTune {
             test_samples: test.samples(),
             z_mm_before: errors(&test, &file.network).z_mm,
             z_mm_after: errors(&test, &tuned).z_mm,
-            simulated_z_mm_before: file.errors.z_mm,
+            simulated_z_mm_before: file.scores.network.nodes().map_or(f64::NAN, |errors| errors.z_mm),
             simulated_z_mm_after: errors(&simulated, &tuned).z_mm,
         };
         // Its errors stay those on the simulated test set, beside which the baselines stand.
-        file.errors = errors(&simulated, &tuned);
+        file.scores.network = TestErrors::Nodes(errors(&simulated, &tuned));
         file.network = tuned;
         file.save(&self.out)?;
         if self.json {

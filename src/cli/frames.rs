@@ -6,7 +6,8 @@ use ndarray::Array2;
 
 use super::{
     failure::Failure,
-    import_arguments::{ImportArguments, with_bar, working_folder},
+    import_arguments::ImportArguments,
+    samples::{with_bar, working_folder},
 };
 use crate::{
     dataset::Dataset,
@@ -43,7 +44,7 @@ impl FrameArguments {
             return Err(Failure::Arguments(message.to_owned()));
         };
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
-        self.import.save_recipe(&plan)?;
+        self.import.save_recipe(Some(&plan))?;
         let (set, lines, scale) = (recording.set, recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())

@@ -2,12 +2,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{checkpointing::check_same, failure::Failure, output::progress_bar};
+use super::{checkpointing::check_same, failure::Failure};
 use crate::{
     dataset::{Division, SplitBy},
     export::RecipeFile,
     import::{
-        Condition, Decimal, DialectChoice, Encoding, Joined, Missing, Plan, Progress, Recipe, Separator, TestFiles,
+        Condition, Decimal, DialectChoice, Encoding, Joined, Missing, Plan, Recipe, Recorded, Separator, TestFiles,
     },
 };
 
@@ -21,7 +21,7 @@ pub(super) struct DialectArguments {
     /// Decimal separator [default: found]
     #[arg(long, value_name = "point|comma")]
     decimal: Option<Decimal>,
-    /// Whether the first row has the names of the columns [default: found]
+    /// yes if the first row has the names of the columns [default: found]
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     header: Option<bool>,
     /// Encoding [default: found]
@@ -32,11 +32,11 @@ pub(super) struct DialectArguments {
     skip_lines: Option<usize>,
 }
 
-// Own data: files, meanings of their columns, and the split.
+// A recording: files, meanings of their columns, and the split.
 #[derive(Args)]
-#[command(next_help_heading = "Own data")]
+#[command(next_help_heading = "Recording")]
 pub(super) struct ImportArguments {
-    /// Train on the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated sensor
+    /// Use the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated array
     ///
     /// A column is named as in the header, or c1, c2, … without one; c2..c16 is a range. --inputs and --targets name
     /// columns, separated by commas.
@@ -52,7 +52,7 @@ pub(super) struct ImportArguments {
     /// Largest time between a row and its partner [default: half the median interval of the joined file]
     #[arg(long, value_name = "TIME", requires = "join", value_parser = positive)]
     join_limit: Option<f64>,
-    /// Columns to be told from the inputs
+    /// Columns to be predicted from the inputs
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "data")]
     targets: Vec<String>,
     /// Column of the times
@@ -133,6 +133,14 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     Ok((column.trim().to_owned(), unit.trim().to_owned()))
 }
 
+/// Refuses the first argument that is given.
+fn refuse(given: &[(bool, &str)], message: impl Fn(&str) -> String) -> Result<(), Failure> {
+    match given.iter().find(|(is_given, _)| *is_given) {
+        Some((_, argument)) => Err(Failure::Arguments(message(argument))),
+        None => Ok(()),
+    }
+}
+
 impl DialectArguments {
     pub(super) fn choice(&self) -> DialectChoice {
         DialectChoice {
@@ -176,9 +184,7 @@ impl ImportArguments {
             (self.test_data.is_some(), "--test-data"),
             (self.folds.is_some(), "--folds"),
         ];
-        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
-            return Err(Failure::Arguments(format!("{argument} needs --inputs and --targets")));
-        }
+        refuse(&given, |argument| format!("{argument} needs --inputs and --targets"))?;
         let message = "--data: name the file to inspect";
         self.data
             .as_deref()
@@ -190,7 +196,7 @@ impl ImportArguments {
         self.validation_fraction.is_some() || self.recipe.is_some()
     }
 
-    /// Refuses arguments that have no meaning without own data.
+    /// Refuses arguments that have no meaning without a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         let given = [
             (self.save_recipe.is_some(), "--save-recipe"),
@@ -201,16 +207,13 @@ impl ImportArguments {
             (self.folds.is_some(), "--folds"),
             (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(Failure::Arguments(format!("{argument} needs --data or --recipe"))),
-            None => Ok(()),
-        }
+        refuse(&given, |argument| format!("{argument} needs --data or --recipe"))
     }
 
-    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Those that name files and columns
-    /// need --data, which is refused already.
+    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Names of files are not compared: they
+    /// may be [elsewhere](Self::relocated) now.
     pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {
-        let division = &saved.division;
+        let (division, import) = (&saved.division, &saved.import);
         check_same("split", self.split, division.by)?;
         check_same("test-fraction", self.test_fraction, division.test_fraction)?;
         check_same(
@@ -218,19 +221,91 @@ impl ImportArguments {
             self.validation_fraction,
             division.validation_fraction,
         )?;
+        let given = |columns: &[String]| (!columns.is_empty()).then(|| columns.join(","));
+        check_same("targets", given(&self.targets), import.targets.join(","))?;
+        for (argument, column, saved) in [
+            ("time", &self.time, &import.time),
+            ("group", &self.group, &import.group),
+            ("row-wire", &self.row_wire, &import.row_wire),
+        ] {
+            check_same(argument, column.as_ref(), saved.as_deref().unwrap_or("none"))?;
+        }
         let given = [
-            (self.test_data.is_some(), "--test-data"),
+            (self.recipe.is_some(), "--recipe"),
+            (!self.join_time.is_empty(), "--join-time"),
+            (self.join_limit.is_some(), "--join-limit"),
+            (!self.conditions.is_empty(), "--where"),
+            (!self.missing.is_empty(), "--missing"),
+            (!self.unit.is_empty(), "--unit"),
             (self.folds.is_some(), "--folds"),
             (self.save_recipe.is_some(), "--save-recipe"),
             (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(Failure::Arguments(format!(
-                "{argument}: the checkpoint names the files and their division; leave it out to resume, or start a new \
-                 training with another --checkpoint"
-            ))),
-            None => Ok(()),
+        refuse(&given, |argument| {
+            format!(
+                "{argument}: the checkpoint has the columns and the division of the recording; leave it out to resume, or start \
+                 a new training with another --checkpoint"
+            )
+        })
+    }
+
+    /// Returns the origin of the samples of a checkpoint with its files where the arguments name them. A file is recognised by
+    /// its name; one of another name takes the place of the argument. Files that are still missing may be in the same folder.
+    pub(super) fn relocated(&self, saved: &Recorded) -> Result<Recorded, Failure> {
+        let mut found = saved.clone();
+        for (argument, given, place) in self.files(&saved.plan) {
+            let Some(place) = place else {
+                let message = format!("{argument}: the checkpoint has no such file; leave it out to resume");
+                return Err(Failure::Arguments(message));
+            };
+            let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
+            let is_named = |path: &PathBuf| path.file_name() == given.file_name();
+            let mut named = saved.plan.files().filter(|path| is_named(path));
+            let before = if is_named(place) {
+                place
+            } else {
+                named.next().unwrap_or(place)
+            };
+            found = found.relocated(before, &given);
+            let missing = Vec::from_iter(found.missing().into_iter().map(Path::to_owned));
+            for path in missing {
+                let near = path.file_name().map(|name| given.with_file_name(name));
+                if let Some(near) = near.filter(|near| *near != given && near.exists()) {
+                    found = found.relocated(&path, &near);
+                }
+            }
         }
+        Ok(found)
+    }
+
+    /// Files given, with their arguments and the files of `saved` in their places.
+    fn files<'a>(&'a self, saved: &'a Plan) -> Vec<(&'static str, &'a PathBuf, Option<&'a PathBuf>)> {
+        let (import, test) = (&saved.import, saved.test.as_ref());
+        let joined = |place| import.join.get(place).map(|joined: &Joined| &joined.file);
+        let test_joined = |place| test.and_then(|test| test.join.get(place));
+        let data = self.data.iter().map(|file| ("--data", file, Some(&import.data)));
+        let join = self.join.iter().enumerate();
+        let join = join.map(|(place, file)| ("--join", file, joined(place)));
+        let positions = self.positions.iter();
+        let positions = positions.map(|file| ("--positions", file, import.positions.as_ref()));
+        let test_data = self.test_data.iter();
+        let test_data = test_data.map(|file| ("--test-data", file, test.map(|test| &test.data)));
+        let test_join = self.test_join.iter().enumerate();
+        let test_join = test_join.map(|(place, file)| ("--test-join", file, test_joined(place)));
+        data.chain(join)
+            .chain(positions)
+            .chain(test_data)
+            .chain(test_join)
+            .collect()
+    }
+
+    /// The plan of a recording as in [`Self::plan`]; `None` if the source is a simulated array.
+    pub(super) fn given(&self, inputs: &[String]) -> Result<Option<Plan>, Failure> {
+        if self.is_given() {
+            return self.plan(inputs).map(Some);
+        }
+        self.check_unused()?;
+        Ok(None)
     }
 
     /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
@@ -320,31 +395,11 @@ impl ImportArguments {
         self.recipe.as_deref()
     }
 
-    /// Writes the recipe, if that is asked for.
-    pub(super) fn save_recipe(&self, plan: &Plan) -> Result<(), Failure> {
-        match &self.save_recipe {
-            Some(path) => Ok(RecipeFile::save(plan, path)?),
-            None => Ok(()),
+    /// Writes the recipe of `plan`, if that is asked for.
+    pub(super) fn save_recipe(&self, plan: Option<&Plan>) -> Result<(), Failure> {
+        match (&self.save_recipe, plan) {
+            (Some(path), Some(plan)) => Ok(RecipeFile::save(plan, path)?),
+            _ => Ok(()),
         }
     }
-}
-
-/// Runs `import` with a bar that shows how far the file has been read.
-pub(super) fn with_bar<T>(
-    is_hidden: bool,
-    import: impl FnOnce(&mut dyn FnMut(Progress) -> std::ops::ControlFlow<()>) -> T,
-) -> T {
-    let bar = progress_bar(is_hidden, 1, "reading {bytes} of {total_bytes}");
-    let result = import(&mut |progress| {
-        bar.set_length(progress.of.unwrap_or(progress.bytes));
-        bar.set_position(progress.bytes);
-        std::ops::ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
-    result
-}
-
-/// Folder to which the paths of a plan from arguments are relative.
-pub(super) fn working_folder() -> &'static Path {
-    Path::new("")
 }

@@ -1,12 +1,13 @@
 use clap::Args;
 
 use super::{
+    checkpointing::check_same,
     failure::Failure,
     parsers::{count, number},
 };
 use crate::{
     decoupling::DecoderKind,
-    evaluation::{Preset, SimulatedSettings},
+    evaluation::{Measured, Preset, RunSettings, SimulatedSettings},
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows},
 };
@@ -28,7 +29,7 @@ pub(super) struct SceneArguments {
     /// :cylinder, :edge)
     #[arg(long, value_name = "random|smooth:MM|indenter")]
     loading: Option<Loading>,
-    /// Quantity that the network reads; of own data (--data) the columns, separated by commas
+    /// Quantity that the network reads; for a recording (--data) the columns, separated by commas
     #[arg(long, value_name = "resistance|conductance|log", value_delimiter = ',')]
     inputs: Vec<String>,
     /// Scaling of the inputs: each to its range, or whitened principal components
@@ -106,49 +107,61 @@ impl SceneArguments {
         }
     }
 
-    /// Columns read, of own data.
+    /// Columns that a network of a recording reads.
     pub(super) fn columns(&self) -> &[String] {
         &self.inputs
     }
 
-    /// Row model and scaling for own data, where they are given.
+    /// Default settings for a recording, with the row model and scaling given.
     ///
     /// # Errors
-    /// Names the first argument given that has a meaning for a simulated sensor only.
-    pub(super) fn measured(&self, has_row_wires: bool) -> Result<(Option<RowModel>, Option<ScalingChoice>), Failure> {
+    /// Names the first argument given that is for a simulated array only.
+    pub(super) fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
         let refuse = |argument: &str, reason: &str| Err(Failure::Arguments(format!("{argument}: {reason}")));
-        let scene = "own data (--data) have no scene to be drawn from; leave it out";
+        let scene = "a recording (--data) has no scene to be drawn from; leave it out";
+        let noise = "a recording (--data) has noise of its own; leave it out";
         let given = [
-            (self.preset.is_some(), "--preset"),
-            (self.axes.is_some(), "--axes"),
-            (self.loading.is_some(), "--loading"),
+            (self.preset.is_some(), "--preset", scene),
+            (self.axes.is_some(), "--axes", scene),
+            (self.loading.is_some(), "--loading", scene),
+            (!self.noise.is_empty(), "--noise", noise),
+            (self.noise_ohm.is_some(), "--noise-ohm", noise),
+            (self.adc_bits.is_some(), "--adc-bits", noise),
+            (self.drift.is_some(), "--drift", noise),
+            (self.noise_in.is_some(), "--noise-in", noise),
         ];
-        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
-            return refuse(argument, scene);
+        if let Some((_, argument, reason)) = given.into_iter().find(|(is_given, ..)| *is_given) {
+            return refuse(argument, reason);
         }
-        let given = [
-            (!self.noise.is_empty(), "--noise"),
-            (self.noise_ohm.is_some(), "--noise-ohm"),
-            (self.adc_bits.is_some(), "--adc-bits"),
-            (self.drift.is_some(), "--drift"),
-            (self.noise_in.is_some(), "--noise-in"),
-        ];
-        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
-            return refuse(argument, "own data (--data) have their own noise already; leave it out");
+        if let Some(kind) = self.decoder.iter().find(|kind| kind.needs_sensor()) {
+            let reason =
+                "it solves the equations of a simulated array, which a recording (--data) does not have; leave it out";
+            return refuse(&format!("--decoder {kind}"), reason);
         }
         let rows = match self.rows {
-            None => None,
-            Some(Rows::All) => Some(RowModel::Shared),
-            Some(Rows::Known) if has_row_wires => Some(RowModel::Each),
+            None | Some(Rows::All) => RowModel::Shared,
+            Some(Rows::Known) if has_row_wires => RowModel::Each,
             Some(Rows::Known) => return refuse("--rows known", "name the column of row-wires with --row-wire"),
             Some(Rows::One(_)) => {
                 return refuse(
                     "--rows",
-                    "choose one row of own data with --where, for example \"row=3\"",
+                    "choose one row of a recording with --where, for example \"row=3\"",
                 );
             }
         };
-        Ok((rows, self.scaling))
+        let mut settings = RunSettings::from(Measured { rows });
+        settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
+        Ok(settings)
+    }
+
+    /// Refuses another row model or scaling than `saved`, the settings of a run on a recording.
+    pub(super) fn check_resumed(&self, saved: &RunSettings) -> Result<(), Failure> {
+        let rows = match saved.source.row_model() {
+            RowModel::Shared => Rows::All,
+            RowModel::Each => Rows::Known,
+        };
+        check_same("rows", self.rows, rows)?;
+        check_same("scaling", self.scaling, saved.inputs.scaling)
     }
 
     /// `present` with the given parts of the noise.

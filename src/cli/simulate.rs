@@ -6,9 +6,9 @@ use std::{
 use clap::Args;
 
 use super::{
-    announcement::announce,
     failure::Failure,
     parsers::{count, seed},
+    samples::announce,
     scene_arguments::SceneArguments,
 };
 use crate::{
@@ -121,12 +121,11 @@ impl Simulate {
             _ => return Err(Failure::Arguments("--decoder: give only one here".to_owned())),
         };
         let networks = if kind.needs_network() {
-            announce(settings)?;
+            announce(&(*settings).into())?;
             let mut run = Run::prepare(*settings)?;
             while run.step().is_none() {}
-            let scores = run.node_scores();
-            let remarks =
-                scores.map(|scores| error_remarks(settings, &scores.network, &scores.baselines, run.stop_reason()));
+            let scores = run.scores();
+            let remarks = scores.map(|scores| error_remarks(settings, &scores, run.stop_reason()));
             let remarks = remarks.into_iter().flatten();
             let of_network = remarks
                 .filter(|(row, _)| *row == "network")

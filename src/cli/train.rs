@@ -7,23 +7,23 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::{
-    announcement::announce,
-    checkpointing::{CheckpointArguments, Checkpointing, Saving},
+    checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::Graceful,
-    output::{print_object, progress_bar},
-    train_report::{print_text, report},
+    output::progress_bar,
+    samples::{announce, following, sets},
+    train_report::Trained,
     training_arguments::TrainingArguments,
 };
 use crate::{
     decoupling::DecoderKind,
-    evaluation::{DecoderReport, DecoderSet, Run, RunError},
+    evaluation::{DecoderReport, DecoderSet, Run, RunError, Source},
     export::{
-        CheckpointFile, DocumentError, MeasuredCheckpointFile, NetworkFile, SensorFile, check_writable, format_number,
-        is_same,
+        CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
+    import::{Setup, SetupError, SetupSets},
     training::TrainingSettings,
 };
 
@@ -31,8 +31,8 @@ use crate::{
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
 /// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
-/// with the published figures where there are any. With --data it trains on samples of a real sensor from files, and compares
-/// the network with the mean and with ridge regression, target by target. Ctrl-C stops after the epoch,
+/// with the published figures where there are any. With --data it trains on the samples of a recording, and compares the
+/// network with the mean, with ridge regression and with other decoders, target by target. Ctrl-C stops after the epoch,
 /// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
@@ -51,7 +51,7 @@ pub(super) struct Train {
     pub(super) out: Option<PathBuf>,
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
     pub(super) json: bool,
@@ -61,46 +61,34 @@ impl Train {
     pub(super) fn run(self) -> Result<(), Failure> {
         self.checkpoint.check()?;
         self.check_paths()?;
-        if let Some(path) = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume) {
-            match MeasuredCheckpointFile::load(path) {
-                // It is of another kind.
-                Err(DocumentError::Other { .. }) => {}
-                file if self.import.is_given() => {
-                    file?;
-                    let message = "--data: the checkpoint names the files; leave it out to resume";
-                    return Err(Failure::Arguments(message.to_owned()));
+        let resumed = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume);
+        let (mut run, sets) = match resumed {
+            Some(path) => self.resume(path)?,
+            None => {
+                let setup = self.setup()?;
+                if let Some(folds) = self.import.folds {
+                    return self.cross_validate(&setup, folds);
                 }
-                file => {
-                    self.check_no_report()?;
-                    return self.resume_measured(path, file?);
-                }
-            }
-        }
-        if self.import.is_given() {
-            self.check_no_report()?;
-            return self.run_measured();
-        }
-        self.import.check_unused()?;
-        let mut run = match &self.checkpoint.checkpoint {
-            Some(path) if self.checkpoint.resume => self.resume(path)?,
-            _ => {
-                let mut settings = self.training.settings()?;
-                if let Some(path) = &self.sensor {
-                    settings.source.sensor = SensorFile::load(path)?;
-                }
-                announce(&settings)?;
-                Run::prepare(settings)?
+                let sets = sets(&setup, self.json)?;
+                self.import.save_recipe(setup.plan())?;
+                let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
+                (run, sets)
             }
         };
-        let end = self.train(&mut run, self.checkpoint.checkpointing(Saving::Simulated));
-        let file = NetworkFile::from_run(&run)?;
+        let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
+        let file = NetworkFile::from_run(&run, sets.recorded())?;
         // Whatever fails now, the figures are printed.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
-        let mut decoders = Vec::new();
-        let measured = match end {
-            Err(Failure::Interrupted(_)) => Ok(()),
-            _ => measure_decoders(&self.training.scene.decoders(), &file, &run, &mut decoders),
-        };
+        let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));
+        if !matches!(end, Err(Failure::Interrupted(_))) {
+            measured = measure_decoders(&self.decoders(&run), &file, &sets, &mut decoders);
+        }
+        if end.is_ok() {
+            match self.optimism(&run, &sets) {
+                Ok(sentences) => optimism = sentences,
+                Err(failure) => end = Err(failure),
+            }
+        }
         let flaw = run.flaw();
         let reported = self.report.as_ref().map_or(Ok(()), |path| {
             let report = RunReport {
@@ -112,28 +100,37 @@ impl Train {
             };
             report.save(path)
         });
-        if self.json {
-            print_object(&report(&file, flaw.as_ref(), &decoders)?)?;
-        } else {
-            print_text(&file, flaw.as_ref(), &decoders)?;
-        }
+        let trained = Trained {
+            run: &run,
+            file: &file,
+            sets: &sets,
+            decoders: &decoders,
+            optimism: &optimism,
+        };
+        trained.print(self.json)?;
         measured?;
-        let saved = saved.map_err(Failure::from);
-        let reported = reported.map_err(Failure::from);
-        first_failure([saved, reported, end])
+        first_failure([saved.map_err(Failure::from), reported.map_err(Failure::from), end])
     }
 
-    /// Joins what saving the network and training came to.
-    pub(super) fn end(&self, saved: Result<(), DocumentError>, end: Result<(), Failure>) -> Result<(), Failure> {
-        first_failure([saved.map_err(Failure::from), end])
-    }
-
-    fn check_no_report(&self) -> Result<(), Failure> {
-        if self.report.is_none() {
-            return Ok(());
+    /// Setup of a new run.
+    fn setup(&self) -> Result<Setup, Failure> {
+        let plan = self.import.given(self.training.scene.columns())?;
+        let setup = self.training.setup(plan, self.import.holds_out())?;
+        match (&self.sensor, setup.simulated()) {
+            (Some(path), Some(mut settings)) => {
+                settings.source.sensor = SensorFile::load(path)?;
+                Ok(settings.into())
+            }
+            _ => Ok(setup),
         }
-        let message = "--report: reports are written of simulated sensors; leave it out, or use --json with --data";
-        Err(Failure::Arguments(message.to_owned()))
+    }
+
+    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    fn decoders(&self, run: &Run) -> Vec<DecoderKind> {
+        match run.settings().source {
+            Source::Simulated(_) => self.training.scene.decoders(),
+            Source::Measured(_) => self.training.scene.decoder.clone(),
+        }
     }
 
     /// Checks that every file has a path of its own that can be written.
@@ -156,26 +153,45 @@ impl Train {
         files.iter().try_for_each(|(_, path)| Ok(check_writable(path)?))
     }
 
-    fn resume(&self, path: &Path) -> Result<Run, Failure> {
-        let file = CheckpointFile::load(path)?;
-        let saved = file.settings.training;
-        let training = self.training.training_from(&file.settings)?;
+    /// Resumes the training of a checkpoint.
+    fn resume(&self, path: &Path) -> Result<(Run, SetupSets), Failure> {
+        let mut file = CheckpointFile::load(path)?;
+        let saved = file.setup();
+        match saved.plan() {
+            Some(plan) => self.import.check_resumed(plan)?,
+            None if self.import.is_given() => {
+                let message = "--data: the checkpoint is of a simulated array; leave it out to resume";
+                return Err(Failure::Arguments(message.to_owned()));
+            }
+            None => self.import.check_unused()?,
+        }
+        let training = self.training.resumed(&saved)?;
+        if let Some(recorded) = &mut file.recorded {
+            *recorded = self.import.relocated(recorded)?;
+            if let Some(missing) = recorded.missing().first() {
+                return Err(Failure::MissingRecording {
+                    checkpoint: path.to_owned(),
+                    recording: missing.to_path_buf(),
+                });
+            }
+        }
         announce(&file.settings)?;
-        let mut run = file.resume().map_err(|source| Failure::Resume {
-            path: path.to_owned(),
-            source,
+        let resumed = following(&saved, self.json, |on_progress| {
+            file.resume_unless(&|| false, on_progress)
+        });
+        let (mut run, sets) = resumed.map_err(|error| match error {
+            SetupError::Run(source) => Failure::Resume {
+                path: path.to_owned(),
+                source,
+            },
+            error => error.into(),
         })?;
-        self.continue_run(&mut run, saved, training)?;
-        Ok(run)
+        self.continue_run(&mut run, saved.settings().training, training)?;
+        Ok((run, sets))
     }
 
     /// Gives a resumed run the method and stopping rules asked for, where they differ from those `saved`.
-    pub(super) fn continue_run(
-        &self,
-        run: &mut Run,
-        saved: TrainingSettings,
-        training: TrainingSettings,
-    ) -> Result<(), Failure> {
+    fn continue_run(&self, run: &mut Run, saved: TrainingSettings, training: TrainingSettings) -> Result<(), Failure> {
         run.set_stopping(training.stopping)?;
         if training.method != saved.method {
             run.continue_with(training.method)?;
@@ -191,7 +207,7 @@ impl Train {
 
     /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
     /// terminal.
-    pub(super) fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
+    fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
         let bar = progress_bar(
             self.json,
             run.settings().training.stopping.epochs,
@@ -246,28 +262,32 @@ impl Train {
     }
 }
 
-/// Returns the first failure, and tells the others.
+/// Returns the first failure, and prints the others.
 fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<(), Failure> {
     let mut failures = ends.into_iter().filter_map(Result::err);
     let Some(first) = failures.next() else { return Ok(()) };
     for other in failures {
-        // Nobody is left to tell if this fails.
+        // There is no one to report to if this fails.
         let _ = writeln!(stderr(), "{other}");
     }
     Err(first)
 }
 
-/// Measures decoders of these kinds on the test samples of `run`, whose network is in `file`.
+/// Measures decoders of these kinds on the test samples of `sets`, next to the network of `file`.
 pub(super) fn measure_decoders(
     kinds: &[DecoderKind],
     file: &NetworkFile,
-    run: &Run,
+    sets: &SetupSets,
     reports: &mut Vec<DecoderReport>,
 ) -> Result<(), RunError> {
-    let set = DecoderSet::new(&file.settings, Some(file.network.clone()))?;
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    let training = sets.sets.split.training.clone();
+    let set = DecoderSet::on_set(file.settings, training, Some(file.network.clone()));
     for kind in kinds {
         for &precision in kind.precisions() {
-            reports.extend(set.measure(*kind, precision, run.test())?);
+            reports.extend(set.measure(*kind, precision, &sets.sets.test)?);
         }
     }
     Ok(())

@@ -6,58 +6,104 @@ use std::{
 
 use serde::Serialize;
 
-use super::{failure::Failure, output::print, spread_plot::write_starts};
+use super::{
+    errors_report::{ErrorsReport, Target, targets},
+    failure::Failure,
+    output::{print, print_object},
+    recording_report::{RecordingReport, import_warnings, write_warnings},
+    spread_plot::write_starts,
+};
 use crate::{
     evaluation::{
-        Baselines, DecoderReport, ErrorRow, Errors, Outlook, ReferenceNote, RunError, RunFlaw, SimulatedSettings,
-        StartRecord, best_start, error_remarks, error_rows,
+        Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
+        StartRecord, TestErrors, best_start, error_remarks,
+        recorded::{Determination, Undetermined},
     },
-    export::{NetworkFile, TrainingRecord, format_duration, format_number},
+    export::{
+        NetworkFile, TrainingRecord, decoder_table, describe_standings, describe_worse_than_ridge, error_table,
+        format_duration,
+    },
+    import::SetupSets,
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
     sensor::{ArrayScale, Geometry, counted},
     training::{Stage, StopReason},
 };
 
+/// A trained network and what was measured of it.
+pub(super) struct Trained<'a> {
+    pub(super) run: &'a Run,
+    pub(super) file: &'a NetworkFile,
+    pub(super) sets: &'a SetupSets,
+    pub(super) decoders: &'a [DecoderReport],
+    /// Sentences on how optimistic random test samples are.
+    pub(super) optimism: &'a [String],
+}
+
 /// The object printed by `train --json`.
 #[derive(Serialize)]
 struct Report<'a> {
-    array: ArrayScale,
+    #[serde(flatten)]
+    source: SourceReport<'a>,
     hidden: usize,
     method: &'static str,
     seed: u64,
-    samples: usize,
-    validation_samples: usize,
-    test_samples: usize,
     starts: &'a [StartRecord],
-    stages: &'a [Stage],
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
+    networks: usize,
+    weights: usize,
+    warnings: Vec<String>,
+    /// Other decoders; absent for a recording if none was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decoders: Option<BTreeMap<String, Decoder<'a>>>,
+}
+
+/// Figures that only one kind of source has, or has in another form.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum SourceReport<'a> {
+    Array(Box<ArrayReport<'a>>),
+    Recording(Box<RecordingFigures<'a>>),
+}
+
+#[derive(Serialize)]
+struct ArrayReport<'a> {
+    array: ArrayScale,
+    samples: usize,
+    validation_samples: usize,
+    test_samples: usize,
+    stages: &'a [Stage],
     train_mse: f64,
     validation_mse: Option<f64>,
     epoch_ms: f64,
-    errors: &'a Errors,
-    baselines: &'a Baselines,
+    errors: Errors,
+    baselines: Baselines<Errors>,
     published: Option<Published>,
-    scene: &'a Scene,
-    inputs: &'a InputChoice,
+    scene: Scene,
+    inputs: InputChoice,
     unknowns: usize,
     equations: usize,
-    networks: usize,
-    weights: usize,
     condition: Option<f64>,
-    warnings: Vec<String>,
     /// Remarks on the errors above, with cause and cure.
     remarks: Vec<String>,
-    decoders: BTreeMap<String, Decoder>,
     reference: Option<Reference>,
 }
 
 #[derive(Serialize)]
-struct Decoder {
-    z_percent: Option<f64>,
-    z_mm: f64,
+struct RecordingFigures<'a> {
+    #[serde(flatten)]
+    recording: RecordingReport,
+    seconds: Option<f64>,
+    targets: Vec<Target<'a>>,
+    baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
+}
+
+#[derive(Serialize)]
+struct Decoder<'a> {
+    #[serde(flatten)]
+    errors: ErrorsReport<'a>,
     frame_us: f64,
     /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
     residual: Option<f64>,
@@ -88,6 +134,239 @@ struct Published {
     y_percent: f64,
 }
 
+impl<'a> Decoder<'a> {
+    fn new(channels: &'a [Channel], report: &DecoderReport) -> Self {
+        Self {
+            errors: ErrorsReport::new(channels, &report.errors),
+            frame_us: report.cost.frame_us,
+            residual: report.residual.filter(|residual| residual.is_finite()),
+            fit_seconds: report.cost.fit_seconds,
+            remarks: report.remarks.iter().map(ToString::to_string).collect(),
+            solved: (report.solved.rows > 0).then_some(Solved {
+                rows: report.solved.rows,
+                unsolved: report.solved.unsolved,
+                undetermined: report.solved.undetermined,
+            }),
+        }
+    }
+}
+
+impl<'a> ArrayReport<'a> {
+    fn new(file: &'a NetworkFile, settings: &SimulatedSettings, remarks: Vec<String>) -> Result<Self, RunError> {
+        let (source, training) = (&settings.source, &file.training);
+        let best = training.history.get(training.best_epoch);
+        let size = source.model_size()?;
+        let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
+        let scores = file.scores.nodes().expect("the targets are nodes");
+        Ok(Self {
+            array: source.sensor.scale,
+            samples: source.samples,
+            validation_samples: source.validation_samples,
+            test_samples: source.test_samples,
+            stages: &training.stages,
+            train_mse: best_start.map_or_else(
+                || best.map_or(f64::NAN, |record| record.training_mse),
+                |start| start.train_mse,
+            ),
+            validation_mse: best_start.map_or_else(
+                || best.and_then(|record| record.validation_mse),
+                |start| start.validation_mse,
+            ),
+            epoch_ms: 1e3 * epoch_seconds(training),
+            errors: scores.network,
+            baselines: scores.baselines,
+            published: settings.published().map(|row| Published {
+                z_percent: row.z_percent,
+                x_percent: row.x_percent,
+                y_percent: row.y_percent,
+            }),
+            scene: source.scene,
+            inputs: settings.inputs,
+            unknowns: size.unknowns,
+            equations: size.equations,
+            condition: condition(Outlook::of(source).ok().as_ref()),
+            remarks,
+            reference: scores.baselines.reference.map(|errors| Reference {
+                z_percent: errors.z_percent,
+                z_mm: errors.z_mm,
+            }),
+        })
+    }
+}
+
+impl<'a> Trained<'a> {
+    /// Prints the report, as JSON or as text.
+    pub(super) fn print(&self, is_json: bool) -> Result<(), Failure> {
+        if is_json {
+            print_object(&self.report()?)
+        } else {
+            print(|out| self.write(out))
+        }
+    }
+
+    /// Returns the object printed by `train --json`.
+    pub(super) fn report(&self) -> Result<impl Serialize + use<'a>, Failure> {
+        let Self { file, .. } = *self;
+        let (settings, training, scores) = (&file.settings, &file.training, &file.scores);
+        let determined = self.determined();
+        let source = match (&self.sets.recordings, settings.simulated()) {
+            (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
+                recording: RecordingReport::new(&self.sets.sets, recordings),
+                seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
+                targets: targets(&file.problem.targets, &scores.network, &determined),
+                baselines: BTreeMap::from([
+                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
+                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
+                ]),
+            })),
+            (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
+            (None, None) => unreachable!("sets are recorded or simulated"),
+        };
+        let decoder = |report: &DecoderReport| (report.name(), Decoder::new(&file.problem.targets, report));
+        let has_decoders = file.problem.has_nodes || !self.decoders.is_empty();
+        Ok(Report {
+            source,
+            hidden: settings.hidden,
+            method: settings.training.method.short_name(),
+            seed: settings.seed.0,
+            starts: &training.starts,
+            epochs: epochs(training),
+            best_epoch: training.best_epoch,
+            stop_reason: training.stop_reason,
+            networks: file.network.values().len(),
+            weights: file.network.weights(),
+            warnings: self.warnings(&determined),
+            decoders: has_decoders.then(|| self.decoders.iter().map(decoder).collect()),
+        })
+    }
+
+    /// Coefficient of determination of each target of a recording.
+    fn determined(&self) -> Vec<Result<Determination, Undetermined>> {
+        let Some(recordings) = &self.sets.recordings else {
+            return Vec::new();
+        };
+        let by = recordings.recorded.plan.division.by;
+        Determination::measure(self.run.test(), self.run.decouple_test().view(), by)
+    }
+
+    /// Warnings of the source and of the training.
+    fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
+        let source = self.file.settings.simulated().map(|settings| settings.source);
+        let outlook = source.and_then(|source| Outlook::of(&source).ok());
+        let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
+        let of_import = self.sets.recordings.as_ref().map(import_warnings);
+        of_array
+            .map(ToString::to_string)
+            .chain(of_import.into_iter().flatten())
+            .chain(self.optimism.iter().cloned())
+            .chain(self.run.flaw().map(|flaw| flaw.to_string()))
+            .chain(describe_standings(&self.file.problem.targets, determined))
+            .chain(describe_worse_than_ridge(self.file))
+            .collect()
+    }
+
+    /// Remarks on the rows of the error table.
+    fn remarks(&self) -> Vec<String> {
+        let (file, baselines) = (self.file, &self.file.scores.baselines);
+        let Some(settings) = file.settings.simulated() else {
+            return Vec::new();
+        };
+        let remarks = error_remarks(&settings, &file.scores, file.training.stop_reason);
+        let remarks = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
+        remarks
+            .chain(ReferenceNote::of(baselines).map(|note| note.to_string()))
+            .collect()
+    }
+
+    fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let Self { file, .. } = *self;
+        let (settings, training) = (&file.settings, &file.training);
+        match (&self.sets.recordings, settings.simulated()) {
+            (Some(recordings), _) => RecordingReport::new(&self.sets.sets, recordings).write(out)?,
+            (None, Some(settings)) => write_array(file, &settings, out)?,
+            (None, None) => unreachable!("sets are recorded or simulated"),
+        }
+        let first = training.stages.first();
+        let method = first.map_or(settings.training.method, |stage| stage.method);
+        writeln!(
+            out,
+            "{}, {}, {method}, {}, seed {}",
+            counted(file.problem.inputs.len(), "input"),
+            counted(settings.hidden, "hidden node"),
+            counted(settings.starts, "start"),
+            settings.seed
+        )?;
+        for stage in training.stages.iter().skip(1) {
+            writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
+        }
+        let reason = training
+            .stop_reason
+            .map_or("not ended".to_owned(), |reason| reason.to_string());
+        let time = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
+        writeln!(
+            out,
+            "Ended after {}, {} on one thread ({} per epoch): {reason}",
+            counted(epochs(training), "epoch"),
+            time(training.seconds),
+            time(epoch_seconds(training))
+        )?;
+        writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
+        if training.starts.len() > 1 {
+            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
+            writeln!(out)?;
+        }
+        write!(out, "{}", error_table(&file.error_table()).aligned())?;
+        write_warnings(&self.warnings(&self.determined()), out)?;
+        write_warnings(&self.remarks(), out)?;
+        self.write_decoders(out)?;
+        if let Some(settings) = settings.simulated() {
+            writeln!(
+                out,
+                "\nErrors in % are relative to the coordinate, as in the paper, or to the stroke where stated."
+            )?;
+            let note = settings.source.sensor.scale.note();
+            for note in note.iter().map(String::as_str).chain([Geometry::ASSUMPTION]) {
+                writeln!(out, "{note}")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the errors of each decoder and their ratio to the reference.
+    fn write_decoders(&self, out: &mut dyn Write) -> io::Result<()> {
+        let reference = self.file.scores.baselines.reference.as_ref();
+        if reference.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
+            writeln!(
+                out,
+                "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \
+                 given."
+            )?;
+        }
+        if self.decoders.is_empty() {
+            return Ok(());
+        }
+        write!(
+            out,
+            "\n{}",
+            decoder_table(&self.file.problem, self.decoders, reference).aligned()
+        )?;
+        for report in self.decoders {
+            let name = report.kind.name(report.precision);
+            for remark in &report.remarks {
+                writeln!(out, "Warning: {name}: {remark}")?;
+            }
+        }
+        if self.file.problem.has_nodes {
+            writeln!(
+                out,
+                "The residual is the rms relative difference between the readings and those of the decoded deformation; it \
+                 needs no ground truth."
+            )?;
+        }
+        Ok(())
+    }
+}
+
 fn epochs(training: &TrainingRecord) -> usize {
     training.history.last().map_or(0, |record| record.epoch)
 }
@@ -97,187 +376,18 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
     training.seconds / epochs(training).max(1) as f64
 }
 
-/// Returns the object printed by `train --json`.
-pub(super) fn report<'a>(
-    file: &'a NetworkFile,
-    flaw: Option<&RunFlaw>,
-    decoders: &[DecoderReport],
-) -> Result<impl Serialize + use<'a>, Failure> {
-    let (settings, training) = (&file.settings, &file.training);
-    let best = training.history.get(training.best_epoch);
-    let size = settings.source.model_size().map_err(RunError::from)?;
-    let outlook = Outlook::of(&settings.source).ok();
-    let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
-    Ok(Report {
-        array: settings.source.sensor.scale,
-        hidden: settings.hidden,
-        method: settings.training.method.short_name(),
-        seed: settings.seed.0,
-        samples: settings.source.samples,
-        validation_samples: settings.source.validation_samples,
-        test_samples: settings.source.test_samples,
-        starts: &training.starts,
-        stages: &training.stages,
-        epochs: epochs(training),
-        best_epoch: training.best_epoch,
-        stop_reason: training.stop_reason,
-        train_mse: best_start.map_or_else(
-            || best.map_or(f64::NAN, |record| record.training_mse),
-            |start| start.train_mse,
-        ),
-        validation_mse: best_start.map_or_else(
-            || best.and_then(|record| record.validation_mse),
-            |start| start.validation_mse,
-        ),
-        epoch_ms: 1e3 * epoch_seconds(training),
-        errors: &file.errors,
-        baselines: &file.baselines,
-        published: settings.published().map(|row| Published {
-            z_percent: row.z_percent,
-            x_percent: row.x_percent,
-            y_percent: row.y_percent,
-        }),
-        scene: &settings.source.scene,
-        inputs: &settings.inputs,
-        unknowns: size.unknowns,
-        equations: size.equations,
-        networks: size.networks,
-        weights: file.network.weights(),
-        condition: condition(outlook.as_ref()),
-        warnings: warnings(outlook.as_ref())
-            .into_iter()
-            .chain(flaw.map(ToString::to_string))
-            .collect(),
-        remarks: remarks(file),
-        decoders: decoders.iter().map(|report| (report.name(), decoder(report))).collect(),
-        reference: file.baselines.reference.as_ref().map(|errors| Reference {
-            z_percent: errors.z_percent,
-            z_mm: errors.z_mm,
-        }),
-    })
-}
-
-fn decoder(report: &DecoderReport) -> Decoder {
-    Decoder {
-        z_percent: report.errors.z_percent,
-        z_mm: report.errors.z_mm,
-        frame_us: report.cost.frame_us,
-        residual: Some(report.residual).filter(|residual| residual.is_finite()),
-        fit_seconds: report.cost.fit_seconds,
-        remarks: report.remarks.iter().map(ToString::to_string).collect(),
-        solved: (report.solved.rows > 0).then_some(Solved {
-            rows: report.solved.rows,
-            unsolved: report.solved.unsolved,
-            undetermined: report.solved.undetermined,
-        }),
-    }
-}
-
-/// Remarks on the rows of the error table.
-fn remarks(file: &NetworkFile) -> Vec<String> {
-    let reason = file.training.stop_reason;
-    let remarks = error_remarks(&file.settings, &file.errors, &file.baselines, reason);
-    let told = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
-    told.chain(ReferenceNote::of(&file.baselines).map(|note| note.to_string()))
-        .collect()
-}
-
 /// Condition number of the worst row; none if the Jacobian is singular.
 fn condition(outlook: Option<&Outlook>) -> Option<f64> {
     let condition = outlook?.worst_row.condition();
     Some(condition).filter(|condition| condition.is_finite())
 }
 
-fn warnings(outlook: Option<&Outlook>) -> Vec<String> {
-    let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
-    warnings.map(ToString::to_string).collect()
-}
-
-/// Prints what was trained, why it ended, and the error table.
-pub(super) fn print_text(
+/// Writes the scene of an array, the size of its equations and of the network, and the numbers of samples.
+fn write_array(
     file: &NetworkFile,
-    flaw: Option<&RunFlaw>,
-    decoders: &[DecoderReport],
-) -> Result<(), Failure> {
-    print(|output| write_text(file, flaw, decoders, output))
-}
-
-fn write_text(
-    file: &NetworkFile,
-    flaw: Option<&RunFlaw>,
-    decoders: &[DecoderReport],
-    out: &mut impl Write,
+    SimulatedSettings { source, inputs, .. }: &SimulatedSettings,
+    out: &mut dyn Write,
 ) -> io::Result<()> {
-    let (settings, training) = (&file.settings, &file.training);
-    let scale = settings.source.sensor.scale;
-    let first = training.stages.first();
-    let method = first.map_or(settings.training.method, |stage| stage.method);
-    writeln!(
-        out,
-        "{scale}, {}, {method}, seed {}",
-        counted(settings.hidden, "hidden node"),
-        settings.seed
-    )?;
-    for stage in training.stages.iter().skip(1) {
-        writeln!(out, "From epoch {} {}", stage.first_epoch, stage.method)?;
-    }
-    write_scene(file, out)?;
-    let rows = settings.source.model_size().map_or(1, |size| size.rows);
-    let whole = |samples: usize| samples.div_ceil(rows) * rows;
-    writeln!(
-        out,
-        "{} for training, {} for validation, {} for test",
-        counted(whole(settings.source.samples), "sample"),
-        whole(settings.source.validation_samples),
-        whole(settings.source.test_samples)
-    )?;
-    let reason = training
-        .stop_reason
-        .map_or("not ended".to_owned(), |reason| reason.to_string());
-    let time = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
-    writeln!(
-        out,
-        "Ended after {}, {} on one thread ({} an epoch): {reason}",
-        counted(epochs(training), "epoch"),
-        time(training.seconds),
-        time(epoch_seconds(training))
-    )?;
-    writeln!(out, "Weights kept from epoch {}", training.best_epoch)?;
-    if let Some(flaw) = flaw {
-        writeln!(out, "Warning: {flaw}")?;
-    }
-    writeln!(out)?;
-    if training.starts.len() > 1 {
-        write_starts(&training.starts, out)?;
-        writeln!(out)?;
-    }
-    let published = settings.published();
-    write_table(&error_rows(&file.errors, &file.baselines, published.as_ref()), out)?;
-    for remark in remarks(file) {
-        writeln!(out, "Warning: {remark}")?;
-    }
-    let reference = file.baselines.reference.as_ref();
-    if reference.is_some_and(Errors::is_rounding) {
-        writeln!(
-            out,
-            "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \
-             given."
-        )?;
-    }
-    write_decoders(decoders, reference, out)?;
-    writeln!(
-        out,
-        "\nErrors in % are relative to the coordinate, as in the paper, or to the stroke where stated."
-    )?;
-    for note in scale.note().iter().map(String::as_str).chain([Geometry::ASSUMPTION]) {
-        writeln!(out, "{note}")?;
-    }
-    Ok(())
-}
-
-/// Writes the scene, the size of its equations and of the network, and warnings.
-fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
-    let SimulatedSettings { source, inputs, .. } = &file.settings;
     let scene = &source.scene;
     let Noise {
         relative,
@@ -288,8 +398,8 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
     } = scene.noise;
     write!(
         out,
-        "Rows {}, axes {}, loading {}, inputs {} ({})",
-        scene.rows, scene.movement, scene.loading, inputs.quantity, inputs.scaling
+        "{}: rows {}, axes {}, loading {}, inputs {} ({})",
+        source.sensor.scale, scene.rows, scene.movement, scene.loading, inputs.quantity, inputs.scaling
     )?;
     let noises = [
         (relative > 0.0).then(|| format!("noise {relative:e}")),
@@ -303,7 +413,8 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
         write!(out, ", {noise}")?;
     }
     writeln!(out)?;
-    if let Ok(size) = file.settings.source.model_size() {
+    let size = source.model_size().ok();
+    if let Some(size) = size {
         write!(
             out,
             "A frame has {} and {}; {} with {}",
@@ -313,68 +424,17 @@ fn write_scene(file: &NetworkFile, out: &mut impl Write) -> io::Result<()> {
             counted(file.network.weights(), "weight")
         )?;
     }
-    let outlook = Outlook::of(source).ok();
-    match condition(outlook.as_ref()) {
+    match condition(Outlook::of(source).ok().as_ref()) {
         Some(condition) => writeln!(out, "; condition number of the worst row {condition:.1e}")?,
         None => writeln!(out)?,
     }
-    for warning in warnings(outlook.as_ref()) {
-        writeln!(out, "Warning: {warning}")?;
-    }
-    Ok(())
-}
-
-/// Writes the errors of each decoder and their ratio to the reference.
-fn write_decoders(decoders: &[DecoderReport], reference: Option<&Errors>, out: &mut impl Write) -> io::Result<()> {
-    if decoders.is_empty() {
-        return Ok(());
-    }
-    let headings = ["Z %", "Z mm", "x reference", "residual", "us a frame"];
-    write!(out, "\n{:<14}", "Decoder")?;
-    for heading in headings {
-        write!(out, "{heading:>12}")?;
-    }
-    writeln!(out)?;
-    for report in decoders {
-        write!(out, "{:<14}", report.name())?;
-        let ratio = reference.and_then(|reference| report.errors.times(reference));
-        let values = [
-            report.errors.z_percent,
-            Some(report.errors.z_mm),
-            ratio,
-            Some(report.residual).filter(|residual| residual.is_finite()),
-            Some(report.cost.frame_us),
-        ];
-        for value in values {
-            write!(out, "{:>12}", format_number(value))?;
-        }
-        writeln!(out)?;
-    }
-    for report in decoders {
-        for remark in &report.remarks {
-            writeln!(out, "Warning: {}: {remark}", report.name())?;
-        }
-    }
+    let rows = size.map_or(1, |size| size.rows);
+    let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,
-        "The residual is the rms relative difference between the readings and those of the decoded deformation; it \
-         needs no ground truth."
+        "{} for training, {} for validation, {} for the test",
+        counted(whole(source.samples), "sample"),
+        whole(source.validation_samples),
+        whole(source.test_samples)
     )
-}
-
-fn write_table(rows: &[ErrorRow], out: &mut impl Write) -> io::Result<()> {
-    let headings = ["Z %", "X %", "Y %", "Z mm", "Z % stroke", "worst mm"];
-    write!(out, "{:<14}", "")?;
-    for heading in headings {
-        write!(out, "{heading:>12}")?;
-    }
-    writeln!(out)?;
-    for row in rows {
-        write!(out, "{:<14}", row.name)?;
-        for value in row.values() {
-            write!(out, "{:>12}", format_number(value))?;
-        }
-        writeln!(out)?;
-    }
-    Ok(())
 }

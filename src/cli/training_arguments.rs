@@ -11,9 +11,9 @@ use super::{
 };
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MOST_STARTS, Measured, MeasuredSettings, RunSettings, SimulatedSettings, Simulation},
-    network::{InputChoice, LARGEST_HIDDEN, ScalingChoice},
-    scene::RowModel,
+    evaluation::{MOST_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
+    import::{Plan, Setup},
+    network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
 };
@@ -32,12 +32,12 @@ pub(super) struct TrainingArguments {
     /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
     starts: Option<usize>,
-    /// Training method [default: lm; of own data br]
+    /// Training method [default: lm; br for a recording]
     #[arg(long, value_parser = method())]
     method: Option<Method>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
-    /// Maximum number of epochs [default: 1000; of own data 300]
+    /// Maximum number of epochs [default: 1000; 300 for a recording]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
     epochs: Option<usize>,
     /// Training error (mse, scaled) at which training ends [default: 0]
@@ -85,36 +85,23 @@ impl TrainingArguments {
         })
     }
 
-    /// Row model and scaling for own data, where they are given.
-    ///
-    /// # Errors
-    /// Names the first argument given that has a meaning for a simulated sensor only.
-    fn measured_inputs(&self, has_row_wires: bool) -> Result<(Option<RowModel>, Option<ScalingChoice>), Failure> {
-        let given = self.scene.measured(has_row_wires)?;
-        if !self.scene.decoder.is_empty() {
-            let message = "--decoder: own data (--data) are tested with the mean, ridge and the network; leave it out, or \
-                           use trade";
-            return Err(Failure::Arguments(message.to_owned()));
+    /// Setup of a new run: on samples of `plan`, or else of a simulated array. `holds_out` is true if the plan states its share
+    /// for validation; otherwise the method determines it.
+    pub(super) fn setup(&self, plan: Option<Plan>, holds_out: bool) -> Result<Setup, Failure> {
+        let Some(mut plan) = plan else {
+            return Ok(self.settings()?.into());
+        };
+        let settings = self.recorded(plan.import.row_wire.is_some())?;
+        if !holds_out {
+            plan.division.validation_fraction = settings.validation_fraction();
         }
-        refuse_beside_own_data([
-            self.array.is_some(),
-            self.samples.is_some(),
-            self.test_samples.is_some(),
-            self.validation_samples.is_some(),
-        ])?;
-        Ok(given)
+        Ok(Setup::recording(settings, plan))
     }
 
-    /// Settings of a new run on own data.
-    pub(super) fn measured(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
-        let (rows, scaling) = self.measured_inputs(has_row_wires)?;
-        let rows = rows.unwrap_or(RowModel::Shared);
-        let default = RunSettings::from(Measured { rows });
+    /// Settings of a new run on a recording.
+    fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        let default = self.recorded_source(has_row_wires)?;
         Ok(RunSettings {
-            inputs: InputChoice {
-                scaling: scaling.unwrap_or(default.inputs.scaling),
-                ..default.inputs
-            },
             hidden: self.hidden.unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
             training: self.training(default.training)?,
@@ -123,31 +110,19 @@ impl TrainingArguments {
         })
     }
 
-    /// Training settings with which a run on own data of the settings `saved`, with the columns `inputs`, is resumed.
-    pub(super) fn resumed_measured(
-        &self,
-        saved: &MeasuredSettings,
-        inputs: &[String],
-        has_row_wires: bool,
-    ) -> Result<TrainingSettings, Failure> {
-        let (rows, scaling) = self.measured_inputs(has_row_wires)?;
-        check_same("rows", rows.map(rows_name), rows_name(saved.source.rows))?;
-        check_same("scaling", scaling, saved.inputs.scaling)?;
-        let columns = self.scene.columns();
-        check_same(
-            "inputs",
-            (!columns.is_empty()).then(|| columns.join(",")),
-            inputs.join(","),
-        )?;
-        self.check_network(saved.hidden, saved.starts, saved.seed)?;
-        self.training(saved.training)
-    }
-
-    /// Refuses another number of hidden nodes or starts, or another seed.
-    fn check_network(&self, hidden: usize, starts: usize, of_seed: Seed) -> Result<(), Failure> {
-        check_same("hidden", self.hidden, hidden)?;
-        check_same("starts", self.starts, starts)?;
-        check_same("seed", self.seed, of_seed)
+    /// Default settings with the row model and scaling given.
+    ///
+    /// # Errors
+    /// Names the first argument given that is for a simulated array only.
+    fn recorded_source(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        let settings = self.scene.recorded(has_row_wires)?;
+        refuse_with_recordings([
+            self.array.is_some(),
+            self.samples.is_some(),
+            self.test_samples.is_some(),
+            self.validation_samples.is_some(),
+        ])?;
+        Ok(settings)
     }
 
     /// The sensor, if an array scale is given.
@@ -155,21 +130,43 @@ impl TrainingArguments {
         self.array.map(SensorModel::new)
     }
 
-    /// Training settings with which a run of the settings `saved` is resumed.
-    pub(super) fn training_from(&self, saved: &SimulatedSettings) -> Result<TrainingSettings, Failure> {
-        if let Some(what) = self.scene.difference(saved)? {
-            return Err(Failure::Arguments(format!(
-                "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
-                 with another --checkpoint"
-            )));
+    /// Training settings with which the run of the setup `saved` is resumed.
+    ///
+    /// # Errors
+    /// Names the first argument given that differs.
+    pub(super) fn resumed(&self, saved: &Setup) -> Result<TrainingSettings, Failure> {
+        let settings = saved.settings();
+        match (&settings.source, saved.plan()) {
+            (Source::Simulated(source), _) => {
+                let simulated = saved.simulated().expect("the source is simulated");
+                if let Some(what) = self.scene.difference(&simulated)? {
+                    return Err(Failure::Arguments(format!(
+                        "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
+                         with another --checkpoint"
+                    )));
+                }
+                check_same("array", self.array, source.sensor.scale)?;
+                check_same("samples", self.samples, source.samples)?;
+                check_same("test-samples", self.test_samples, source.test_samples)?;
+                check_same("validation-samples", self.validation_samples, source.validation_samples)?;
+            }
+            (Source::Measured(_), plan) => {
+                let import = plan.map(|plan| &plan.import);
+                self.recorded_source(import.is_some_and(|import| import.row_wire.is_some()))?;
+                self.scene.check_resumed(settings)?;
+                let columns = self.scene.columns();
+                let given = (!columns.is_empty()).then(|| columns.join(","));
+                check_same(
+                    "inputs",
+                    given,
+                    import.map_or(String::new(), |import| import.inputs.join(",")),
+                )?;
+            }
         }
-        let source = &saved.source;
-        check_same("array", self.array, source.sensor.scale)?;
-        check_same("samples", self.samples, source.samples)?;
-        check_same("test-samples", self.test_samples, source.test_samples)?;
-        check_same("validation-samples", self.validation_samples, source.validation_samples)?;
-        self.check_network(saved.hidden, saved.starts, saved.seed)?;
-        self.training(saved.training)
+        check_same("hidden", self.hidden, settings.hidden)?;
+        check_same("starts", self.starts, settings.starts)?;
+        check_same("seed", self.seed, settings.seed)?;
+        self.training(settings.training)
     }
 
     /// The given method and stopping rules; those not given are as in `present`.
@@ -205,29 +202,22 @@ impl TrainingArguments {
     }
 }
 
-/// Name of a row model as an argument.
-fn rows_name(rows: RowModel) -> &'static str {
-    match rows {
-        RowModel::Shared => "all",
-        RowModel::Each => "known",
-    }
-}
-
-/// Refuses arguments that belong to a simulated sensor, given in this order: array, training, test and validation samples.
-pub(super) fn refuse_beside_own_data(are_given: [bool; 4]) -> Result<(), Failure> {
+/// Refuses arguments of a simulated array next to a recording, given in this order: array, training, test and validation
+/// samples.
+pub(super) fn refuse_with_recordings(are_given: [bool; 4]) -> Result<(), Failure> {
     let arguments = [
-        ("--array", "own data (--data) have no array; leave it out"),
+        ("--array", "a recording (--data) has no array; leave it out"),
         (
             "--samples",
-            "all rows of own data (--data) are used; choose some with --where",
+            "all rows of a recording (--data) are used; choose some with --where",
         ),
         (
             "--test-samples",
-            "of own data (--data) a share tests; give --test-fraction or --test-data",
+            "a share of a recording (--data) is held out for testing; give --test-fraction or --test-data",
         ),
         (
             "--validation-samples",
-            "of own data (--data) a share is held out; give --validation-fraction",
+            "a share of a recording (--data) is held out for validation; give --validation-fraction",
         ),
     ];
     match arguments.iter().zip(are_given).find(|(_, is_given)| *is_given) {
@@ -273,7 +263,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use crate::export::report::train_command;
+    use crate::{evaluation::Measured, export::report::train_command, scene::RowModel};
 
     fn parsed(line: &str) -> TrainingArguments {
         let command = TrainingArguments::augment_args(Command::new("train"));
@@ -292,18 +282,20 @@ mod tests {
     }
 
     #[test]
-    fn own_data_have_the_defaults_of_the_library() {
-        let measured = RunSettings::from(Measured { rows: RowModel::Shared });
-        assert_eq!(parsed("train").measured(false).unwrap(), measured);
+    fn recordings_have_the_defaults_of_the_library() {
+        let recorded = |line: &str| parsed(line).recorded(false).unwrap();
+        let default = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(recorded("train"), default);
         // Naming the default method keeps what suits recordings.
-        assert_eq!(parsed("train --method br").measured(false).unwrap(), measured);
-        let told = "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4";
-        let told = parsed(told).measured(false).unwrap();
+        assert_eq!(recorded("train --method br"), default);
+        let given = recorded(
+            "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
+        );
         assert_eq!(
-            (told.training.stopping.epochs, told.starts, told.hidden, told.seed),
+            (given.training.stopping.epochs, given.starts, given.hidden, given.seed),
             (7, 2, 3, Seed(4))
         );
-        assert_eq!(told.training.method, Method::bayesian_regularization());
+        assert_eq!(given.training.method, Method::bayesian_regularization());
     }
 
     #[test]

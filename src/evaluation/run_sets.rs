@@ -38,6 +38,14 @@ impl RunSets {
 }
 
 impl SimulatedSettings {
+    /// Draws the sets of these settings, as far as a run holds them in memory.
+    ///
+    /// # Errors
+    /// If the settings are invalid, or the samples do not fit into memory.
+    pub fn draw_sets(&self) -> Result<RunSets, RunError> {
+        Ok(self.checked_sets_unless(&|| false)?.expect("nothing cancels it"))
+    }
+
     /// As [`Self::sets_unless`], after a check that they fit into memory.
     pub(crate) fn checked_sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
         Workload::of(self)?.check_memory()?;

@@ -12,6 +12,7 @@ mod heat_map;
 mod look;
 mod of_decoders;
 mod of_epochs;
+mod of_errors;
 mod of_experiment;
 mod of_learning;
 mod of_nodes;
@@ -39,11 +40,10 @@ pub use heat_map::HeatMap;
 pub use look::{Hue, Key, LineStyle, Look, Marker};
 pub use of_decoders::decoders_figure;
 pub use of_epochs::{compared_losses_figure, loss_figure, training_state_figure};
+pub use of_errors::{ErrorBins, error_histogram_figure, pair_sample, target_histogram_figure, target_pairs};
 pub use of_experiment::experiment_figure;
 pub use of_learning::learning_curve_figure;
-pub use of_nodes::{
-    ErrorBins, error_histogram_figure, node_figure, pair_address, target_error_histogram_figure, z_pairs_mm,
-};
+pub use of_nodes::{node_figure, pair_address, z_pairs_mm};
 pub use of_readings::{readings_figure, zero_gains_figure};
 pub use of_recorded::position_error_map;
 pub use of_rows::singular_values_figure;

@@ -118,7 +118,7 @@ fn a_training_saved_on_closing_resumes_where_it_stood() {
     drop(driver);
     assert_eq!(files_in(folder.path()), ["kept.checkpoint"]);
     let file = CheckpointFile::load(&path).unwrap();
-    assert_eq!(file.settings, endless());
+    assert_eq!(file.settings, endless().into());
     let run = file.resume().unwrap();
     assert!(run.leader().latest().epoch >= shown && run.stop_reason().is_none());
 }
@@ -206,7 +206,7 @@ fn two_trainings_are_both_asked_about_and_both_saved() {
     give(&other);
     wait_for_closing(&mut driver);
     drop(driver);
-    assert_eq!(CheckpointFile::load(&one).unwrap().settings, endless());
+    assert_eq!(CheckpointFile::load(&one).unwrap().settings, endless().into());
     let file = MeasuredCheckpointFile::load(&other).unwrap();
     assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
 }

@@ -62,7 +62,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
 
     let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
-    let shown = runs.each_ref().map(|run| NetworkFile::from_run(run).unwrap());
+    let shown = runs.each_ref().map(|run| NetworkFile::from_run(run, None).unwrap());
     // What is compared is saved as it is in view, by the names of the runs.
     let saved = folder.path().join("compared.svg");
     driver.save("Surfaces, SVG", &saved);
@@ -75,11 +75,11 @@ fn two_runs_are_compared_and_survive_a_restart() {
     assert_eq!(titles.map(|title| count(&svg, &title)), [1, 1]);
     assert_eq!(count(&svg, "z (mm)"), 3, "two axes and one key");
     let check = |driver: &Driver| {
-        let [a, b] = shown.each_ref().map(|file| file.errors);
+        let [a, b] = shown.each_ref().map(|file| *file.scores.network.nodes().unwrap());
         for (letter, errors) in [("A", a), ("B", b)] {
             let cell = format!("Z error, %, {letter}: {}", format_number(errors.z_percent));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
-            let cell = format!("worst node, mm, {letter}: {}", format_number(errors.worst_mm));
+            let cell = format!("Worst node, mm, {letter}: {}", format_number(errors.worst_mm));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));

@@ -46,19 +46,26 @@ fn table(driver: &Driver) -> Vec<String> {
 /// The same from the library.
 fn table_of(run: &Run) -> Vec<String> {
     let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
-    let limit = run.baselines().unwrap().reference.filter(|limit| !limit.is_rounding());
+    let limit = run
+        .baselines()
+        .unwrap()
+        .nodes()
+        .unwrap()
+        .reference
+        .filter(|limit| !limit.is_rounding());
     let of_decoder = |(wanted, name): (DecoderResult, &str)| {
         let report = set.measure(wanted.kind, wanted.precision, run.test()).unwrap().unwrap();
-        let ratio = limit.map(|limit| report.errors.z_mm / limit.z_mm);
+        let errors = *report.errors.nodes().unwrap();
+        let ratio = limit.map(|limit| errors.z_mm / limit.z_mm);
         let figures = [
-            Some(("Z %", report.errors.z_percent)),
+            Some(("Z %", errors.z_percent)),
             ratio.map(|ratio| ("× limit", Some(ratio))),
-            Some(("residual", Some(report.residual))),
+            Some(("residual", report.residual)),
         ];
         let cell = |(heading, value)| format!("{name}, {heading}: {}", format_number(value));
         figures.into_iter().flatten().map(cell).collect::<Vec<_>>()
     };
-    DecoderResult::pending()
+    DecoderResult::pending(&run.settings().source)
         .into_iter()
         .zip(NAMES)
         .flat_map(of_decoder)

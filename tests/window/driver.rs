@@ -8,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, Views, WindowFile};
-use decoupler::evaluation::{Run, SimulatedSettings, Simulation, error_rows};
+use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
+use decoupler::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
 use egui_kittest::{
@@ -119,7 +119,9 @@ impl Driver {
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
-        driver.wait("the first surface", |driver| driver.state().test().is_some());
+        driver.wait("the first surface", |driver| {
+            driver.state().test().is_some() || driver.state().source == SourceKind::Recording
+        });
         driver
     }
 
@@ -505,10 +507,10 @@ pub(crate) fn trained(settings: SimulatedSettings) -> Run {
 /// The error table that the library gives for `run`, in the window's words.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
-    let rows = error_rows(&run.node_scores().unwrap().network, run.baselines().unwrap(), None);
-    let cells = rows.iter().flat_map(|row| {
-        let named = columns.iter().zip(row.values());
-        named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(value)))
+    let table = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
+    let cells = table.blocks[0].rows.iter().flat_map(|row| {
+        let named = columns.iter().zip(&row.errors);
+        named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(*value)))
     });
     cells.collect()
 }

@@ -100,7 +100,7 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     assert_eq!(driver.state().draft, experiment.cells()[1].settings);
     assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
     let z = results.cells[1].trials[0].errors.z_percent;
-    let shown = driver.state().result().unwrap().errors.z_percent;
+    let shown = driver.state().result().unwrap().errors.percent();
     assert_eq!(shown.map(f64::to_bits), z.map(f64::to_bits), "it is the cell's network");
 }
 
@@ -297,11 +297,9 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     driver.click("Open sweep folder…");
     driver.type_into("File", &home.path().join("trials").display().to_string());
     driver.click_button("Open");
-    driver.wait("the first trials", |driver| {
-        driver.says("2 of 4 trials finished; new ones")
-    });
+    driver.wait("the first trials", |driver| driver.says("2 of 4 trials finished"));
     train("2/2");
-    driver.wait("the other trials", |driver| driver.says("All 4 trials finished."));
+    driver.wait("the other trials", |driver| driver.says("4 of 4 trials finished"));
     assert!(
         driver.says("Sweep folder trials: 4 of 4 trials finished"),
         "{:#?}",

@@ -67,7 +67,7 @@ fn on_show(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
 
 /// What the library decodes.
 fn by_library(file: &NetworkFile, frame_ohm: &[f64]) -> Vec<DVec3> {
-    let scale = file.settings.source.sensor.scale;
+    let scale = file.settings.simulated().unwrap().source.sensor.scale;
     let mut decoder = CompiledNetworks::<f64>::new(&file.network, scale.rows());
     let mut answer_mm = vec![0.0; scale.rows() * scale.coordinates_per_row()];
     decoder.decode(frame_ohm, &mut answer_mm).unwrap();
@@ -107,9 +107,9 @@ fn without_a_network_one_click_trains_one_and_another_shows_it_live() {
     let (time_s, nodes) = on_show(&driver).unwrap();
     let scene = Scene {
         noise: Noise::default(),
-        ..file.settings.source.scene
+        ..file.settings.simulated().unwrap().source.scene
     };
-    let mut source = Simulated::new(&file.settings.source.sensor, &scene, Seed(0), 50.0).unwrap();
+    let mut source = Simulated::new(&file.settings.simulated().unwrap().source.sensor, &scene, Seed(0), 50.0).unwrap();
     let mut ohm = vec![0.0; source.readings()];
     while source.next_frame(&mut ohm).unwrap() < time_s {}
     assert_eq!(nodes, by_library(&file, &ohm), "at {time_s} s");
@@ -322,7 +322,7 @@ fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     let file = network(&driver, 0);
-    let sensor = file.settings.source.sensor;
+    let sensor = file.settings.simulated().unwrap().source.sensor;
     let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
     let rows = (0..10).map(|row| sensor.row_resistances(row, &at_rest).unwrap());
     let frame_ohm: Vec<f64> = rows.flatten().collect();

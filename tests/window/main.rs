@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;
-mod closing;
 mod comparing;
 mod configuring;
 mod continuing;
@@ -15,22 +14,21 @@ mod extremes;
 mod habits;
 mod identifying;
 mod import_choices;
+mod importing;
 mod live;
 mod looking;
 mod newcomer;
-mod overwriting;
-mod own_data;
-mod own_findings;
-mod own_surfaces;
 mod pictures;
 mod pressing;
 mod rasterise;
 mod reading_errors;
 mod recordings;
 mod remembering;
+mod results;
 mod scenes;
 mod scrubbing;
 mod snapshots;
+mod sources;
 mod surface_view;
 mod trading;
 mod training;

@@ -27,7 +27,7 @@ fn file() -> (tempfile::TempDir, PathBuf) {
 #[track_caller]
 fn shows_the_baselines_of(driver: &Driver, settings: SimulatedSettings) {
     let run = Run::prepare(settings).unwrap();
-    let baselines = run.baselines().unwrap();
+    let baselines = run.baselines().unwrap().nodes().unwrap();
     for (name, errors) in [("training mean", baselines.mean), ("linear map", baselines.linear)] {
         let cells = [
             format!("{name}, Z %: {}", format_number(errors.z_percent)),
@@ -106,8 +106,8 @@ fn a_linear_map_that_beats_the_network_is_marked() {
     driver.enter("Epochs", "1");
     driver.train();
     driver.settle();
-    let result = driver.state().result().unwrap().errors;
-    let linear = driver.state().run.as_ref().unwrap().baselines.linear;
+    let result = *driver.state().result().unwrap().errors.nodes().unwrap();
+    let linear = driver.state().run.as_ref().unwrap().baselines.nodes().unwrap().linear;
     assert!(linear.z_mm < result.z_mm, "one epoch is too few");
     assert!(driver.has(MARK), "{:#?}", driver.texts());
     driver.enter("Epochs", "60");
@@ -115,7 +115,7 @@ fn a_linear_map_that_beats_the_network_is_marked() {
     driver.enter("Training samples", "1000");
     driver.train();
     driver.settle();
-    let result = driver.state().result().unwrap().errors;
+    let result = *driver.state().result().unwrap().errors.nodes().unwrap();
     assert!(result.z_mm < linear.z_mm);
     assert!(!driver.has(MARK));
 }

@@ -25,7 +25,7 @@ fn wait_for_scene(driver: &mut Driver) {
         let (state, draft) = (driver.state(), driver.state().draft);
         let shown = match (&state.preview, &state.run) {
             (Some(preview), _) => Some(preview.settings),
-            (None, run) => run.as_ref().map(|run| run.settings),
+            (None, run) => run.as_ref().and_then(|run| run.simulated()),
         };
         shown
             .is_some_and(|shown| (shown.source.sensor, shown.source.scene) == (draft.source.sensor, draft.source.scene))
@@ -63,7 +63,7 @@ fn one_row_is_all_that_is_drawn() {
     assert!(driver.has("6 unknowns, 18 equations a frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
-    assert!(driver.has("1 of 100"), "a snapshot is one sample");
+    assert!(driver.says("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
     settings.source.scene.rows = Rows::One(3);
@@ -146,9 +146,9 @@ fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
     settings.inputs.scaling = ScalingChoice::Whitening;
     let run = trained(settings);
     assert_eq!(driver.table(), table_of(&run));
-    let limit = run.baselines().unwrap().reference.unwrap();
+    let limit = run.baselines().unwrap().nodes().unwrap().reference.unwrap();
     assert!(limit.z_mm > 0.0);
-    let ratio = run.node_scores().unwrap().network.z_mm / limit.z_mm;
+    let ratio = run.errors().nodes().unwrap().z_mm / limit.z_mm;
     let said = format!("{} times the limit that noise sets", format_number(ratio));
     assert!(driver.says(&said), "{said}: {:#?}", driver.texts());
 }
@@ -298,39 +298,4 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
         let mut words = text.split(|letter: char| !letter.is_alphanumeric());
         assert!(words.all(|word| word != "NaN" && word != "inf"), "{text}");
     }
-}
-
-#[test]
-fn files_written_before_there_were_scenes_still_open() {
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
-    let mut driver = Driver::open();
-    driver.open_form("Type the path of a checkpoint");
-    let checkpoint = fixtures.join("checkpoint_version_1.json");
-    driver.type_into("File", &checkpoint.display().to_string());
-    driver.click_button("Open");
-    driver.wait("the training", |driver| driver.state().run.is_some());
-    driver.wait("its result", |driver| driver.state().result().is_some());
-    let draft = driver.state().draft;
-    assert_eq!(
-        (draft.source.scene, draft.inputs),
-        (Scene::default(), InputChoice::PAPER)
-    );
-    assert!(matches!(driver.state().phase, Phase::Paused | Phase::Ended(_)));
-    assert!(driver.has("Decoupled surface"));
-
-    let network = fs::read_to_string(fixtures.join("network_version_1.json")).unwrap();
-    let workspace = format!(
-        r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":1,"name":"Old","network":{network}}}],"pinned":[1,null]}}"#
-    );
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("workspace.json"), workspace).unwrap();
-    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
-    driver.wait("the run", |driver| !driver.state().runs.workspace.runs.is_empty());
-    assert_eq!(driver.notice(), None);
-    let kept = &driver.state().runs.workspace.runs[0].file.settings;
-    assert_eq!((kept.source.scene, kept.inputs), (Scene::default(), InputChoice::PAPER));
-    driver.click_button("Compare");
-    driver.wait("its surface", |driver| {
-        driver.views().compare.places[0].compared.is_some()
-    });
 }

@@ -44,8 +44,17 @@ fn by_library(plan: &TradeOffPlan, noise: f64) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for &preset in &plan.presets {
         let settings = plan.settings(preset, noise);
-        let on_point = |point| points.push(point);
-        measure_trade_off(preset, &settings, &plan.hidden, &plan.decoders, || false, on_point).unwrap();
+        let on_point = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
+        let sets = settings.draw_sets().unwrap();
+        measure_trade_off(
+            &settings.into(),
+            &sets,
+            &plan.hidden,
+            &plan.decoders,
+            || false,
+            on_point,
+        )
+        .unwrap();
     }
     points
 }
@@ -61,7 +70,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
         ((16, 16), Some(TradeOffEnding::Complete))
     );
     for level in &outcome.levels {
-        for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise)) {
+        for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise.unwrap())) {
             assert_eq!(
                 (shown.report.kind, shown.report.precision),
                 (own.report.kind, own.report.precision)
@@ -92,7 +101,7 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     let level = driver.views().trade_off.shown().unwrap();
     let fastest = fastest_under(&level.points, 5.0).unwrap().clone();
     let best = most_accurate_under(&level.points, 1e9).unwrap().clone();
-    let is_best = format_percent(best.report.errors.z_percent);
+    let is_best = format_percent(best.report.errors.percent());
     let answer = driver
         .texts()
         .into_iter()
@@ -111,7 +120,10 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
     assert!(driver.has("No measured decoder is this accurate."));
 
     driver.click("Load into Train view");
-    assert_eq!((driver.shown(), driver.state().draft), ("Train", fastest.settings));
+    assert_eq!(
+        (driver.shown(), driver.state().draft),
+        ("Train", fastest.settings.simulated().unwrap())
+    );
 }
 
 #[test]
@@ -132,7 +144,7 @@ fn a_click_on_a_point_loads_its_configuration() {
         driver.views().trade_off.look.marked.unwrap(),
         driver.views().trade_off.shown().unwrap(),
     );
-    assert_eq!(level.points[marked].preset, Preset::Best);
+    assert_eq!(level.points[marked].preset, Some(Preset::Best));
     let row = driver
         .texts()
         .into_iter()
@@ -172,7 +184,7 @@ fn what_is_measured_is_saved_as_table_and_figures() {
     let heading = columns(table.lines().next().unwrap());
     assert!(table.lines().all(|line| columns(line) == heading), "{table}");
     let points = &driver.views().trade_off.outcome.as_ref().unwrap().levels[0].points;
-    let z = points[0].report.errors.z_percent.unwrap();
+    let z = points[0].report.errors.percent().unwrap();
     assert!(table.lines().nth(1).unwrap().contains(&format!(",{z:?},")), "{table}");
     let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
     for text in [

@@ -108,7 +108,7 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
     assert_eq!(driver.get("Actual surface").value(), first);
 
     driver.click("Show");
-    let worst = driver.state().result().unwrap().errors.worst_node;
+    let worst = driver.state().result().unwrap().errors.nodes().unwrap().worst_node;
     assert_eq!(driver.views().train.snapshot, worst.snapshot);
     assert_eq!(driver.views().train.lights.node, Some(worst.row * 6 + worst.node));
     for theme in ["Light theme", "Dark theme"] {
@@ -241,7 +241,7 @@ fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
     driver.train();
     let run = driver.state().run.as_ref().unwrap();
     let result = run.result.as_ref().unwrap();
-    let nodes = run.test.frame(result.decoupled_mm.view(), 0).nodes_mm;
+    let nodes = run.test.array().unwrap().frame(result.answers.view(), 0).nodes_mm;
     // The best network is the one before the first step, which knows nothing yet.
     assert_eq!(result.best_epoch, 0);
     let (low, high) = (4.0 - 0.08, 5.0 + 0.08);

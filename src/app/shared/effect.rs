@@ -1,17 +1,35 @@
-use super::{FileTask, Look, Matter, Notice};
-use crate::{evaluation::SimulatedSettings, figure::Figure, training::TrainerState};
+use std::{path::PathBuf, sync::Arc};
+
+use super::{FileTask, Look, Matter, Notice, SourceKind};
+use crate::{
+    evaluation::{RunSettings, SimulatedSettings},
+    export::NetworkFile,
+    figure::Figure,
+    import::{Plan, Setup},
+    training::TrainerState,
+};
 
 /// Request of a view to the window, which carries all of them out in one place once everything is drawn.
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// Change the settings of the next training.
     Configure(Box<SimulatedSettings>),
+    /// Change the settings of the next training on a recording.
+    ConfigureRecording(Box<RunSettings>),
+    /// Train on this plan of an import from now on, or say what it lacks.
+    Import(Result<Arc<Plan>, String>),
+    /// Train on a source of this kind from now on.
+    ChooseSource(SourceKind),
+    /// Show the setup of another run as that of the next training.
+    TakeSetup(Box<Setup>),
     /// Show the view that trains.
     ShowTraining,
     /// Begin training.
     Train,
+    /// Take up the training saved in this checkpoint.
+    OpenTraining(PathBuf),
     /// Show the training that has these settings and whose starts stand so.
-    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
+    TakeUp(Box<Setup>, Vec<TrainerState>),
     /// Hold the training.
     Pause,
     /// Go on with it.
@@ -42,6 +60,8 @@ pub enum Effect {
         /// Sentence that tells so.
         notice: String,
     },
+    /// Keep the run of a network file that was opened.
+    KeepRun(Box<NetworkFile>),
     /// Call the kept run with this number so.
     RenameRun(u64, String),
     /// Show the kept run with this number in one of the two places, or nothing.

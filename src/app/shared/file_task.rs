@@ -4,7 +4,7 @@ use std::{
     sync::{Arc, mpsc::Sender},
 };
 
-use crate::{app::training_worker::RunId, evaluation::Run};
+use crate::app::training_worker::{RunId, TrainedRun};
 
 /// A file whose path is to be asked for. It carries what is to be written, as it is when it is asked for: what the user
 /// does until the path is known changes nothing.
@@ -91,14 +91,14 @@ impl fmt::Debug for Contents {
 #[derive(Clone)]
 pub struct ContentsOfRun(Arc<Take>);
 
-type Take = dyn Fn(&Run) -> Result<Contents, String> + Send + Sync;
+type Take = dyn Fn(&TrainedRun) -> Result<Contents, String> + Send + Sync;
 
 impl ContentsOfRun {
     /// Contents of `run`.
     ///
     /// # Errors
     /// If it has none.
-    pub fn take(&self, run: &Run) -> Result<Contents, String> {
+    pub fn take(&self, run: &TrainedRun) -> Result<Contents, String> {
         (self.0)(run)
     }
 }
@@ -124,7 +124,7 @@ impl FileTask {
         words: FileWords,
         stem: &str,
         run: RunId,
-        take: impl Fn(&Run) -> Result<Contents, String> + Send + Sync + 'static,
+        take: impl Fn(&TrainedRun) -> Result<Contents, String> + Send + Sync + 'static,
     ) -> Self {
         Self {
             words,

@@ -4,23 +4,24 @@ use std::{path::Path, sync::Arc};
 
 use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
 use crate::{
-    app::training_worker::RunId,
-    evaluation::{DecoderReport, PastNetworks, Run, SimulatedSettings},
+    app::training_worker::{RunId, TrainedRun},
+    evaluation::{DecoderReport, PastNetworks, Run},
     export::{
-        MeasuredNetworkFile, NetworkFile,
+        NetworkFile,
         bundle::{BundleError, BundleFormat, BundlePrecision, BundleReport, export_bundle},
         format_number,
         report::RunReport,
     },
+    import::Setup,
 };
 
 /// A trained network that can be exported.
 #[derive(Clone, Debug)]
 pub enum NetworkSource {
     /// Of the training on show, which the worker has.
-    Training(RunId, Box<SimulatedSettings>),
+    Training(RunId, Box<Setup>),
     /// Of a past epoch of the training on show.
-    Past(RunId, Box<SimulatedSettings>, usize, PastNetworks),
+    Past(RunId, Box<Setup>, usize, PastNetworks),
     /// Of a kept run with this name.
     Kept(String, Arc<NetworkFile>),
 }
@@ -34,27 +35,28 @@ impl NetworkSource {
         contents: impl Fn(Arc<NetworkFile>, Option<&Run>) -> Contents + Send + Sync + 'static,
     ) -> FileTask {
         match self {
-            Self::Training(run, settings) => {
-                let take = move |run: &Run| {
-                    let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
-                    Ok(contents(Arc::new(file), Some(run)))
+            Self::Training(run, setup) => {
+                let take = move |trained: &TrainedRun| {
+                    let file = trained.network_file()?;
+                    Ok(contents(Arc::new(file), Some(&trained.run)))
                 };
-                FileTask::save_run(words, &file_stem(what, settings), *run, take)
+                FileTask::save_run(words, &file_stem(what, setup), *run, take)
             }
-            Self::Past(run, settings, epoch, past) => {
+            Self::Past(run, setup, epoch, past) => {
                 let (epoch, past) = (*epoch, past.clone());
-                let take = move |run: &Run| {
+                let take = move |trained: &TrainedRun| {
+                    let (run, recorded) = (&trained.run, trained.recorded.as_ref());
                     let network = past.at(epoch, &run.network());
                     let network =
                         network.ok_or_else(|| format!("the network of epoch {epoch} is not kept any more"))?;
-                    let file = NetworkFile::from_past(run, &network).map_err(|error| error.to_string())?;
+                    let file = NetworkFile::from_past(run, recorded, &network).map_err(|error| error.to_string())?;
                     Ok(contents(Arc::new(file), None))
                 };
-                let stem = format!("{}-epoch{epoch}", file_stem(what, settings));
+                let stem = format!("{}-epoch{epoch}", file_stem(what, setup));
                 FileTask::save_run(words, &stem, *run, take)
             }
             Self::Kept(_, file) => {
-                let stem = file_stem(what, &file.settings);
+                let stem = file_stem(what, &file.setup());
                 FileTask::save(words, &stem, contents(Arc::clone(file), None))
             }
         }
@@ -87,26 +89,6 @@ pub fn network_exports<'a>(
         ask: ask(Box::new(move |source| report_task(&source, decoders()))),
     });
     exports
-}
-
-/// A network of own data in every form that it can have, in files named after `stem`; `file` gives it, or the reason why
-/// there is none.
-pub fn own_network_exports<'a>(stem: &str, file: &Result<Arc<MeasuredNetworkFile>, String>) -> Vec<Export<'a>> {
-    let export = |(format, precision)| {
-        let words = own_bundle_words(format);
-        let ask = file.clone().map(|file| -> Ask<'a> {
-            let (name, contents) = match format {
-                BundleFormat::Json => (format!("{stem}-network"), Contents::new(move |path| file.save(path))),
-                _ => (
-                    format!("{stem}-{format}-{precision}"),
-                    bundle_contents(move |path| export_bundle(&*file, format, precision, path)),
-                ),
-            };
-            Box::new(move || Effect::ChooseFile(FileTask::save(words, &name, contents)))
-        });
-        bundle_export("", (format, precision), words, ask)
-    };
-    bundles().map(export).collect()
 }
 
 /// Every form of a network with its precisions.
@@ -158,20 +140,20 @@ fn bundle_words(format: BundleFormat) -> FileWords {
     let (kind, description) = match format {
         BundleFormat::Onnx => (
             "network as ONNX",
-            "A folder with the network as an ONNX graph (opset 13) and golden vectors: ohm in, mm out.",
+            "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
         ),
         BundleFormat::C99 => (
             "network as C99",
-            "A folder with one header and one source in C99 and a self-test: ohm in, mm out. fixed16 computes in whole \
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 computes in whole \
              numbers only, for microcontrollers.",
         ),
         BundleFormat::Matlab => (
             "network for MATLAB and Octave",
-            "A folder with one function file for MATLAB and GNU Octave and golden vectors: ohm in, mm out.",
+            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out.",
         ),
         BundleFormat::NumPy => (
             "network for NumPy",
-            "A folder with the weights as .npz, a short decode.py and golden vectors: ohm in, mm out.",
+            "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out.",
         ),
         BundleFormat::Json => {
             return FileWords {
@@ -186,35 +168,6 @@ fn bundle_words(format: BundleFormat) -> FileWords {
         kind,
         description,
         extensions: &[],
-    }
-}
-
-fn own_bundle_words(format: BundleFormat) -> FileWords {
-    let description = match format {
-        BundleFormat::Onnx => {
-            "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out, in the units \
-             of the recording."
-        }
-        BundleFormat::C99 => {
-            "A folder with one header and one source in C99 and a self-test: readings in, targets out, in the units of the \
-             recording. fixed16 computes in whole numbers only, for microcontrollers."
-        }
-        BundleFormat::Matlab => {
-            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out, in the \
-             units of the recording."
-        }
-        BundleFormat::NumPy => {
-            "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out, in the units \
-             of the recording."
-        }
-        BundleFormat::Json => {
-            "The network with its settings, record and errors, and the recipe of its import. It opens here again, and the \
-             terminal commands decode and export read it."
-        }
-    };
-    FileWords {
-        description,
-        ..bundle_words(format)
     }
 }
 
@@ -260,26 +213,34 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
     };
     source.task(REPORT, "report", move |file, run| {
         let flaw = run.and_then(Run::flaw);
+        let test = run.map(|run| Arc::clone(run.test()));
         let (name, decoders) = (name.clone(), decoders.clone());
         Contents::new(move |path: &Path| {
+            let test = match &test {
+                Some(test) => Arc::clone(test),
+                None => file.test_set().map_err(|error| error.to_string())?,
+            };
             RunReport {
                 name: name.as_deref(),
                 file: &file,
                 flaw: flaw.as_ref(),
                 decoders: &decoders,
+                test: &test,
             }
             .save(path)
+            .map_err(|error| error.to_string())
         })
     })
 }
 
 /// A name that tells the files of different runs apart: what the file holds, and of which run. Without extension.
-pub fn file_stem(what: &str, settings: &SimulatedSettings) -> String {
-    let array = settings.source.sensor.scale.to_string().replace('×', "x");
+pub fn file_stem(what: &str, setup: &Setup) -> String {
+    let source = setup.source_name().replace('×', "x");
+    let settings = setup.settings();
     let (hidden, method) = (settings.hidden, settings.training.method.short_name());
     let starts = match settings.starts {
         1 => String::new(),
         starts => format!("-starts{starts}"),
     };
-    format!("{what}-{array}-h{hidden}-{method}{starts}-seed{}", settings.seed)
+    format!("{what}-{source}-h{hidden}-{method}{starts}-seed{}", settings.seed)
 }

@@ -1,10 +1,16 @@
+use std::sync::Arc;
+
 use crate::{
     app::{
-        test_view::TestView,
+        test_view::TestSet,
         training_worker::{Began, Progress, RunId, RunResult, append_epochs},
     },
-    evaluation::{Baselines, PastNetworks, PublishedErrors, SimulatedSettings, StartRecord},
+    evaluation::{
+        Baselines, ErrorTable, PastNetworks, Problem, PublishedErrors, RunSettings, Scores, SimulatedSettings,
+        StartRecord,
+    },
     figure::EpochOutline,
+    import::Setup,
     training::{EpochRecord, Stage, StopReason},
 };
 
@@ -13,15 +19,17 @@ use crate::{
 pub struct RunView {
     /// Its identity.
     pub id: RunId,
-    /// Settings it is trained with.
-    pub settings: SimulatedSettings,
-    /// Settings on the left when it began or was continued: as [`Self::settings`], but the epochs are those asked
-    /// for from where it stood.
-    pub asked: SimulatedSettings,
+    /// Setup it is trained with.
+    pub setup: Setup,
+    /// Setup on the left when it began or was continued: as [`Self::setup`], but the epochs are those asked
+    /// for from where it was.
+    pub asked: Setup,
+    /// Description of the readings and targets.
+    pub problem: Arc<Problem>,
     /// Weights and biases of the network.
     pub weights: usize,
     /// Its test set.
-    pub test: TestView,
+    pub test: TestSet,
     /// Errors of the baselines.
     pub baselines: Baselines,
     /// Errors that the paper reports for this configuration.
@@ -49,16 +57,18 @@ impl RunView {
     pub fn new(began: Began) -> Self {
         let Began {
             id,
-            settings,
+            setup,
+            problem,
             weights,
             test,
             baselines,
         } = began;
         Self {
             id,
-            published: settings.published(),
-            settings,
-            asked: settings,
+            published: setup.simulated().and_then(|settings| settings.published()),
+            asked: setup.clone(),
+            setup,
+            problem,
             weights,
             test,
             baselines,
@@ -71,6 +81,29 @@ impl RunView {
             stop_reason: None,
             is_saved: false,
         }
+    }
+
+    /// Settings it is trained with.
+    pub fn settings(&self) -> &RunSettings {
+        self.setup.settings()
+    }
+
+    /// Settings of a simulated array, if it is one.
+    pub fn simulated(&self) -> Option<SimulatedSettings> {
+        self.setup.simulated()
+    }
+
+    /// Errors of this result and of the baselines.
+    pub fn scores(&self, result: &RunResult) -> Scores {
+        Scores {
+            network: result.errors.clone(),
+            baselines: self.baselines.clone(),
+        }
+    }
+
+    /// Error table of this result.
+    pub fn error_table(&self, result: &RunResult) -> ErrorTable {
+        ErrorTable::of_scores(&self.problem, &self.scores(result), self.published.as_ref())
     }
 
     /// Takes the worker's news.

@@ -13,10 +13,11 @@ use ndarray::Array2;
 use crate::{
     app::{
         job::JobError,
-        test_view::{Frame, TestView, TestViewError},
+        test_view::{Frame, TargetCharts, TestSet, TestViewError},
     },
-    evaluation::{Baselines, Errors, PastNetworks, Run, RunFlaw, SimulatedSettings, StartRecord},
+    evaluation::{Baselines, PastNetworks, Problem, Run, RunFlaw, RunSettings, StartRecord, TestErrors},
     export::NetworkFile,
+    import::{Progress as Reading, Recorded, Setup},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
 };
@@ -25,11 +26,11 @@ use crate::{
 #[derive(Debug)]
 pub enum Request {
     /// Begin a training; one in progress is dropped.
-    Train(Box<SimulatedSettings>),
+    Train(Box<Setup>),
     /// Take up the training saved in this file and hold it; one in progress is dropped.
     Open(PathBuf),
     /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
-    TakeUp(Box<SimulatedSettings>, Vec<TrainerState>),
+    TakeUp(Box<Setup>, Vec<TrainerState>),
     /// Go on from the present weights with this method and this many epochs more.
     Continue(TrainingSettings),
     /// Step no further until told to resume.
@@ -52,8 +53,10 @@ pub enum Event {
     /// A training that was cancelled while it was prepared has not begun.
     Abandoned,
     /// The training goes on with these settings, or why it cannot.
-    Continued(Result<Box<SimulatedSettings>, String>),
-    /// News of the training.
+    Continued(Result<Box<RunSettings>, String>),
+    /// Progress of reading a file before a training.
+    Reading(Reading),
+    /// Progress of the training.
     Progressed(Box<Progress>),
     /// The training on show has ended: what is to be kept of it, or why nothing can be.
     Finished(Result<Box<NetworkFile>, String>),
@@ -64,16 +67,24 @@ pub enum Event {
 /// Takes what it needs from a training, or is told why that is not there.
 pub struct Inspection(Box<Inspect>);
 
-type Inspect = dyn FnOnce(Result<&Run, &str>) + Send;
+type Inspect = dyn FnOnce(Result<&TrainedRun, &str>) + Send;
+
+/// A run of the worker, and where its samples come from if they are recorded.
+pub struct TrainedRun {
+    /// The run.
+    pub run: Run,
+    /// Origin of recorded samples; `None` for a simulated array.
+    pub recorded: Option<Recorded>,
+}
 
 impl Inspection {
     /// Runs `inspect` on the worker's thread.
-    pub fn new(inspect: impl FnOnce(Result<&Run, &str>) + Send + 'static) -> Self {
+    pub fn new(inspect: impl FnOnce(Result<&TrainedRun, &str>) + Send + 'static) -> Self {
         Self(Box::new(inspect))
     }
 
     /// Looks at `run`.
-    pub(super) fn inspect(self, run: Result<&Run, &str>) {
+    pub(super) fn inspect(self, run: Result<&TrainedRun, &str>) {
         (self.0)(run);
     }
 }
@@ -101,12 +112,14 @@ impl RunId {
 pub struct Began {
     /// Its identity.
     pub id: RunId,
-    /// Settings asked for.
-    pub settings: SimulatedSettings,
+    /// Setup asked for.
+    pub setup: Setup,
+    /// Description of the readings and targets.
+    pub problem: Arc<Problem>,
     /// Weights and biases of the network.
     pub weights: usize,
     /// The test set.
-    pub test: TestView,
+    pub test: TestSet,
     /// Errors of the baselines.
     pub baselines: Baselines,
 }
@@ -148,12 +161,16 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
 /// Result of the best network so far on the test set, and its cost.
 #[derive(Clone, Debug)]
 pub struct RunResult {
-    /// Coordinates: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
+    /// Decoded values of the test set: samples × targets, in their units.
+    pub answers: Arc<Array2<f64>>,
+    /// Charts over all test samples of a recording.
+    pub charts: Option<Arc<TargetCharts>>,
+    /// Remarks on the errors of a recording, once the training is paused or has ended.
+    pub remarks: Vec<String>,
     /// The snapshot that was on show, and its surface: laid through the nodes here, so that the window need not.
     pub frame: Option<(usize, Frame)>,
     /// Their errors.
-    pub errors: Errors,
+    pub errors: TestErrors,
     /// The epoch of the network.
     pub best_epoch: usize,
     /// Defect of its training, once that has ended.

@@ -1,4 +1,5 @@
 use std::{
+    path::Path,
     sync::{
         Arc,
         atomic::{AtomicU64, AtomicUsize, Ordering},
@@ -7,17 +8,20 @@ use std::{
     time::{Duration, Instant},
 };
 
+use ndarray::Array2;
+
 use super::{
-    Began, Event, Progress, Request, RunId, RunResult,
+    Began, Event, Progress as Advance, Request, RunId, RunResult, TrainedRun,
     continuation::{continue_run, furthest_epoch},
 };
 use crate::{
     app::{
         job::Report,
-        test_view::{TestView, TestViewError},
+        test_view::{TestSet, TestViewError},
     },
-    evaluation::{PastNetworks, Run, RunError, network_frame_time},
-    export::{CheckpointFile, NetworkFile},
+    evaluation::{PastNetworks, Run, RunError, network_frame_time, recorded::Determination},
+    export::{CheckpointFile, NetworkFile, describe_standings, describe_worse_than_ridge},
+    import::{Progress, Setup, SetupSets},
     training::TrainingSettings,
 };
 
@@ -37,9 +41,9 @@ pub(super) struct TrainingLoop<'a> {
     snapshot: &'a AtomicUsize,
     /// Preparations so far.
     preparations: u64,
-    run: Option<Run>,
+    run: Option<TrainedRun>,
     /// Its test set, as it is drawn.
-    test: Option<TestView>,
+    test: Option<TestSet>,
     /// Networks of its past epochs.
     past: PastNetworks,
     /// Identity of the training `run`.
@@ -89,26 +93,31 @@ impl<'a> TrainingLoop<'a> {
     }
 
     fn is_training(&self) -> bool {
-        let unfinished = self.run.as_ref().is_some_and(|run| run.stop_reason().is_none());
+        let unfinished = self
+            .run
+            .as_ref()
+            .is_some_and(|trained| trained.run.stop_reason().is_none());
         unfinished && !self.is_paused
     }
 
     fn answer(&mut self, request: Request) {
         match request {
-            Request::Train(settings) => {
-                let prepared = self.prepare(|is_cancelled| Run::prepare_unless(*settings, is_cancelled));
+            Request::Train(setup) => {
+                let prepared = self.prepare(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
                 self.begin(prepared, false, Event::Began);
             }
             Request::Open(path) => {
                 let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
                 let prepared = prepared.and_then(|file| {
-                    let prepared = self.prepare(|is_cancelled| file.resume_unless(is_cancelled));
+                    let prepared = self.resume(file);
                     prepared.map_err(|error| format!("'{}': {error}", path.display()))
                 });
                 self.begin(prepared, true, Event::Opened);
             }
-            Request::TakeUp(settings, states) => {
-                let prepared = self.prepare(|is_cancelled| Run::resume_unless(*settings, states, is_cancelled));
+            Request::TakeUp(setup, states) => {
+                let resume =
+                    |sets: SetupSets, is_cancelled: &dyn Fn() -> bool| sets.resume(&setup, states, is_cancelled);
+                let prepared = self.prepare(&setup, resume);
                 self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
             }
             Request::Continue(training) => self.go_on(training),
@@ -118,8 +127,8 @@ impl<'a> TrainingLoop<'a> {
             }
             Request::Resume => self.is_paused = false,
             Request::Stop => {
-                if let Some(run) = self.run.as_mut().filter(|run| run.stop_reason().is_none()) {
-                    run.stop();
+                if let Some(trained) = self.run.as_mut().filter(|trained| trained.run.stop_reason().is_none()) {
+                    trained.run.stop();
                     self.report_progress();
                 }
             }
@@ -132,35 +141,53 @@ impl<'a> TrainingLoop<'a> {
         }
     }
 
-    /// Draws the sets of a run and starts its networks; `None` once that is cancelled.
+    /// Draws or reads the samples of `setup` and starts its networks; `None` once that is cancelled.
     fn prepare(
         &mut self,
-        prepare: impl FnOnce(&dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
-    ) -> Result<Option<(Run, Box<Began>)>, TestViewError> {
+        setup: &Setup,
+        run: impl FnOnce(SetupSets, &dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
+    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
         let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
         let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
-        let begun = prepare(&is_cancelled)?.map(begun).transpose()?;
+        let Some(sets) = setup.sets(Path::new(""), &is_cancelled, &mut |progress| reading(report, progress))? else {
+            return Ok(None);
+        };
+        let recorded = sets.recorded().cloned();
+        let run = run(sets, &is_cancelled)?;
+        let begun = run.map(|run| begun(TrainedRun { run, recorded })).transpose()?;
         Ok(begun.filter(|_| !is_cancelled()))
+    }
+
+    /// Takes up the training of a checkpoint; `None` once that is cancelled.
+    fn resume(&mut self, file: CheckpointFile) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
+        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
+        let resumed = file.resume_unless(&is_cancelled, &mut |progress| reading(report, progress))?;
+        let begun = resumed.map(|(run, sets)| {
+            let recorded = sets.recorded().cloned();
+            begun(TrainedRun { run, recorded })
+        });
+        Ok(begun.transpose()?.filter(|_| !is_cancelled()))
     }
 
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
     fn begin<X>(
         &mut self,
-        prepared: Result<Option<(Run, Box<Began>)>, X>,
+        prepared: Result<Option<(TrainedRun, Box<Began>)>, X>,
         is_paused: bool,
         event: fn(Result<Box<Began>, X>) -> Event,
     ) {
         self.preparations += 1;
-        let (run, began) = match prepared {
+        let (trained, began) = match prepared {
             Ok(Some(prepared)) => prepared,
             Ok(None) => return self.report.send(Event::Abandoned),
             Err(error) => return self.report.send(event(Err(error))),
         };
         // What had ended before it was saved was kept when it ended.
-        self.is_kept = run.stop_reason().is_some();
+        self.is_kept = trained.run.stop_reason().is_some();
         self.past = PastNetworks::default();
-        self.past.record(&run);
-        (self.run, self.id, self.test) = (Some(run), Some(began.id), Some(began.test.clone()));
+        self.past.record(&trained.run);
+        (self.run, self.id, self.test) = (Some(trained), Some(began.id), Some(began.test.clone()));
         self.is_paused = is_paused;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
@@ -170,9 +197,9 @@ impl<'a> TrainingLoop<'a> {
 
     fn go_on(&mut self, training: TrainingSettings) {
         let continued = match &mut self.run {
-            Some(run) => continue_run(run, training)
-                .map_err(|error| error.to_string())
-                .and_then(|()| run.settings().simulated().ok_or_else(|| LOST.to_owned())),
+            Some(TrainedRun { run, .. }) => continue_run(run, training)
+                .map(|()| *run.settings())
+                .map_err(|error| error.to_string()),
             None => Err(LOST.to_owned()),
         };
         let has_failed = continued.is_err();
@@ -184,7 +211,9 @@ impl<'a> TrainingLoop<'a> {
     }
 
     fn train_one_epoch(&mut self) {
-        let Some(run) = &mut self.run else { return };
+        let Some(TrainedRun { run, .. }) = &mut self.run else {
+            return;
+        };
         let ended = run.step().is_some();
         self.past.record(run);
         if ended || Instant::now() >= self.next_report {
@@ -193,20 +222,23 @@ impl<'a> TrainingLoop<'a> {
     }
 
     fn report_progress(&mut self) {
-        let Some(run) = &self.run else { return };
+        let Some(TrainedRun { run, .. }) = &self.run else {
+            return;
+        };
         let begun = Instant::now();
         let number = run.leader_number();
         let trainer = &run.trainers()[number];
         let networks = run.network();
-        let decoupled_mm = networks.decouple(run.test());
-        // Every training of the window is simulated.
-        let Some(errors) = run.errors_of(&decoupled_mm) else {
-            return;
-        };
-        let frame = self.test.as_ref().map(|test| {
+        let answers = networks.decouple(run.test());
+        let errors = run.errors_of(&answers);
+        let test = self.test.as_ref();
+        let frame = test.and_then(TestSet::array).map(|test| {
             let snapshot = test.nearest_snapshot(self.snapshot.load(Ordering::Relaxed));
-            (snapshot, test.frame(decoupled_mm.view(), snapshot))
+            (snapshot, test.frame(answers.view(), snapshot))
         });
+        let charts = test
+            .and_then(TestSet::recording)
+            .map(|test| Arc::new(test.charts(&answers)));
         let cost = begun.elapsed();
         let has_several = run.trainers().len() > 1;
         let is_standing = self.is_paused || run.stop_reason().is_some();
@@ -219,13 +251,19 @@ impl<'a> TrainingLoop<'a> {
             (leader, epochs) if leader == number => epochs,
             _ => 0,
         };
-        let progress = Box::new(Progress {
+        let progress = Box::new(Advance {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
             starts,
             past: self.past.clone(),
             result: RunResult {
-                decoupled_mm: Arc::new(decoupled_mm),
+                remarks: if is_standing {
+                    self.remarks(&answers)
+                } else {
+                    Vec::new()
+                },
+                answers: Arc::new(answers),
+                charts,
                 frame,
                 errors,
                 best_epoch: trainer.best_epoch(),
@@ -254,15 +292,32 @@ impl<'a> TrainingLoop<'a> {
         self.report_finished();
     }
 
+    /// Remarks on these answers to the test samples of a recording.
+    fn remarks(&self, answers: &Array2<f64>) -> Vec<String> {
+        let recorded = self
+            .run
+            .as_ref()
+            .and_then(|trained| Some((trained, trained.recorded.as_ref()?)));
+        let Some((trained, recorded)) = recorded else {
+            return Vec::new();
+        };
+        let determined = Determination::measure(trained.run.test(), answers.view(), recorded.plan.division.by);
+        let mut remarks = describe_standings(&trained.run.problem().targets, &determined);
+        if let Ok(file) = trained.network_file() {
+            remarks.extend(describe_worse_than_ridge(&file));
+        }
+        remarks
+    }
+
     /// Hands over, once, what is to be kept of a run that has ended.
     fn report_finished(&mut self) {
-        let Some(run) = self.run.as_ref().filter(|run| run.stop_reason().is_some()) else {
+        let Some(trained) = self.run.as_ref().filter(|trained| trained.run.stop_reason().is_some()) else {
             return;
         };
         if std::mem::replace(&mut self.is_kept, true) {
             return;
         }
-        let file = NetworkFile::from_run(run).map_err(|error| error.to_string());
+        let file = trained.network_file();
         let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
         let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {flaw}"));
         self.report.send(Event::Finished(finished));
@@ -277,16 +332,36 @@ const REPLACED: &str = "the file was not written, for another training has repla
                         trainings are in the run list of the Compare view";
 
 /// A run, and what the window is to know of it.
-fn begun(run: Run) -> Result<(Run, Box<Began>), TestViewError> {
-    let simulated = run.settings().simulated().zip(run.baselines().copied());
-    let (settings, baselines) = simulated.ok_or(TestViewError::Measured)?;
-    let test = TestView::of(&settings, run.test().clone())?;
+fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
+    let run = &trained.run;
+    let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
     let began = Began {
         id: RunId::new(),
-        settings,
+        setup: Setup::of(*run.settings(), plan).expect("a recorded run has its plan"),
+        problem: Arc::clone(run.problem()),
         weights: run.leader().weights(),
-        test,
-        baselines,
+        test: TestSet::of(run)?,
+        baselines: run
+            .baselines()
+            .cloned()
+            .expect("the baselines of a whole run are measured"),
     };
-    Ok((run, Box::new(began)))
+    Ok((trained, Box::new(began)))
+}
+
+/// Reports how far a recording has been read.
+fn reading(report: &Report<Event>, progress: Progress) {
+    report.progress(Event::Reading(progress), |_, _| ());
+}
+
+impl TrainedRun {
+    /// Takes the best network so far, with its record and errors.
+    pub fn network_file(&self) -> Result<NetworkFile, String> {
+        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+    }
+
+    /// Takes the present state, to be resumed.
+    pub fn checkpoint_file(&self) -> Result<CheckpointFile, String> {
+        CheckpointFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+    }
 }

@@ -8,22 +8,22 @@ mod compare;
 mod experiments;
 mod identifiability;
 mod live;
-mod own_data;
 mod trade_off;
 mod train;
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{job::Wake, shared::View};
+use crate::import::Plan;
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{TradeOffEnding, TradeOffPlan};
+pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult};
 
 use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
-    own_data::OwnDataView, trade_off::TradeOffView, train::TrainView,
+    trade_off::TradeOffView, train::TrainView,
 };
 
 /// All views.
@@ -41,8 +41,6 @@ pub struct Views {
     pub trade_off: TradeOffView,
     /// View of frames decoded as they come.
     pub live: LiveView,
-    /// View of recordings and networks trained on them.
-    pub own_data: OwnDataView,
 }
 
 impl Views {
@@ -55,12 +53,26 @@ impl Views {
             identifiability: IdentifiabilityView::new(Arc::clone(wake)),
             trade_off: TradeOffView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
-            own_data: OwnDataView::new(Arc::clone(wake)),
         }
     }
 
+    /// Opens the recordings of this plan in the Train view.
+    pub fn open_plan(&mut self, plan: &Plan) {
+        self.train.recording.open_plan(plan);
+    }
+
+    /// Looks for the recordings of the checkpoint at `path`, which could not be resumed.
+    pub fn look_for_recordings(&mut self, path: PathBuf) {
+        self.train.recording.look_for_recordings(path);
+    }
+
+    /// Returns true if the user has opened a recording, also one whose files are missing.
+    pub fn has_recording(&self) -> bool {
+        !self.train.recording.is_empty()
+    }
+
     /// In the order of the top bar. The first is the one that trains.
-    pub fn all(&mut self) -> [&mut dyn View; 7] {
+    pub fn all(&mut self) -> [&mut dyn View; 6] {
         [
             &mut self.train,
             &mut self.experiments,
@@ -68,7 +80,6 @@ impl Views {
             &mut self.identifiability,
             &mut self.trade_off,
             &mut self.live,
-            &mut self.own_data,
         ]
     }
 }

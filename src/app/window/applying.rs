@@ -7,7 +7,10 @@ use super::{DecouplerWindow, copying::ToCopy, path_look::Found, remembered::is_w
 use crate::{
     app::{
         preview,
-        shared::{Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, refuse_in_use},
+        shared::{
+            Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
+            refuse_in_use,
+        },
         test_view::HeightScale,
         theme,
         training_worker::{Inspection, LOST, Request, Worker},
@@ -15,6 +18,7 @@ use crate::{
     },
     evaluation::SimulatedSettings,
     figure::SequentialMap,
+    import::Setup,
 };
 
 impl DecouplerWindow {
@@ -23,15 +27,30 @@ impl DecouplerWindow {
         let shared = &mut self.shared;
         match effect {
             Effect::Configure(draft) => self.configure(*draft),
+            Effect::ConfigureRecording(settings) => {
+                shared.recording.settings = *settings;
+                self.notices.settle(Matter::Settings);
+            }
+            Effect::Import(plan) => shared.recording.plan = plan,
+            Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
+            Effect::ChooseSource(_) => {}
+            Effect::TakeSetup(setup) => self.take_setup(&setup),
             Effect::ShowTraining => self.show(0),
             Effect::Train => {
-                let settings = Box::new(shared.draft);
                 self.opened = None;
-                self.prepare(Request::Train(settings));
+                match shared.setup() {
+                    Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
+                    Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+                }
             }
             // A training may have begun in the same frame.
-            Effect::TakeUp(..) if shared.phase.is_busy() => {}
-            Effect::TakeUp(settings, states) => self.prepare(Request::TakeUp(settings, states)),
+            Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
+            Effect::OpenTraining(path) => self.open_training(path),
+            Effect::TakeUp(setup, states) => {
+                self.opened = None;
+                self.take_setup(&setup);
+                self.prepare(Request::TakeUp(setup, states));
+            }
             Effect::Pause => {
                 shared.phase = Phase::Paused;
                 self.worker.ask(Request::Pause);
@@ -40,7 +59,10 @@ impl DecouplerWindow {
                 // The settings on the left are always those that are trained with.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
-                    shared.draft.training = run.asked.training;
+                    match shared.source {
+                        SourceKind::Array => shared.draft.training = run.asked.settings().training,
+                        SourceKind::Recording => shared.recording.settings.training = run.asked.settings().training,
+                    }
                 }
                 shared.phase = Phase::Training;
                 self.worker.ask(Request::Resume);
@@ -49,7 +71,7 @@ impl DecouplerWindow {
                 shared.phase = Phase::Training;
                 self.notices.settle(Matter::Training);
                 self.notices.settle(Matter::Settings);
-                self.worker.ask(Request::Continue(shared.draft.training));
+                self.worker.ask(Request::Continue(shared.settings().training));
             }
             Effect::Continue => {}
             Effect::Stop => {
@@ -69,6 +91,7 @@ impl DecouplerWindow {
             Effect::TypePath(task) => self.type_path(task),
             Effect::Copy { text, notice } => self.copy_text(text, notice),
             Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
+            Effect::KeepRun(file) => self.runs.keep(*file),
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
@@ -83,6 +106,12 @@ impl DecouplerWindow {
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
         self.worker.ask(request);
+    }
+
+    /// Takes up the training saved in this checkpoint.
+    fn open_training(&mut self, path: PathBuf) {
+        self.opened = Some(path.clone());
+        self.prepare(Request::Open(path));
     }
 
     /// Shows the view in this place.
@@ -229,10 +258,7 @@ impl DecouplerWindow {
             }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => {
-                self.opened = Some(path.clone());
-                self.prepare(Request::Open(path));
-            }
+            Purpose::Open => self.open_training(path),
         }
     }
 
@@ -251,10 +277,40 @@ impl DecouplerWindow {
             self.notices.settle(Matter::Settings);
         }
         let run = self.shared.run.as_ref();
-        if run.is_some_and(|run| have_same_test_set(&run.settings, &draft)) {
+        if run.is_some_and(|run| is_of_test_set(run, &draft)) {
             self.shared.preview = None;
         } else if !have_same_sets(&before, &draft) {
             self.ask_for_what_is_missing();
+        }
+    }
+
+    /// Trains on a source of this kind from now on.
+    pub(super) fn choose_source(&mut self, source: SourceKind) {
+        self.shared.source = source;
+        self.notices.settle(Matter::Settings);
+        if source == SourceKind::Array {
+            self.configure(self.shared.draft);
+            self.ask_for_what_is_missing();
+        }
+    }
+
+    /// Makes the setup of another run that of the next training.
+    pub(super) fn take_setup(&mut self, setup: &Setup) {
+        match (setup.simulated(), setup.plan()) {
+            (Some(settings), _) => {
+                self.shared.source = SourceKind::Array;
+                self.configure(settings);
+            }
+            (None, Some(plan)) => {
+                self.shared.source = SourceKind::Recording;
+                let plan = plan.absolute();
+                self.views.open_plan(&plan);
+                self.shared.recording = RecordingDraft {
+                    settings: *setup.settings(),
+                    plan: Ok(Arc::new(plan)),
+                };
+            }
+            (None, None) => {}
         }
     }
 
@@ -266,10 +322,16 @@ impl DecouplerWindow {
             (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
                 preview::compare(&mut self.previews, draft);
             }
-            (None, Some(run)) if have_same_test_set(&run.settings, &draft) => {}
+            (None, Some(run)) if is_of_test_set(run, &draft) => {}
             _ => preview::draw(&mut self.previews, draft),
         }
     }
+}
+
+/// Returns true if `run` is on a simulated array with the test set of these settings.
+pub(super) fn is_of_test_set(run: &RunView, settings: &SimulatedSettings) -> bool {
+    run.simulated()
+        .is_some_and(|of_run| have_same_test_set(&of_run, settings))
 }
 
 /// Returns true if both draw the same test set.

@@ -125,6 +125,14 @@ impl DecouplerWindow {
         if let Some(draft) = window.remembered.draft {
             window.shared.draft = draft;
         }
+        if let Some(settings) = window.remembered.recording {
+            window.shared.recording.settings = settings;
+        }
+        window.shared.source = window.remembered.source.unwrap_or_default();
+        if let Some(plan) = window.remembered.plan.clone() {
+            window.views.open_plan(&plan);
+            window.shared.recording.plan = Ok(Arc::new(plan));
+        }
         if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
             window.show(place);
         }
@@ -261,7 +269,7 @@ impl DecouplerWindow {
             }
             None => {}
         }
-        self.undoing.follow(ui.input(|input| input.time), &self.shared.draft);
+        self.undoing.follow(ui.input(|input| input.time), &self.shared);
         self.overlay_ui(ui, &actions);
         self.dropping_ui(ui);
         self.tour_ui(ui, &actions);

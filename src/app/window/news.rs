@@ -1,15 +1,15 @@
 use super::{
     DecouplerWindow,
-    applying::{have_same_sets, have_same_test_set},
+    applying::{have_same_sets, have_same_test_set, is_of_test_set},
     dialogs::Answer,
 };
 use crate::{
     app::{
         preview::PreviewEvent,
-        shared::{Matter, Notice, Phase, Preview, RunView},
+        shared::{Matter, Notice, Phase, Preview, RunView, SourceKind},
         training_worker::Event,
     },
-    evaluation::SimulatedSettings,
+    evaluation::RunSettings,
 };
 
 impl DecouplerWindow {
@@ -76,10 +76,7 @@ impl DecouplerWindow {
             PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
             // A training has begun meanwhile, and shows the same.
             PreviewEvent::Drawn(settings, _)
-                if shared
-                    .run
-                    .as_ref()
-                    .is_some_and(|run| have_same_test_set(&run.settings, &settings)) => {}
+                if shared.run.as_ref().is_some_and(|run| is_of_test_set(run, &settings)) => {}
             PreviewEvent::Drawn(settings, Ok(test)) => {
                 shared.preview = Some(Preview {
                     settings: *settings,
@@ -105,29 +102,41 @@ impl DecouplerWindow {
         match event {
             Event::Began(Ok(began)) => {
                 shared.preview = None;
+                shared.reading = None;
                 shared.run = Some(RunView::new(*began));
                 shared.phase = Phase::Training;
             }
             Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
             Event::Opened(Ok(began)) => {
-                shared.draft = began.settings;
+                let setup = began.setup.clone();
                 shared.preview = None;
                 shared.run = Some(RunView {
                     is_saved: true,
                     ..RunView::new(*began)
                 });
+                self.take_setup(&setup);
+                let shared = &mut self.shared;
                 self.typed = None;
                 // If it has ended, the news of it say so.
                 shared.phase = Phase::Paused;
             }
-            Event::Opened(Err(reason)) => self.refuse(Matter::Training, reason),
+            Event::Opened(Err(reason)) => {
+                self.refuse(Matter::Training, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
+            }
             Event::Continued(Ok(settings)) => {
                 if let Some(run) = &mut shared.run {
-                    run.asked = SimulatedSettings {
-                        training: shared.draft.training,
-                        ..run.asked
+                    let training = match shared.source {
+                        SourceKind::Array => shared.draft.training,
+                        SourceKind::Recording => shared.recording.settings.training,
                     };
-                    run.settings = *settings;
+                    run.asked = run.asked.with_settings(RunSettings {
+                        training,
+                        ..*run.asked.settings()
+                    });
+                    run.setup = run.setup.with_settings(*settings);
                     run.is_saved = false;
                     run.stop_reason = None;
                 }
@@ -140,6 +149,7 @@ impl DecouplerWindow {
                 };
                 self.notices.fail(Matter::Training, error);
             }
+            Event::Reading(progress) => shared.reading = Some(progress),
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     shared.phase = Phase::Ended(reason);

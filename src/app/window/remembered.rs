@@ -6,9 +6,11 @@ use std::{
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
 use crate::{
-    evaluation::{SimulatedSettings, Workload},
+    app::shared::SourceKind,
+    evaluation::{RunSettings, SimulatedSettings, Workload},
     export::{WriteError, atomic_write},
     figure::SequentialMap,
+    import::Plan,
 };
 
 /// The size of a window that remembers none, in points.
@@ -38,6 +40,15 @@ pub(super) struct Remembered {
     /// The settings of the next training.
     #[serde(deserialize_with = "if_readable")]
     pub(super) draft: Option<SimulatedSettings>,
+    /// Source of the next training.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) source: Option<SourceKind>,
+    /// Settings of the next training on a recording.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) recording: Option<RunSettings>,
+    /// Plan of the recording that is open, with absolute paths.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) plan: Option<Plan>,
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,

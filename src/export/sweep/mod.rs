@@ -86,7 +86,7 @@ fn save_new(kind: DocumentKind, program: &str, value: &impl Serialize, path: &Pa
 
 /// Reads a file of this kind, with the program that wrote it.
 fn load<T: DeserializeOwned>(kind: DocumentKind, path: &Path) -> Result<(String, T), DocumentError> {
-    let (_, bytes) = kind.read(path)?;
+    let bytes = kind.read(path)?;
     let read = Sealed::read(&bytes).and_then(|sealed| {
         let value = serde_json::from_str(sealed.run.get()).map_err(|error| error.to_string())?;
         Ok((sealed.program, value))

@@ -9,8 +9,7 @@ use crate::{
         theme::{space, type_size},
         widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
     },
-    evaluation::SimulatedSettings,
-    export::{KeptRun, format_duration, format_percent},
+    export::{KeptRun, NetworkFile, format_duration, format_percent},
     sensor::counted,
 };
 
@@ -52,11 +51,12 @@ fn run_ui(
 ) {
     let name = &run.name;
     name_ui(ui, position, run, effects);
-    dim_ui(ui, &conditions(&run.file.settings));
+    dim_ui(ui, &conditions(&run.file));
     let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
     let text = format!(
-        "Z {}, {} on one thread",
-        format_percent(run.file.errors.z_percent),
+        "{} {}, {} on one thread",
+        if run.file.problem.has_nodes { "Z" } else { "Error" },
+        format_percent(run.file.scores.network.percent()),
         format_duration(time)
     );
     ui.label(RichText::new(text).size(type_size().note));
@@ -90,8 +90,8 @@ fn run_ui(
         let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
         if take.on_hover_text("Uses its settings for the next training.").clicked() {
-            let settings = Box::new(run.file.settings);
-            effects.extend([Effect::Configure(settings), Effect::ShowTraining]);
+            let setup = Box::new(run.file.setup());
+            effects.extend([Effect::TakeSetup(setup), Effect::ShowTraining]);
         }
         let remove = ui.add(Button::new("Remove…").min_size([0.0, space(6)].into()));
         remove.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Remove {name}")));
@@ -122,20 +122,24 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
 }
 
 /// Returns the conditions of the run in a line.
-fn conditions(settings: &SimulatedSettings) -> String {
+fn conditions(file: &NetworkFile) -> String {
+    let settings = &file.settings;
     let starts = match settings.starts {
         1 => String::new(),
         starts => format!(", {starts} starts"),
     };
+    let simulated = settings.simulated();
+    let samples = simulated.map_or(String::new(), |settings| {
+        format!(", {}", counted(settings.source.samples, "sample"))
+    });
     let mut text = format!(
-        "{}, {} hidden, {}, {}, seed {}{starts}",
-        settings.source.sensor.scale,
+        "{}, {} hidden, {}{samples}, seed {}{starts}",
+        file.source_name(),
         settings.hidden,
         settings.training.method.short_name(),
-        counted(settings.source.samples, "sample"),
         settings.seed
     );
-    for words in unlike_paper(settings) {
+    for words in simulated.iter().flat_map(unlike_paper) {
         text += &format!(", {words}");
     }
     text

@@ -13,7 +13,7 @@ pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut 
             if trial.states.is_empty() {
                 effects.extend([Effect::Configure(Box::new(settings)), Effect::Train]);
             } else {
-                effects.push(Effect::TakeUp(Box::new(settings), trial.states.clone()));
+                effects.push(Effect::TakeUp(Box::new(settings.into()), trial.states.clone()));
             }
         }
         None => effects.push(Effect::Configure(Box::new(settings))),

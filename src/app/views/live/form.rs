@@ -17,9 +17,10 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         }
         section_heading_ui(ui, "Source");
         let network = view.network.network(&shared.runs).map(|(_, file)| file.clone());
-        let settings = network.as_ref().map(|file| &file.settings);
+        let settings = network.as_ref().and_then(|file| file.settings.simulated());
         let motion = view.source.motion;
-        view.source.form_ui(ui, settings, view.running.is_some(), effects);
+        view.source
+            .form_ui(ui, settings.as_ref(), view.running.is_some(), effects);
         if view.source.motion != motion {
             view.command(Command::Move(view.source.motion));
         }

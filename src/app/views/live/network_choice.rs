@@ -70,7 +70,7 @@ impl NetworkChoice {
 
     /// Decodes with this network, which is of no run.
     pub fn take(&mut self, name: &str, file: Arc<NetworkFile>) {
-        self.problem = file.old_version_warning();
+        self.problem = None;
         self.file = Some((name.to_owned(), file));
         self.pick = NetworkPick::File;
     }
@@ -152,13 +152,21 @@ impl NetworkChoice {
 
 /// Array and rows of a network, and its error, each in a line.
 fn in_words(file: &NetworkFile) -> (String, String) {
-    let settings = &file.settings;
-    let rows = match settings.source.scene.rows {
-        Rows::All => "all rows".to_owned(),
-        Rows::Known => "known rows".to_owned(),
-        Rows::One(row) => format!("row {} alone", row + 1),
-    };
-    let array = format!("{}, {} hidden, {rows}", settings.source.sensor.scale, settings.hidden);
-    let error = format_percent(file.errors.z_percent);
-    (array, format!("Z error on its test set {error}"))
+    let rows = file
+        .settings
+        .simulated()
+        .map(|settings| match settings.source.scene.rows {
+            Rows::All => ", all rows".to_owned(),
+            Rows::Known => ", known rows".to_owned(),
+            Rows::One(row) => format!(", row {} alone", row + 1),
+        });
+    let source = format!(
+        "{}, {} hidden{}",
+        file.source_name(),
+        file.settings.hidden,
+        rows.unwrap_or_default()
+    );
+    let error = format_percent(file.scores.network.percent());
+    let name = if file.problem.has_nodes { "Z error" } else { "Error" };
+    (source, format!("{name} on its test set {error}"))
 }

@@ -92,7 +92,10 @@ impl LiveView {
             .network
             .network(&shared.runs)
             .ok_or("Train a network, or open a network file.")?;
-        let settings = &network.settings;
+        let settings = network
+            .settings
+            .simulated()
+            .ok_or("Choose a network of a simulated array.")?;
         let scale = settings.source.sensor.scale;
         let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
         let fault = self
@@ -101,13 +104,14 @@ impl LiveView {
             .filter(|_| self.fault.problem(scale, &read).is_none());
         let plan = LivePlan {
             source: self.source.plan(fault, at_s)?,
-            noise: self.source.noise(settings),
+            noise: self.source.noise(&settings),
             zero: self
                 .zero
                 .clone()
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
             recordings: folder(shared).join("recordings"),
             network: Arc::clone(network),
+            settings,
         };
         Ok((name.to_owned(), plan))
     }

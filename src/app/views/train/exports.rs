@@ -1,13 +1,19 @@
 //! Exports of the training on show.
 
-use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
+use super::{
+    bottom_tab::has_target_surface,
+    chart::{all_targets_figure, chart},
+    state::TrainView,
+    surfaces::surface_figure,
+};
 use crate::{
     app::shared::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
-        RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
+        RunView, Shared, SourceKind, copy_exports, csv_export, error_table_export, file_stem, loss_export,
+        network_exports, picture_exports,
     },
-    evaluation::{DecoderReport, error_rows},
-    export::{CheckpointFile, decoder_table, error_table},
+    evaluation::DecoderReport,
+    export::{decoder_table, error_table},
     figure::{Figure, surface::ViewMode},
 };
 
@@ -25,20 +31,29 @@ const OPENED: FileWords = FileWords {
     ..CHECKPOINT
 };
 
+const DECODERS: FileWords = FileWords {
+    kind: "decoder table",
+    description: "Errors and times of the measured decoders with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
 /// Task of saving the checkpoint of `run`.
 pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
-    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.settings), run.id, |run| {
-        let file = CheckpointFile::from_run(run).map_err(|error| error.to_string())?;
+    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.setup), run.id, |run| {
+        let file = run.checkpoint_file()?;
         Ok(Contents::new(move |path| file.save(path)))
     })
 }
 
 /// Task of opening a checkpoint.
 pub(super) fn open_task(shared: &Shared) -> FileTask {
-    let settings = shared.run.as_ref().map_or(&shared.draft, |run| &run.settings);
+    let setup = shared
+        .run
+        .as_ref()
+        .map_or_else(|| shared.draft.into(), |run| run.setup.clone());
     FileTask {
         words: OPENED,
-        suggestion: OPENED.file_name(&file_stem("training", settings)),
+        suggestion: OPENED.file_name(&file_stem("training", &setup)),
         purpose: Purpose::Open,
     }
 }
@@ -50,23 +65,24 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     let run = shown.clone().map(|(run, _)| run);
     let stem = |what: &str| {
         run.as_ref()
-            .map_or_else(|_| String::new(), |run| file_stem(what, &run.settings))
+            .map_or_else(|_| String::new(), |run| file_stem(what, &run.setup))
     };
     let mut exports = networks(view, &shown);
-    let what = match shared.look.mode {
-        ViewMode::ThreeD => "surfaces",
-        ViewMode::Top => "surfaces-top",
+    let (name, what) = match shared.look.mode {
+        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
+        ViewMode::ThreeD => ("Surfaces", "surfaces"),
+        ViewMode::Top => ("Surfaces", "surfaces-top"),
     };
-    let surfaces = run.clone().map(|_| || Figure::from(surface_figure(view, shared)));
-    exports.extend(picture_exports("Surfaces", stem(what), surfaces));
+    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
+    exports.extend(picture_exports(name, stem(what), surfaces));
     let chart = run.clone().and_then(|_| {
-        let figure = chart_figure(view, shared).ok_or("This chart has nothing to show yet.")?;
-        Ok(move || Figure::from(figure.clone()))
+        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+        Ok(move || figure.clone())
     });
     exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
     let errors = shown.clone().map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
-        move || error_table(&error_rows(&result.errors, &run.baselines, run.published.as_ref()))
+        move || error_table(&run.error_table(result))
     });
     let of_epoch = view.scrub.result().map(|past| format!("-epoch{}", past.epochs_run));
     let of_errors = stem("errors") + &of_epoch.unwrap_or_default();
@@ -78,8 +94,14 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         if reports.is_empty() {
             return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
-        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref()))
+        Ok(move || decoder_table(&run.problem, &reports, run.baselines.reference.as_ref()))
     });
+    exports.push(csv_export(
+        "Decoder table",
+        DECODERS,
+        stem("decoders"),
+        decoders.clone(),
+    ));
     exports.extend(copy_exports("Decoder table", decoders));
     let standing = run.and_then(|run| match shared.phase {
         Phase::Paused | Phase::Ended(_) => Ok(run),
@@ -96,11 +118,20 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     exports
 }
 
+/// What is drawn above the charts: the surfaces, or all targets of a sample.
+fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
+    let surfaces = surface_figure(view, shared);
+    match all_targets_figure(view, shared) {
+        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
+        _ => surfaces.into(),
+    }
+}
+
 /// The best network, and before it that of a past epoch while it is on show.
 fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
     let source = shown
         .as_ref()
-        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.settings)));
+        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
     let mut exports = network_exports("", &source.map_err(String::clone), move || measured(view));
     let Ok((run, latest)) = shown else { return exports };
     let in_group = |group: ExportGroup| {
@@ -116,7 +147,7 @@ fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult)
         .map(in_group(ExportGroup::BestNetwork(latest.best_epoch)))
         .collect();
     if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
-        let source = NetworkSource::Past(run.id, Box::new(run.settings), epoch, run.past.clone());
+        let source = NetworkSource::Past(run.id, Box::new(run.setup.clone()), epoch, run.past.clone());
         // The decoders were measured beside the best network.
         let past = network_exports("", &Ok(source), Vec::new).into_iter();
         let past = past

@@ -47,7 +47,11 @@ impl Decoding {
     /// # Errors
     /// A sensor or scene that has no frames, with the reason.
     pub(super) fn new(network: Arc<NetworkFile>, scene: &Scene, zero: Option<ZeroGains>) -> Result<Self, String> {
-        let sensor = network.settings.source.sensor;
+        let settings = network
+            .settings
+            .simulated()
+            .ok_or("a network of a recording has no sensor model")?;
+        let sensor = settings.source.sensor;
         let scale = sensor.scale;
         let rows = scene.rows.read(scale.rows()).map_err(|error| error.to_string())?;
         let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];

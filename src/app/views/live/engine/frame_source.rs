@@ -38,7 +38,7 @@ pub(super) enum Next {
 impl LivePlan {
     /// The network's scene with the noise of the readings.
     pub(super) fn scene(&self) -> Scene {
-        let scene = self.network.settings.source.scene;
+        let scene = self.settings.source.scene;
         Scene {
             noise: Noise {
                 relative: self.noise,
@@ -57,7 +57,7 @@ impl FrameSource {
         tally: &mut Tally,
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
-        let (sensor, scene): (SensorModel, Scene) = (plan.network.settings.source.sensor, plan.scene());
+        let (sensor, scene): (SensorModel, Scene) = (plan.settings.source.sensor, plan.scene());
         // The rows of a frame are told apart also where the network is not told them.
         let rows = match scene.rows {
             Rows::All => Rows::Known,

@@ -9,6 +9,7 @@ use ndarray::Array2;
 
 use crate::{
     app::test_view::Frame,
+    evaluation::SimulatedSettings,
     export::NetworkFile,
     live::{Diagnosis, Motion, Source, ZeroGains},
     scene::Fault,
@@ -19,8 +20,10 @@ use crate::{
 /// Frames to be decoded, and the network that decodes them.
 #[derive(Clone, Debug)]
 pub struct LivePlan {
-    /// The network, with its sensor and scene.
+    /// The network.
     pub network: Arc<NetworkFile>,
+    /// Settings of the network, with its sensor and scene.
+    pub settings: SimulatedSettings,
     /// Source of the frames.
     pub source: SourcePlan,
     /// Noise of a reading, relative to it (standard deviation); a simulated source has it, and faults are judged by it.

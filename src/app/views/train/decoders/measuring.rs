@@ -1,6 +1,6 @@
 //! Measures decoders in the background. It ends after the last, or after the one in hand when nobody waits for more.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use super::{DecoderResult, DecodersState};
 use crate::{
@@ -10,7 +10,8 @@ use crate::{
         training_worker::RunId,
     },
     dataset::Dataset,
-    evaluation::{DecoderReport, DecoderSet, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet},
+    import::Setup,
     network::Networks,
 };
 
@@ -57,8 +58,8 @@ impl DecoderMeasuring {
         if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
         {
             self.of = Some(of);
-            state.measured = Some(DecoderResult::pending());
-            self.begin(run.settings, (**networks).clone(), Arc::clone(&run.test.set));
+            state.measured = Some(DecoderResult::pending(&run.settings().source));
+            self.begin(run.setup.clone(), (**networks).clone(), Arc::clone(run.test.set()));
         }
     }
 
@@ -67,12 +68,10 @@ impl DecoderMeasuring {
         (self.of, state.measured) = (None, None);
     }
 
-    /// Measures all decoders of `settings` with their trained `networks` on `test`.
-    fn begin(&mut self, settings: SimulatedSettings, networks: Networks, test: Arc<Dataset>) {
-        self.job.start(
-            move |report| measure_all(settings, networks, &test, report),
-            News::Ended,
-        );
+    /// Measures all decoders of `setup` with their trained `networks` on `test`.
+    fn begin(&mut self, setup: Setup, networks: Networks, test: Arc<Dataset>) {
+        self.job
+            .start(move |report| measure_all(&setup, networks, &test, report), News::Ended);
     }
 
     /// Takes what the thread has to tell.
@@ -87,10 +86,20 @@ impl DecoderMeasuring {
     }
 }
 
-fn measure_all(settings: SimulatedSettings, networks: Networks, test: &Dataset, report: &Report<News>) {
-    let set = DecoderSet::new(&settings, Some(networks)).map_err(|error| error.to_string());
-    for (place, wanted) in DecoderResult::pending().into_iter().enumerate() {
-        if report.is_cancelled() {
+fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<News>) {
+    let is_cancelled = || report.is_cancelled();
+    let sets = setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
+    let set = match sets {
+        Ok(None) => return,
+        Ok(Some(sets)) => Ok(DecoderSet::on_set(
+            *setup.settings(),
+            sets.sets.split.training,
+            Some(networks),
+        )),
+        Err(error) => Err(error.to_string()),
+    };
+    for (place, wanted) in DecoderResult::pending(&setup.settings().source).into_iter().enumerate() {
+        if is_cancelled() {
             return;
         }
         let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
@@ -109,7 +118,7 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use super::*;
-    use crate::evaluation::{Run, Simulation};
+    use crate::evaluation::{Run, SimulatedSettings, Simulation};
 
     #[test]
     fn decoders_that_cannot_be_measured_say_why_and_none_is_left_waiting() {
@@ -128,11 +137,11 @@ mod tests {
         let (waking, woken) = channel();
         let wake = move || waking.send(()).unwrap_or(());
         let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
-        state.measured = Some(DecoderResult::pending());
+        state.measured = Some(DecoderResult::pending(&run.settings().source));
         assert!(state.is_measuring());
         let mut impossible = settings;
         impossible.source.samples = 0;
-        measuring.begin(impossible, run.network(), Arc::clone(run.test()));
+        measuring.begin(impossible.into(), run.network(), Arc::clone(run.test()));
         while state.is_measuring() {
             woken.recv().unwrap();
             measuring.take_news(&mut state);

@@ -1,6 +1,6 @@
 use crate::{
     decoupling::{DecoderKind, Precision},
-    evaluation::DecoderReport,
+    evaluation::{DecoderReport, DecoderSet, Source},
 };
 
 /// The table of decoders.
@@ -24,17 +24,14 @@ pub struct DecoderResult {
 }
 
 impl DecoderResult {
-    /// All decoders, none measured yet.
-    pub fn pending() -> Vec<Self> {
-        let of_kind = |kind: DecoderKind| {
-            let precisions = kind.precisions().iter().copied();
-            precisions.map(move |precision| Self {
-                kind,
-                precision,
-                report: None,
-            })
+    /// All decoders for this source, none measured yet.
+    pub fn pending(source: &Source) -> Vec<Self> {
+        let pending = |(kind, precision)| Self {
+            kind,
+            precision,
+            report: None,
         };
-        DecoderKind::ALL.into_iter().flat_map(of_kind).collect()
+        DecoderSet::kinds(source).map(pending).collect()
     }
 }
 

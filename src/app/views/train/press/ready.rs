@@ -86,8 +86,8 @@ impl ReadyNetwork {
 /// Settings of the ready-made network for the test set on show; `None` where it would take long.
 fn settings_of(shared: &Shared) -> Option<SimulatedSettings> {
     let settings = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => &preview.settings,
-        (None, Some(run)) => &run.settings,
+        (Some(preview), _) => preview.settings,
+        (None, Some(run)) => run.simulated()?,
         (None, None) => return None,
     };
     ready_settings(&settings.source)

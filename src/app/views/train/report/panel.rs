@@ -5,15 +5,24 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        glossary::{self, Term},
-        shared::{Effect, Phase, RunResult, RunView, Shared},
+        glossary,
+        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
         theme::{Theme, space, type_size},
-        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
-        widgets::{Column, Landmark, Row, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui, table_ui},
+        views::train::{
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
+        },
+        widgets::{
+            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
+        },
     },
     decoupling::DecoderKind,
-    evaluation::{ErrorRow, NodeAddress, ReferenceNote, error_remarks, error_rows},
+    evaluation::{
+        Baselines, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings,
+        TestErrors, error_remarks,
+    },
     export::{format_duration, format_number},
+    figure::trade_words::frame_time,
+    training::StopReason,
 };
 
 /// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
@@ -25,23 +34,26 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         let shown = shared.shown_run().zip(result.as_ref());
         if let Some((run, result)) = shown {
             let baselines = &run.baselines;
-            error_table_ui(ui, &error_rows(&result.errors, baselines, run.published.as_ref()));
+            error_table_ui(ui, &run.error_table(result));
             match view.scrub.epoch() {
                 Some(_) => {
                     dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
                 }
                 None => verdict_ui(ui, shared, run, result),
             }
-            conditioning_ui(ui, &run.test);
+            if let Some(test) = run.test.array() {
+                conditioning_ui(ui, test);
+            }
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            if let Some(worst) = worst_node_ui(ui, result) {
-                view.go_to(worst, shared);
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
             }
-            decoders_ui(ui, &mut view.decoders, shared.phase, baselines.reference.as_ref());
+            let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
+            decoders_ui(ui, &mut view.decoders, shared.phase, limit);
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.starts);
+            spread_ui(ui, &run.problem, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -58,25 +70,29 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
 
 /// The table with the network's row still empty.
 fn expectation_ui(ui: &mut Ui, shared: &Shared) {
+    if shared.source == SourceKind::Recording {
+        dim_ui(
+            ui,
+            "Press Train: the errors of each target appear here, next to those of the mean and of ridge regression.",
+        );
+        return;
+    }
     let known = shared.preview.as_ref();
-    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines?))) {
+    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines.clone()?))) {
         // The settings may have moved on to a scene whose figures are still to come.
         let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
         let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
         let published = shared.draft.published().filter(|_| is_of_draft);
-        let mut rows = error_rows(&baselines.mean, &baselines, published.as_ref());
-        for row in rows.iter_mut().filter(|row| row.name == NETWORK) {
-            *row = ErrorRow {
-                name: NETWORK,
-                z_percent: None,
-                x_percent: None,
-                y_percent: None,
-                z_mm: None,
-                z_full_scale_percent: None,
-                worst_mm: None,
-            };
+        let scores = Scores {
+            network: baselines.mean.clone(),
+            baselines,
+        };
+        let mut table = ErrorTable::of_scores(&preview.settings.source.problem(), &scores, published.as_ref());
+        let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);
+        for row in rows.filter(|row| row.name == NETWORK) {
+            row.errors.fill(None);
         }
-        error_table_ui(ui, &rows);
+        error_table_ui(ui, &table);
         conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
@@ -92,73 +108,125 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 /// The name of the network's row.
 const NETWORK: &str = "network";
 
-/// The error columns, in the order of [`ErrorRow::values`]; the last, the worst node, stands below the table.
-const COLUMNS: [Column; 5] = [
-    column(glossary::Z_PERCENT),
-    column(glossary::X_PERCENT),
-    column(glossary::Y_PERCENT),
-    column(glossary::Z_MM),
-    column(glossary::STROKE_PERCENT),
-];
+/// Measures of error that the table shows: all but the worst node, which is shown below.
+fn is_in_table(measure: ErrorMeasure) -> bool {
+    measure != ErrorMeasure::WorstMm
+}
 
-const fn column(term: Term) -> Column {
-    Column {
-        heading: term.name,
-        meaning: term.hint,
+fn column(measure: ErrorMeasure) -> TableColumn<'static> {
+    let term = match measure {
+        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
+        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
+        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
+        ErrorMeasure::ZMm => Some(glossary::Z_MM),
+        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
+        _ => None,
+    };
+    let heading = match measure {
+        ErrorMeasure::RangePercent => "% of range",
+        measure => measure.heading().0,
+    };
+    let heading = term.map_or(heading, |term| term.name);
+    TableColumn::figure(heading).meaning(term.map_or(measure.definition(), |term| term.hint))
+}
+
+fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
+    let palette = Theme::of(ui).palette;
+    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
+    let measures = shown.iter().map(|&place| column(table.measures[place]));
+    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
+    // The error by which the network is judged.
+    let judged = table
+        .measures
+        .iter()
+        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
+    let mut rows = Vec::new();
+    for block in &table.blocks {
+        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
+        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
+        let row = |row: &ErrorRow| {
+            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+                .meaning(row_meaning(row.name))
+                .colour(match row.name {
+                    NETWORK => palette.accent,
+                    "published" | "reference" => palette.dim,
+                    _ => palette.text,
+                })
+                .strong(row.name == NETWORK)
+                .mark(if beats(row.name, judged(row), of_network) {
+                    BETTER
+                } else {
+                    ""
+                })
+        };
+        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
+        rows.extend(block.rows.iter().map(row));
+    }
+    TableView::new("errors", &columns).show_all(ui, rows);
+}
+
+/// Definition of a row of the error table.
+fn row_meaning(name: &str) -> &'static str {
+    match name {
+        "training mean" => DecoderKind::Mean.meaning(),
+        "linear map" => glossary::LINEAR_MAP.hint,
+        "ridge" => DecoderKind::Ridge.meaning(),
+        NETWORK => {
+            "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
+        }
+        "reference" => glossary::REFERENCE.hint,
+        "published" => glossary::PUBLISHED.hint,
+        _ => "",
     }
 }
 
-fn error_table_ui(ui: &mut Ui, rows: &[ErrorRow]) {
-    let palette = Theme::of(ui).palette;
-    let of_network = rows.iter().find(|row| row.name == NETWORK).and_then(|row| row.z_mm);
-    let row = |row: &ErrorRow| Row {
-        name: row.name,
-        meaning: match row.name {
-            "training mean" => DecoderKind::Mean.meaning(),
-            "linear map" => glossary::LINEAR_MAP.hint,
-            NETWORK => "The network with the lowest validation error so far",
-            "reference" => glossary::REFERENCE.hint,
-            "published" => glossary::PUBLISHED.hint,
-            _ => "",
-        },
-        cells: row.values()[..COLUMNS.len()]
-            .iter()
-            .map(|value| format_number(*value))
-            .collect(),
-        colour: match row.name {
-            NETWORK => palette.accent,
-            "published" | "reference" => palette.dim,
-            _ => palette.text,
-        },
-        is_strong: row.name == NETWORK,
-        mark: if beats(row, of_network) { BETTER } else { "" },
-    };
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows.iter().map(row).collect::<Vec<_>>()));
-}
-
 /// Meaning of the mark at a baseline.
-const BETTER: &str = "Better on z than the network.";
+const BETTER: &str = "Better than the network.";
 
-/// Returns true for a baseline that is better on z than the network, in millimetres.
-fn beats(row: &ErrorRow, of_network_mm: Option<f64>) -> bool {
-    let is_baseline = ["training mean", "linear map"].contains(&row.name);
-    let both = row.z_mm.zip(of_network_mm);
-    is_baseline && both.is_some_and(|(baseline_mm, network_mm)| baseline_mm < network_mm)
+/// Returns true for a baseline with a smaller error than the network.
+fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
+    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
+    is_baseline
+        && error
+            .zip(of_network)
+            .is_some_and(|(baseline, network)| baseline < network)
 }
 
-/// Says plainly where the network loses, and what would help; or by how much it wins. Nothing while it still learns.
+/// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
-    let baselines = &run.baselines;
-    let remarks = error_remarks(&run.settings, &result.errors, baselines, Some(reason));
+    match (run.simulated(), result.errors.nodes(), run.baselines.nodes()) {
+        (Some(settings), Some(errors), Some(baselines)) => {
+            verdict_on_nodes_ui(ui, (run, result, reason), &settings, errors, &baselines);
+        }
+        _ => {
+            let flaw = result.flaw.as_ref().map(ToString::to_string);
+            for remark in flaw.iter().chain(&result.remarks) {
+                note_ui(ui, &sentence(remark));
+            }
+        }
+    }
+    if shared.setup().is_ok_and(|setup| setup != run.asked) {
+        dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+fn verdict_on_nodes_ui(
+    ui: &mut Ui,
+    (run, result, reason): (&RunView, &RunResult, StopReason),
+    settings: &SimulatedSettings,
+    errors: &Errors,
+    baselines: &Baselines<Errors>,
+) {
+    let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(flaw) = &result.flaw {
         Some(sentence(&flaw.to_string()))
     } else if let Some((row, remark)) = of_network {
         Some(sentence(&format!("{row}: {remark}")))
-    } else if result.errors.z_mm > baselines.linear.z_mm {
-        let remedy = reason.remedy(&run.settings.training.method);
+    } else if errors.z_mm > baselines.linear.z_mm {
+        let remedy = reason.remedy(&settings.training.method);
         Some(sentence(&format!(
             "a linear map of the resistances is better on z than this network: {remedy}"
         )))
@@ -167,9 +235,9 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     };
     if let Some(fault) = fault {
         note_ui(ui, &fault);
-    } else if result.errors.z_mm > 0.0 {
-        let times = format_number(baselines.linear.z_mm / result.errors.z_mm);
-        let to_limit = baselines.reference.and_then(|limit| result.errors.times(&limit));
+    } else if errors.z_mm > 0.0 {
+        let times = format_number(baselines.linear.z_mm / errors.z_mm);
+        let to_limit = baselines.reference.and_then(|limit| errors.times(&limit));
         let text = match to_limit.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
             Some(ratio) => {
@@ -177,9 +245,6 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
             }
         };
         dim_ui(ui, &text);
-    }
-    if run.asked != shared.draft {
-        dim_ui(ui, "The settings have changed since this training.");
     }
 }
 
@@ -193,10 +258,11 @@ fn sentence(text: &str) -> String {
 /// Returns the worst node, if the user wants to see it.
 fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
     let mut is_wanted = false;
-    let worst = result.errors.worst_node;
+    let errors = result.errors.nodes()?;
+    let worst = errors.worst_node;
     ui.add_space(space(1));
     ui.horizontal(|ui| {
-        let text = format!("Worst node {} mm", format_number(result.errors.worst_mm));
+        let text = format!("Worst node {} mm", format_number(errors.worst_mm));
         ui.label(RichText::new(text).size(type_size().note))
             .on_hover_text(glossary::WORST_NODE.hint);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -230,7 +296,7 @@ fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
 
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let epochs = result.epochs_run;
-    let training = if run.settings.starts > 1 {
+    let training = if run.settings().starts > 1 {
         "Training, all starts"
     } else {
         "Training"
@@ -243,22 +309,18 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", format_short_time(time)));
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
         });
-    }
-}
-
-/// As [`format_duration`], with microseconds below a millisecond.
-fn format_short_time(time: Duration) -> String {
-    if time < Duration::from_millis(1) {
-        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
-    } else {
-        format_duration(time)
     }
 }
 

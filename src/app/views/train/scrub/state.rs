@@ -4,10 +4,10 @@ use crate::{
     app::{
         job::{Job, JobError, Wake},
         shared::{RunResult, RunView, Shared},
+        test_view::TestSet,
         training_worker::RunId,
     },
-    dataset::Dataset,
-    evaluation::{Errors, PastNetworks},
+    evaluation::{PastNetworks, Source, TestErrors},
     network::Networks,
 };
 
@@ -122,16 +122,18 @@ impl ScrubState {
     fn compute(&mut self, run: &RunView, epoch: usize) {
         let Some(present) = &run.result else { return };
         let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
-        let is_standing = present.is_standing;
+        let (is_standing, source) = (present.is_standing, run.settings().source);
         // The surface on show is laid there too, as with the training's own results.
         let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
             move |_| {
-                let result = result_at(epoch, &past, &networks, &test.set, test.stroke_mm)?;
-                let frame = test.frame(result.decoupled_mm.view(), snapshot);
+                let result = result_at(epoch, &past, &networks, &source, &test)?;
+                let array = test.array();
+                let recording = test.recording();
                 Some(RunResult {
                     is_standing,
-                    frame: Some((snapshot, frame)),
+                    frame: array.map(|test| (snapshot, test.frame(result.answers.view(), snapshot))),
+                    charts: recording.map(|test| Arc::new(test.charts(&result.answers))),
                     ..result
                 })
             },
@@ -144,16 +146,18 @@ fn result_at(
     epoch: usize,
     past: &PastNetworks,
     present: &Networks,
-    test: &Dataset,
-    stroke_mm: f64,
+    source: &Source,
+    test: &TestSet,
 ) -> Option<RunResult> {
     let past = past.at(epoch, present)?;
     let (networks, best_epoch) = (past.networks, past.best_epoch);
-    let decoupled_mm = networks.decouple(test);
+    let answers = networks.decouple(test.set());
     Some(RunResult {
-        errors: Errors::measure(test, &decoupled_mm, stroke_mm),
-        decoupled_mm: Arc::new(decoupled_mm),
+        errors: TestErrors::measure(source, test.set(), &answers),
+        answers: Arc::new(answers),
         frame: None,
+        charts: None,
+        remarks: Vec::new(),
         best_epoch,
         flaw: None,
         epochs_run: epoch,
