@@ -14,7 +14,9 @@ use crate::{
         CrossValidation,
         experiments::{CellSummary, ExperimentResults, PaperTable, Verdict},
     },
-    export::{ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean, format_duration},
+    export::{
+        Cell, ExperimentTable, Table, describe_conditions, describe_failures, describe_worse_than_mean, format_duration,
+    },
     sensor::Geometry,
 };
 
@@ -95,8 +97,12 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
             table.heading(),
             describe_conditions(&results.experiment)
         )?;
-        write_aligned(&ExperimentTable::new(results), out)?;
-        writeln!(out)?;
+        let table = ExperimentTable::new(results);
+        let rows = table
+            .rows
+            .into_iter()
+            .map(|row| row.into_iter().map(Cell::from).collect());
+        writeln!(out, "{}", Table::of_headings(table.headings, rows).aligned())?;
         for Verdict {
             claim,
             standing,
@@ -116,26 +122,4 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
     writeln!(out, "{}", ExperimentTable::NOTE)?;
     writeln!(out, "{}", Geometry::ASSUMPTION)?;
     writeln!(out, "Took {}", format_duration(took))
-}
-
-fn write_aligned(table: &ExperimentTable, out: &mut impl Write) -> io::Result<()> {
-    let width = |column: usize, heading: &str| {
-        let cells = table.rows.iter().map(|row| row[column].chars().count());
-        cells.max().unwrap_or(0).max(heading.chars().count())
-    };
-    let widths: Vec<_> = table
-        .headings
-        .iter()
-        .enumerate()
-        .map(|(column, heading)| width(column, heading))
-        .collect();
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let padded = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
-        padded.collect::<Vec<_>>().join("  ")
-    };
-    writeln!(out, "{}", line(&mut table.headings.iter().copied()))?;
-    for row in &table.rows {
-        writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
-    }
-    Ok(())
 }

@@ -37,7 +37,7 @@ mod training_record;
 mod unfinished;
 mod workload_words;
 
-pub use crate::evaluation::format::{format_duration, format_number, format_percent};
+pub use crate::evaluation::format::{format_decimals, format_duration, format_number, format_percent, format_r2};
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};

@@ -79,7 +79,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
         for (letter, errors) in [("A", a), ("B", b)] {
             let cell = format!("Z error, %, {letter}: {}", format_number(errors.z_percent));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
-            let cell = format!("worst node, mm, {letter}: {}", format_number(errors.worst_mm));
+            let cell = format!("Worst node, mm, {letter}: {}", format_number(errors.worst_mm));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));

@@ -1,12 +1,12 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, Color32, Layout, RichText, Ui};
+use eframe::egui::{Color32, RichText, Ui};
 
 use super::{Phase, RunView, Shared, SourceKind};
 use crate::{
     app::{
-        theme::{Palette, Theme, space, type_size},
-        widgets::{progress_bar_ui, state_ui},
+        theme::{Palette, Theme, type_size},
+        widgets::{state_ui, status_progress_ui},
     },
     evaluation::TestErrors,
     export::{format_duration, format_number, format_percent},
@@ -23,7 +23,7 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
         state_ui(ui, colour, &text);
         if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
             if let Some(Progress { bytes, of: Some(of) }) = shared.reading {
-                bar_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
+                status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
             }
             return;
         }
@@ -39,7 +39,7 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
         if shared.phase.is_busy() {
             let epochs_run = run.result.as_ref().map_or(0, |result| result.epochs_run);
             let epochs = run.settings().training.stopping.epochs.max(1);
-            bar_ui(ui, "Training", epochs_run as f32 / epochs as f32);
+            status_progress_ui(ui, "Training", epochs_run as f32 / epochs as f32);
         }
     });
 }
@@ -107,12 +107,4 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
 
 fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
     Duration::try_from_secs_f64(per_epoch.as_secs_f64() * epochs as f64).unwrap_or(Duration::MAX)
-}
-
-/// A progress bar at the right end of the line.
-fn bar_ui(ui: &mut Ui, name: &str, share: f32) {
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.set_max_width(space(40));
-        progress_bar_ui(ui, name, share);
-    });
 }

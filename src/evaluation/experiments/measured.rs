@@ -1,7 +1,7 @@
 use std::cmp::Ordering;
 
 use super::{CellResults, ExperimentResults};
-use crate::evaluation::Spread;
+use crate::evaluation::{Spread, format::format_number};
 
 /// A cell with results.
 #[derive(Clone, Debug)]
@@ -74,23 +74,11 @@ pub(super) fn sorted_by<K: Ord>(mut measured: Vec<Measured>, key: impl FnMut(&Me
     measured
 }
 
-/// Formats a number with three significant digits.
-pub(super) fn number(value: f64) -> String {
-    match value.abs() {
-        1e2.. => format!("{value:.0}"),
-        1e1.. => format!("{value:.1}"),
-        1.0.. => format!("{value:.2}"),
-        0.001.. => format!("{value:.3}"),
-        0.0 => "0".to_owned(),
-        _ => format!("{value:.1e}"),
-    }
-}
-
 /// Formats the median, and the smallest to largest value where they differ.
 fn spread(spread: &Spread) -> String {
     if spread.smallest == spread.largest {
-        return format!("{} %", number(spread.median));
+        return format!("{} %", format_number(spread.median));
     }
-    let [median, smallest, largest] = [spread.median, spread.smallest, spread.largest].map(number);
+    let [median, smallest, largest] = [spread.median, spread.smallest, spread.largest].map(format_number);
     format!("{median} % ({smallest} to {largest})")
 }

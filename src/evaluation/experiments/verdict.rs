@@ -5,8 +5,9 @@ use serde::Serialize;
 use super::{
     Axis, CellResults, ExperimentResults, Growth,
     growth::GrowthLaw,
-    measured::{Measured, number, sorted_by},
+    measured::{Measured, sorted_by},
 };
+use crate::evaluation::format::format_number;
 
 /// Verdict of an experiment on a claim.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -115,7 +116,7 @@ fn judge_cells(
             .zip(&standings)
             .filter(|(_, standing)| **standing == wanted);
         let each = |((cell, figure), _): (&(&Measured, f64), _)| {
-            let against = format!("{} against {}", number(cell.z.median), number(*figure));
+            let against = format!("{} against {}", format_number(cell.z.median), format_number(*figure));
             format!("{} ({against}{})", cell.label, note(cell, *figure))
         };
         those.map(each).collect::<Vec<_>>().join(", ")
@@ -152,9 +153,12 @@ fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
         }
         let bound = cell.bound.filter(|bound| *bound > 0.5 * published);
         let bound = bound.map_or(String::new(), |bound| {
-            format!("; its hidden nodes can carry {}", number(bound))
+            format!("; its hidden nodes can carry {}", format_number(bound))
         });
-        format!(", {} % more{bound}", number(100.0 * (cell.z.median / published - 1.0)))
+        format!(
+            ", {} % more{bound}",
+            format_number(100.0 * (cell.z.median / published - 1.0))
+        )
     };
     let claim = "The published Z error is reached";
     (!cells.is_empty()).then(|| judge_cells(claim, &cells, ["met or beaten at", "missed at"], note))
@@ -242,10 +246,10 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         Some(GrowthLaw::Exponential) => Standing::Fails,
         None => Standing::Undecided,
     };
-    let off = |residual: f64| number(100.0 * residual.exp_m1());
+    let off = |residual: f64| format_number(100.0 * residual.exp_m1());
     let times = points
         .iter()
-        .map(|(x, seconds)| format!("{x}: {} ms", number(1e3 * seconds)));
+        .map(|(x, seconds)| format!("{x}: {} ms", format_number(1e3 * seconds)));
     let law = match growth.degree {
         1 => "a + b·x",
         2 => "a + b·x²",
@@ -256,7 +260,7 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
          {} %.",
         times.collect::<Vec<_>>().join(", "),
         off(growth.polynomial_residual),
-        number(100.0 * (growth.factor_per_unit - 1.0)),
+        format_number(100.0 * (growth.factor_per_unit - 1.0)),
         off(growth.exponential_residual),
     ) + match standing {
         Standing::Undecided => " These sizes and times do not decide between the two.",

@@ -6,22 +6,16 @@ use super::scene_words::{inputs_words, loading_words, movement_words, noise_word
 use crate::{
     app::{
         shared::{PLACES, RunList},
-        theme::Theme,
-        widgets::{Column, Row, fields::capitalised, table_ui},
+        widgets::{TableColumn as Column, TableRow, TableView, fields::capitalised},
     },
     evaluation::{Errors, Simulation},
     export::{KeptRun, Table, TableColumn, format_duration, format_number},
 };
 
-const COLUMNS: [Column; 2] = [
-    Column {
-        heading: "A",
-        meaning: "The run chosen as A",
-    },
-    Column {
-        heading: "B",
-        meaning: "The run chosen as B",
-    },
+const COLUMNS: [Column<'_>; 3] = [
+    Column::text(""),
+    Column::figure("A").meaning("The run chosen as A"),
+    Column::figure("B").meaning("The run chosen as B"),
 ];
 
 /// A figure of a run, in words; `None` if runs of its source have none.
@@ -93,7 +87,7 @@ fn figures(runs: &RunList) -> impl Iterator<Item = (&'static str, [Option<String
         .filter(move |(_, words)| is_empty || words.iter().any(Option::is_some))
 }
 
-/// The same figures for other documents, under the names of the runs.
+/// The figures of both runs, under their names.
 pub fn compared_table(runs: &RunList) -> Table {
     let name = |place: usize| {
         let run = runs.pinned(place).map_or("", |run| &run.name);
@@ -109,16 +103,5 @@ pub fn compared_table(runs: &RunList) -> Table {
 
 /// Errors, configuration and cost of both runs.
 pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
-    let colour = Theme::of(ui).palette.text;
-    let cell = |words: Option<String>| words.unwrap_or_else(|| format_number(None));
-    let row = |(name, words): (&'static str, [Option<String>; 2])| Row {
-        name,
-        meaning: "",
-        cells: words.map(cell).into(),
-        colour,
-        is_strong: false,
-        mark: "",
-    };
-    let rows: Vec<Row> = figures(runs).map(row).collect();
-    ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+    TableView::new("compared", &COLUMNS).show_all(ui, TableRow::of_table(&compared_table(runs)));
 }

@@ -1,7 +1,8 @@
 //! The columns of all files: what they look like, and what they mean.
 
-use eframe::egui::{Align, ComboBox, Label, Layout, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
-use egui_extras::{Column, TableBuilder, TableRow};
+use std::{cell::Cell, rc::Rc};
+
+use eframe::egui::{ComboBox, Label, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use super::{
     column_cells::{figure_ui, meaning_ui, missing_texts, range_texts, remark, unit_ui},
@@ -13,27 +14,24 @@ use super::{
 use crate::{
     app::{
         shared::Effect,
-        theme::{Palette, Theme, semibold, space, type_size},
+        theme::{Palette, Theme, space, type_size},
+        widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView},
     },
     import::{InspectedFile, Meaning},
 };
 
 const ROW_HEIGHT: f32 = space(7);
-const HEADINGS: [(&str, f32); 6] = [
-    ("column", 0.0),
-    ("meaning", space(26)),
-    ("unit", space(15)),
-    ("values", space(22)),
-    ("from – to", space(48)),
-    ("missing", space(15)),
+const MEANING_WIDTH: f32 = space(26);
+const UNIT_WIDTH: f32 = space(15);
+const COLUMNS: [TableColumn<'_>; 7] = [
+    TableColumn::text("column").width(ColumnWidth::Rest),
+    TableColumn::text("meaning").width(ColumnWidth::Points(MEANING_WIDTH - space(3))),
+    TableColumn::text("unit").width(ColumnWidth::Points(UNIT_WIDTH - space(2))),
+    TableColumn::text("values").width(ColumnWidth::Points(space(16))),
+    TableColumn::figure("from – to").width(ColumnWidth::Points(space(46))),
+    TableColumn::figure("missing").width(ColumnWidth::Points(space(12))),
+    TableColumn::text("remarks").width(ColumnWidth::Rest),
 ];
-/// Headings of figures, which stand at the right.
-const FIGURES: [&str; 2] = ["from – to", "missing"];
-/// Least widths of the name and of the remarks, which share what the others leave.
-const LEAST_NAME: f32 = space(28);
-const LEAST_NOTE: f32 = space(26);
-/// Width of the strip of the scroll bar.
-const SCROLL_BAR: f32 = space(3);
 
 /// A line of the table.
 #[derive(Clone, Copy)]
@@ -75,155 +73,142 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
         std::iter::once(Line::File(file)).chain(columns)
     };
     let lines: Vec<Line> = draft.files.iter().enumerate().flat_map(of_file).collect();
-    let fixed: f32 = HEADINGS.iter().map(|(_, width)| width).sum();
-    let rest = ui.available_width() - SCROLL_BAR - fixed;
-    let name = (0.5 * rest).max(LEAST_NAME).min((rest - LEAST_NOTE).max(LEAST_NAME));
-    let note = (rest - name).max(LEAST_NOTE);
     let palette = Theme::of(ui).palette;
-    let mut change = None;
-    ui.spacing_mut().item_spacing.x = 0.0;
-    let mut table = TableBuilder::new(ui)
-        .id_salt("columns")
-        .striped(false)
-        .auto_shrink(false)
-        .min_scrolled_height(0.0)
-        .cell_layout(Layout::left_to_right(Align::Center))
-        .column(Column::exact(name).clip(true));
-    for (_, width) in &HEADINGS[1..] {
-        table = table.column(Column::exact(*width).clip(true));
-    }
-    let table = table.column(Column::exact(note).clip(true));
-    let table = table.header(ROW_HEIGHT, |mut heading| {
-        for text in HEADINGS.iter().map(|(text, _)| *text).chain(["remarks"]) {
-            heading.col(|ui| {
-                let text = RichText::new(text).size(type_size().small).color(palette.dim);
-                if FIGURES.contains(&text.text()) {
-                    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                        ui.add_space(space(1));
-                        ui.label(text);
-                    });
-                    return;
-                }
-                // Remarks keep clear of the figures before them.
-                ui.add_space(if text.text() == "remarks" { space(2) } else { 0.0 });
-                ui.label(text);
-            });
+    let change = Cell::new(None);
+    let wish = |found: Option<Change>| {
+        if found.is_some() {
+            change.set(found);
         }
-    });
-    table.body(|body| {
-        body.rows(ROW_HEIGHT, lines.len(), |mut row| {
-            let found = match lines[row.index()] {
-                Line::File(file) => file_ui(&mut row, draft, file, &palette),
-                Line::Column(file, column) => column_ui(&mut row, draft, (file, column), &palette),
-            };
-            change = change.take().or(found);
-        });
-    });
-    change
+    };
+    let row = |place: usize| match lines[place] {
+        Line::File(file) => file_row(draft, file, &palette, &wish),
+        Line::Column(file, column) => column_row(draft, (file, column), &palette, &wish),
+    };
+    let table = TableView::new("columns", &COLUMNS).row_height(ROW_HEIGHT);
+    table.show(ui, lines.len(), row);
+    change.take()
 }
 
 /// The heading of a file, with a choice for all of its columns.
-fn file_ui(row: &mut TableRow<'_, '_>, draft: &Draft, file: usize, palette: &Palette) -> Option<Change> {
+fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, wish: &'a dyn Fn(Option<Change>)) -> TableRow<'a> {
     let inspected = &draft.files[file];
-    let mut change = None;
-    row.col(|ui| {
-        let text = RichText::new(file_name(&inspected.path)).font(semibold(type_size().body));
-        ui.add(Label::new(text).truncate());
-    });
-    row.col(|ui| {
+    let name = file_name(&inspected.path);
+    let of_all = move |ui: &mut Ui| {
         let label = format!("Meaning of all columns of {}", file_name(&inspected.path));
         let combo = ComboBox::from_id_salt(("all", file))
             .selected_text("set all…")
-            .width(HEADINGS[1].1 - space(3));
+            .width(MEANING_WIDTH - space(3));
         let shown = combo.show_ui(ui, |ui| {
             for meaning in [Meaning::Input, Meaning::Target, Meaning::Unused] {
                 if ui.selectable_label(false, format!("all {meaning}")).clicked() {
-                    change = Some(Change::All(file, meaning));
+                    wish(Some(Change::All(file, meaning)));
                 }
             }
         });
         shown
             .response
             .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-    });
-    for _ in 0..4 {
-        row.col(|_| {});
-    }
-    row.col(|ui| {
-        let text = format!("{} rows", inspected.inspection.rows);
-        ui.add_space(space(2));
-        ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
-    });
-    change
+    };
+    let rows = format!("{} rows", inspected.inspection.rows);
+    let mut cells = vec![TableCell::new(name).strong(true), TableCell::controls(of_all)];
+    cells.extend((0..4).map(|_| TableCell::default()));
+    cells.push(TableCell::new(rows).colour(palette.dim));
+    TableRow::new(cells)
 }
 
-fn column_ui(
-    row: &mut TableRow<'_, '_>,
-    draft: &Draft,
+fn column_row<'a>(
+    draft: &'a Draft,
     (file, column): (usize, usize),
     palette: &Palette,
-) -> Option<Change> {
+    wish: &'a dyn Fn(Option<Change>),
+) -> TableRow<'a> {
+    let palette = *palette;
     let inspected = &draft.files[file];
     let summary = &inspected.inspection.columns[column];
-    let name = inspected.full_name(column);
+    let name = Rc::new(inspected.full_name(column));
     let meaning = inspected.meanings[column];
     let colour = if meaning == Meaning::Unused {
         palette.dim
     } else {
         palette.text
     };
-    let mut change = None;
-    row.col(|ui| {
-        ui.add_space(space(2));
-        ui.add(Label::new(RichText::new(&name).color(colour)).truncate());
-    });
-    row.col(|ui| {
-        change = meaning_ui(ui, &name, meaning, HEADINGS[1].1 - space(3))
-            .map(|meaning| Change::Meaning(file, column, meaning));
-    });
-    row.col(|ui| {
-        if matches!(meaning, Meaning::Input | Meaning::Target) {
-            let unit = unit_ui(ui, &name, &draft.unit(file, column), HEADINGS[2].1 - space(4));
-            change = change.take().or(unit.map(|unit| Change::Unit(file, column, unit)));
+    let of = || Rc::clone(&name);
+    let name_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            ui.add_space(space(2));
+            ui.add(Label::new(RichText::new(&*name).color(colour)).truncate());
         }
-    });
-    row.col(|ui| {
-        let rect = ui.max_rect().shrink2(vec2(space(1), space(1)));
-        let bars = if meaning == Meaning::Unused {
-            palette.line
-        } else {
-            palette.dim
-        };
-        paint_histogram(ui, rect, &summary.histogram, bars);
-        let response = ui.interact(rect, ui.scope_id().with("histogram"), Sense::hover());
-        let label = format!("Histogram of {name}");
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
-        response.on_hover_text("Number of rows in each sixteenth of the range.");
-    });
-    row.col(|ui| {
-        let ends = summary.min.zip(summary.max);
-        let texts = ends.map_or_else(|| vec!["–".to_owned()], |(min, max)| range_texts(min, max));
-        let exact = ends.map(|(min, max)| format!("{min} to {max}"));
-        let response = figure_ui(ui, &texts, &format!("Range of {name}"), colour);
-        if let Some(exact) = exact {
-            response.on_hover_text(exact);
+    };
+    let meaning_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            let picked = meaning_ui(ui, &name, meaning, MEANING_WIDTH - space(3));
+            wish(picked.map(|meaning| Change::Meaning(file, column, meaning)));
         }
-    });
-    row.col(|ui| {
-        let texts = missing_texts(summary.missing, inspected.inspection.rows);
-        let response = figure_ui(ui, &texts, &format!("Missing in {name}"), colour);
-        response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.inspection.rows));
-    });
-    row.col(|ui| {
+    };
+    let unit_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            if matches!(meaning, Meaning::Input | Meaning::Target) {
+                let unit = unit_ui(ui, &name, &draft.unit(file, column), UNIT_WIDTH - space(4));
+                wish(unit.map(|unit| Change::Unit(file, column, unit)));
+            }
+        }
+    };
+    let histogram_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            let rect = ui.max_rect().shrink2(vec2(0.0, space(1)));
+            let bars = if meaning == Meaning::Unused {
+                palette.line
+            } else {
+                palette.dim
+            };
+            paint_histogram(ui, rect, &summary.histogram, bars);
+            let response = ui.interact(rect, ui.scope_id().with("histogram"), Sense::hover());
+            let label = format!("Histogram of {name}");
+            response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+            response.on_hover_text("Number of rows in each sixteenth of the range.");
+        }
+    };
+    let range_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            let ends = summary.min.zip(summary.max);
+            let texts = ends.map_or_else(|| vec!["–".to_owned()], |(min, max)| range_texts(min, max));
+            let exact = ends.map(|(min, max)| format!("{min} to {max}"));
+            let response = figure_ui(ui, &texts, &format!("Range of {name}"), colour);
+            if let Some(exact) = exact {
+                response.on_hover_text(exact);
+            }
+        }
+    };
+    let missing_cell = {
+        let name = of();
+        move |ui: &mut Ui| {
+            let texts = missing_texts(summary.missing, inspected.inspection.rows);
+            let response = figure_ui(ui, &texts, &format!("Missing in {name}"), colour);
+            response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.inspection.rows));
+        }
+    };
+    let remark_cell = move |ui: &mut Ui| {
         if let Some((text, is_bad)) = remark(summary, column) {
             let colour = if is_bad && meaning != Meaning::Unused {
                 palette.warning
             } else {
                 palette.dim
             };
-            ui.add_space(space(2));
             ui.add(Label::new(RichText::new(text).size(type_size().note).color(colour)).truncate());
         }
-    });
-    change
+    };
+    TableRow::new([
+        TableCell::controls(name_cell),
+        TableCell::controls(meaning_cell),
+        TableCell::controls(unit_cell),
+        TableCell::controls(histogram_cell),
+        TableCell::controls(range_cell),
+        TableCell::controls(missing_cell),
+        TableCell::controls(remark_cell),
+    ])
 }

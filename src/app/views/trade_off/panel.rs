@@ -136,10 +136,10 @@ fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
     };
     ui.add_space(space(1));
     let (done, all) = outcome.points();
-    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32);
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
     let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
-    dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
+    let text = format!("{done} of {all} points, at noise {noise}");
+    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32, &text);
     if !trade.is_quiet(shared) {
         note_ui(
             ui,

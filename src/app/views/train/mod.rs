@@ -15,6 +15,7 @@ mod sample_card;
 mod scrub;
 mod state;
 mod surfaces;
+mod target_choice;
 mod view;
 mod workbench;
 

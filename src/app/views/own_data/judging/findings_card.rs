@@ -1,20 +1,21 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, ComboBox, Grid, Layout, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{Align, ComboBox, Layout, Ui, vec2};
 
 use super::{Measuring, measuring::UnderWay, thread::Told};
 use crate::{
     app::{
         plotting::{Pointer, legend_ui, plots_ui},
-        theme::{Theme, semibold, space, type_size},
+        theme::{Theme, space},
         views::own_data::{remarks::sentence, state::OwnDataView},
         widgets::{
-            dim_ui, explained_options_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui,
+            TableCell, TableColumn, TableRow, TableView, dim_ui, explained_options_ui, fields::capitalised,
+            ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
     evaluation::Channel,
     evaluation::recorded::{Findings, FittedModel},
-    export::{describe_target, describe_warnings, format_duration},
+    export::{describe_target, describe_warnings, format_duration, format_number},
     figure::{PlotFigure, learning_curve_figure},
     import::Meaning,
 };
@@ -182,33 +183,25 @@ fn channels_ui(ui: &mut Ui, told: &Told) {
         ),
     );
     let palette = Theme::of(ui).palette;
-    ScrollArea::horizontal().id_salt("channels").show(ui, |ui| {
-        Grid::new("worth of the channels")
-            .spacing(vec2(space(5), space(1)))
-            .show(ui, |ui| {
-                let heading = |text: &str| RichText::new(text).font(semibold(type_size().note)).color(palette.dim);
-                ui.label(heading("channel"));
-                for target in &told.targets {
-                    ui.label(heading(&target.title()));
-                }
-                ui.end_row();
-                for channel in &told.findings.importance {
-                    let colour = if channel.is_dispensable() {
-                        palette.dim
-                    } else {
-                        palette.text
-                    };
-                    let cell = |text: &str| RichText::new(text).size(type_size().note).color(colour);
-                    ui.label(cell(&told.inputs[channel.channel].title()));
-                    for growth in &channel.growth {
-                        ui.label(cell(
-                            &growth.map_or_else(|| "–".to_owned(), |growth| growth.to_string()),
-                        ));
-                    }
-                    ui.end_row();
-                }
-            });
+    let titles: Vec<String> = told.targets.iter().map(Channel::title).collect();
+    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text("channel"))
+        .chain(titles.iter().map(|title| TableColumn::figure(title)))
+        .collect();
+    let rows = told.findings.importance.iter().map(|channel| {
+        let colour = if channel.is_dispensable() {
+            palette.dim
+        } else {
+            palette.text
+        };
+        let name = told.inputs[channel.channel].title();
+        let growth = channel.growth.iter().map(|growth| match growth {
+            Some(growth) => growth.to_string(),
+            None => format_number(None),
+        });
+        let cells = std::iter::once(name.clone()).chain(growth).map(TableCell::new);
+        TableRow::new(cells).named(name).colour(colour)
     });
+    TableView::new("channels", &columns).show_all(ui, rows.collect());
 }
 
 fn curve_ui(ui: &mut Ui, told: &Told, target: &mut usize) {

@@ -46,13 +46,12 @@ pub fn decoders_table(decoders: &Decoders) -> Table {
                 Cell::Text(target.name.clone()),
                 Cell::Text(unit),
             ];
-            let figures = [
-                Some(errors.rmse),
-                errors.r2,
-                Some(report.cost.frame_us),
-                Some(report.cost.fit_seconds),
-            ];
-            cells.extend(figures.map(Cell::Number));
+            cells.extend([
+                errors.rmse.into(),
+                Cell::r2(errors.r2),
+                report.cost.frame_us.into(),
+                report.cost.fit_seconds.into(),
+            ]);
             rows.push(cells);
         }
     }

@@ -6,7 +6,7 @@ use crate::{
         shared::Shared,
         theme::{Theme, semibold, type_size},
         views::train::state::TrainView,
-        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, dim_ui, scrolled_table_ui},
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui},
     },
     export::format_number,
     figure::ErrorBins,
@@ -64,23 +64,10 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
             [snapshot, row, node] => format!("Snapshot {snapshot}, row {row}, node {node}: {error} mm"),
             texts => with_unit(&format!("Sample {}: {error}", texts.join(" "))),
         };
-        TableRow {
-            label,
-            is_marked: is_here && (channel.is_some() || place.node == view.lights.node),
-            meaning: "",
-            dot: None,
-            cells: texts
-                .into_iter()
-                .chain([error])
-                .map(|text| TableCell {
-                    text,
-                    colour: if is_here { palette.text } else { palette.dim },
-                    is_strong: false,
-                    label: None,
-                    meaning: "",
-                })
-                .collect(),
-        }
+        TableRow::new(texts.into_iter().chain([error]).map(TableCell::new))
+            .labelled(label)
+            .selected(is_here && (channel.is_some() || place.node == view.lights.node))
+            .colour(if is_here { palette.text } else { palette.dim })
     };
     let error_heading = unit.map_or_else(|| "Error".to_owned(), |unit| format!("Error {unit}"));
     let error = figure(&error_heading, "−0.0123");
@@ -93,7 +80,8 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         ],
         Some(_) => vec![figure("Sample", "100000"), error],
     };
-    match scrolled_table_ui(ui, "nodes in bar", &columns, None, places.len(), row) {
+    let table = TableView::new("nodes in bar", &columns).clickable();
+    match table.show(ui, places.len(), row) {
         Some(TableClick::Point(at)) => {
             let here = places.get(at).filter(|(place, _)| place.snapshot == view.snapshot);
             let node = here.and_then(|(place, _)| place.node);
@@ -102,7 +90,7 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
                 ui.request_repaint();
             }
         }
-        Some(TableClick::Mark(at) | TableClick::Open(at)) => {
+        Some(TableClick::Select(at) | TableClick::Open(at)) => {
             if let Some((place, _)) = places.get(at) {
                 view.go_to(*place);
                 ui.request_repaint();
@@ -113,9 +101,5 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 }
 
 const fn figure<'a>(heading: &'a str, widest: &'a str) -> TableColumn<'a> {
-    TableColumn {
-        heading,
-        is_figure: true,
-        width: ColumnWidth::Fits(widest),
-    }
+    TableColumn::figure(heading).width(ColumnWidth::Fits(widest))
 }

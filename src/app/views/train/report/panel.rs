@@ -7,21 +7,21 @@ use crate::{
     app::{
         glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
-        theme::{Theme, semibold, space, type_size},
+        theme::{Theme, space, type_size},
         views::train::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
         },
         widgets::{
-            Column, Landmark, Row, TableWidths, captioned_table_ui, dim_ui, ghost_button, note_ui, scrolled_ui,
-            section_heading_ui, table_ui,
+            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
     decoupling::DecoderKind,
     evaluation::{
-        Baselines, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores,
-        SimulatedSettings, TestErrors, error_remarks,
+        Baselines, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings,
+        TestErrors, error_remarks,
     },
     export::{format_duration, format_number},
+    figure::trade_words::frame_time,
     training::StopReason,
 };
 
@@ -51,7 +51,8 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
                 view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
-            decoders_ui(ui, &mut view.decoders, shared.phase, limit);
+            let measured = (&*run.problem, limit);
+            decoders_ui(ui, &mut view.decoders, shared.phase, measured, &mut view.target);
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.problem, &run.starts);
         } else {
@@ -113,7 +114,7 @@ fn is_in_table(measure: ErrorMeasure) -> bool {
     measure != ErrorMeasure::WorstMm
 }
 
-fn heading(measure: ErrorMeasure) -> Column {
+fn column(measure: ErrorMeasure) -> TableColumn<'static> {
     let term = match measure {
         ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
         ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
@@ -126,57 +127,50 @@ fn heading(measure: ErrorMeasure) -> Column {
         ErrorMeasure::RangePercent => "% of range",
         measure => measure.heading().0,
     };
-    Column {
-        heading: term.map_or(heading, |term| term.name),
-        meaning: term.map_or(measure.definition(), |term| term.hint),
+    match term {
+        Some(term) => TableColumn::figure(term.name).meaning(term.hint),
+        None => TableColumn::figure(heading).meaning(measure.definition()),
     }
 }
 
 fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     let palette = Theme::of(ui).palette;
     let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let columns = Vec::from_iter(shown.iter().map(|&place| heading(table.measures[place])));
+    let measures = shown.iter().map(|&place| column(table.measures[place]));
+    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
     // The error by which the network is judged.
     let judged = table
         .measures
         .iter()
         .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
-    let rows_of = |block: &ErrorBlock| -> Vec<Row> {
+    let mut rows = Vec::new();
+    for block in &table.blocks {
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
         let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
-        let row = |row: &ErrorRow| Row {
-            name: row.name,
-            meaning: row_meaning(row.name),
-            cells: shown.iter().map(|&place| format_number(row.errors[place])).collect(),
-            colour: match row.name {
-                NETWORK => palette.accent,
-                "published" | "reference" => palette.dim,
-                _ => palette.text,
-            },
-            is_strong: row.name == NETWORK,
-            mark: if beats(row.name, judged(row), of_network) {
-                BETTER
-            } else {
-                ""
-            },
+        let row = |row: &ErrorRow| {
+            let name = match &block.target {
+                Some(target) => format!("{}, {}", target.title(), row.name),
+                None => row.name.to_owned(),
+            };
+            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+                .named(name)
+                .meaning(row_meaning(row.name))
+                .colour(match row.name {
+                    NETWORK => palette.accent,
+                    "published" | "reference" => palette.dim,
+                    _ => palette.text,
+                })
+                .strong(row.name == NETWORK)
+                .mark(if beats(row.name, judged(row), of_network) {
+                    BETTER
+                } else {
+                    ""
+                })
         };
-        block.rows.iter().map(row).collect()
-    };
-    let blocks = Vec::from_iter(table.blocks.iter().map(|block| (block, rows_of(block))));
-    let widths = TableWidths::fitting(ui, &columns, &Vec::from_iter(blocks.iter().flat_map(|(_, rows)| rows)));
-    for (block, rows) in &blocks {
-        match &block.target {
-            None => {
-                ui.scope(|ui| table_ui(ui, &columns, rows));
-            }
-            Some(target) => {
-                ui.add_space(space(1));
-                ui.label(RichText::new(target.title()).font(semibold(type_size().body)));
-                ui.scope(|ui| captioned_table_ui(ui, &target.title(), &columns, rows, &widths));
-                ui.add_space(space(2));
-            }
-        }
+        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
+        rows.extend(block.rows.iter().map(row));
     }
+    TableView::new("errors", &columns).show_all(ui, rows);
 }
 
 /// Definition of a row of the error table.
@@ -328,22 +322,13 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
         } else {
             "Decoding a sample"
         };
-        rows.push((decoding, format_short_time(time)));
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
         });
-    }
-}
-
-/// As [`format_duration`], with microseconds below a millisecond.
-fn format_short_time(time: Duration) -> String {
-    if time < Duration::from_millis(1) {
-        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
-    } else {
-        format_duration(time)
     }
 }
 
