@@ -30,8 +30,8 @@ pub enum Matter {
     Comparison,
     /// Frames decoded as they come.
     Live,
-    /// Recordings, and networks trained on them.
-    OwnData,
+    /// Files of the recording that is trained on.
+    Recording,
     /// The file by which the next window opens as this one was left.
     Memory,
 }

@@ -21,7 +21,7 @@ impl DecouplerWindow {
             .views
             .all()
             .into_iter()
-            .position(|view| view.take_files(&paths, effects));
+            .position(|view| view.take_files(&paths, &self.shared, effects));
         if let Some(place) = place {
             self.show(place);
             ctx.request_repaint();

@@ -10,6 +10,7 @@ mod exports;
 mod inspect;
 mod paper_figure;
 mod press;
+mod recording;
 mod report;
 mod sample_card;
 mod scrub;

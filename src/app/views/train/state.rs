@@ -9,6 +9,7 @@ use super::{
     inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     paper_figure::PaperFigure,
     press::PressState,
+    recording::RecordingEditor,
     scrub::ScrubState,
 };
 use crate::{
@@ -46,6 +47,8 @@ pub struct TrainView {
     pub press: PressState,
     /// The past epoch on show.
     pub scrub: ScrubState,
+    /// Recording that is trained on.
+    pub(in crate::app) recording: RecordingEditor,
     /// Results of other decoders on the test set.
     pub decoders: DecodersState,
     pub(super) measuring: DecoderMeasuring,
@@ -66,6 +69,7 @@ impl TrainView {
             drawn: Drawn::default(),
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
+            recording: RecordingEditor::new(&wake),
             decoders: DecodersState::default(),
             measuring: DecoderMeasuring::new(wake),
         }

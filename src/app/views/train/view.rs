@@ -1,3 +1,5 @@
+use std::path::PathBuf;
+
 use eframe::egui::{Context, Key, Modifiers, Ui};
 
 use super::{
@@ -10,7 +12,8 @@ use super::{
 use crate::{
     app::{
         shared::{
-            Columns, Effect, Export, Offers, Phase, RunWish, Shared, SourceKind, Unfinished, View, run_buttons_ui,
+            Columns, Effect, Export, FileInUse, Matter, Notice, Offers, Phase, RunWish, Shared, SourceKind, Unfinished,
+            View, run_buttons_ui,
         },
         theme::space,
         widgets::snapshot_ui,
@@ -23,8 +26,23 @@ impl View for TrainView {
         "Train"
     }
 
-    fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.recording.take_news(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
+    }
+
+    fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {
+        if shared.phase.is_busy() {
+            let text = "A training is running: stop it before you open other files.";
+            effects.push(Effect::Tell(Matter::Recording, Notice::Failed(text.to_owned())));
+        } else {
+            self.recording.open(paths.to_vec());
+        }
+        true
+    }
+
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        self.recording.files_in_use()
     }
 
     fn unfinished(&self, shared: &Shared) -> Vec<Unfinished> {
@@ -58,6 +76,9 @@ impl View for TrainView {
         }
         if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
             effects.push(Effect::Stop);
+        }
+        if offers.offer("Open files", !phase.is_busy()) {
+            effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
         if shared.source == SourceKind::Array
             && offers.offer("Press the middle of the surface", shared.test().is_some())
@@ -113,11 +134,13 @@ impl View for TrainView {
     }
 
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        train_exports(self, shared)
+        let mut exports = train_exports(self, shared);
+        exports.extend(self.recording.exports(shared));
+        exports
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        if let Some(figure) = configuration_ui(ui, shared, effects) {
+        if let Some(figure) = configuration_ui(ui, &mut self.recording, shared, effects) {
             self.show_paper_figure(figure, shared, effects);
         }
     }
@@ -128,6 +151,9 @@ impl View for TrainView {
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        if self.recording.is_on_show(shared) {
+            return self.recording.columns_ui(ui, shared, effects);
+        }
         self.follow(shared);
         if self.watched != self.snapshot {
             self.watched = self.snapshot;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    planned::{MadeOf, PlanCache, Planned},
+    planned::{MadeOf, PlanCache},
     renaming::Renaming,
 };
 use crate::{
@@ -288,15 +288,15 @@ impl Draft {
         self.tests.remove(recording);
     }
 
-    /// The import as it stands, to be read anew.
+    /// Plan of the import with absolute paths.
     ///
     /// # Errors
     /// If a text cannot be understood, or a file for the test is missing; with what to do.
-    pub(super) fn planned(&self) -> Result<Arc<Planned>, String> {
+    pub(super) fn planned(&self) -> Result<Arc<Plan>, String> {
         self.cache.borrow_mut().planned(self)
     }
 
-    /// As [`Self::planned`], made anew.
+    /// As [`Self::planned`], with the paths of the draft and not cached.
     pub(super) fn made_plan(&self) -> Result<Plan, String> {
         let mut plan = self.plan.clone();
         let import = &mut plan.import;
@@ -349,7 +349,7 @@ impl Draft {
         for file in &self.files {
             files.push(self.tests.get(&file.path).cloned().ok_or_else(|| {
                 format!(
-                    "{} has no file for the test yet: choose it with “Test file…” under “Split”, or close the other \
+                    "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other \
                      files of the test.",
                     file_name(&file.path)
                 )

@@ -1,8 +1,8 @@
-//! Trying an import out in the background: which samples it gives, and which rows it drops.
+//! A check of the import in the background: numbers of samples, rows dropped, and warnings.
 
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use super::{planned::Planned, remarks::in_window};
+use super::remarks::in_window;
 use crate::{
     app::job::{Job, JobError, Report, Wake},
     dataset::{Dataset, Seed},
@@ -31,11 +31,11 @@ pub(super) struct Checked {
 #[derive(Debug)]
 struct CheckingEvent(Result<Box<Checked>, String>);
 
-/// The import being tried out, and what came of the last.
+/// Check under way, and the outcome of the last one.
 #[derive(Debug)]
 pub(super) struct Checking {
     job: Job<CheckingEvent>,
-    asked: Option<(Arc<Planned>, Seed)>,
+    asked: Option<(Arc<Plan>, Seed)>,
     /// Its outcome, once it is known.
     pub(super) checked: Option<Result<Box<Checked>, String>>,
 }
@@ -49,13 +49,13 @@ impl Checking {
         }
     }
 
-    /// Tries this plan out, unless that is done or under way; none if there is nothing to try.
-    pub(super) fn follow(&mut self, planned: Option<Arc<Planned>>, seed: Seed) {
+    /// Checks this plan, unless that is done or under way; `None` if there is nothing to check.
+    pub(super) fn follow(&mut self, planned: Option<Arc<Plan>>, seed: Seed) {
         let wanted = planned.map(|planned| (planned, seed));
         let is_same = match (&wanted, &self.asked) {
             (None, None) => true,
             (Some((wanted, seed)), Some((asked, before))) => {
-                seed == before && (Arc::ptr_eq(wanted, asked) || wanted.plan == asked.plan)
+                seed == before && (Arc::ptr_eq(wanted, asked) || wanted == asked)
             }
             _ => false,
         };
@@ -64,8 +64,8 @@ impl Checking {
             self.checked = None;
             match wanted {
                 None => self.job.abandon(),
-                Some((planned, seed)) => self.job.start(
-                    move |report| check(&planned.plan, seed, report),
+                Some((plan, seed)) => self.job.start(
+                    move |report| check(&plan, seed, report),
                     |checked: Result<_, JobError>| {
                         CheckingEvent(checked.unwrap_or_else(|error| Err(error.to_string())))
                     },
@@ -77,7 +77,7 @@ impl Checking {
         }
     }
 
-    /// Tells whether an import is being tried out.
+    /// Returns true while an import is being checked.
     pub(super) fn is_under_way(&self) -> bool {
         self.asked.is_some() && self.checked.is_none()
     }
@@ -114,7 +114,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     }))
 }
 
-/// Inputs that tell less than they should.
+/// Remarks on inputs that carry little or no information.
 fn channels(recording: &Recording) -> Vec<String> {
     let name = |channel: usize| recording.inputs[channel].name.clone();
     channel_remarks(&recording.set)

@@ -1,4 +1,4 @@
-//! Files opened in the background: recordings, recipes, networks and checkpoints alike.
+//! Files opened in the background: recordings, recipes, networks and checkpoints.
 
 use std::{
     ops::ControlFlow,
@@ -7,14 +7,17 @@ use std::{
 
 use super::{
     draft::{Draft, file_name, missing},
-    model::{Positions, Tested, Trained},
+    missing::Reopened,
     remarks::in_window,
     renaming::Renaming,
+    sample::write_sample,
 };
 use crate::{
     app::job::{Job, JobError, Report, Wake},
-    export::{DocumentKind, MeasuredCheckpointFile, MeasuredNetworkFile, RecipeFile},
-    import::{InspectedFile, Joined, Plan, Progress, Recipe, holds_positions, suggested_plan, suggested_plan_in_order},
+    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile},
+    import::{
+        InspectedFile, Joined, Plan, Progress, Recipe, Watch, holds_positions, suggested_plan, suggested_plan_in_order,
+    },
 };
 
 /// Files to be opened.
@@ -23,7 +26,13 @@ pub(super) enum ToOpen {
     /// Recordings, or a file of this program.
     Files(Files),
     /// Files of a plan.
-    Plan(Box<Plan>),
+    Import(Box<Reopened>),
+    /// As [`Self::Import`], after the missing file at the first path was found at the second.
+    Found(Box<Reopened>, PathBuf, PathBuf),
+    /// Recordings of a checkpoint that the worker could not resume.
+    Missing(PathBuf),
+    /// The sample recording, to be written into this folder.
+    Sample(PathBuf),
 }
 
 /// Recordings to be opened.
@@ -40,24 +49,30 @@ pub(super) struct Files {
 /// Contents of a file that was opened.
 #[derive(Debug)]
 pub(super) enum Opened {
-    /// Recordings with guesses of what they mean.
+    /// Recordings with the suggested meanings of their columns.
     Recordings(Box<Draft>),
-    /// A file with positions of targets, beside recordings that are open.
+    /// A file with positions of targets, for the recordings that are open.
     Positions(PathBuf),
-    /// A recipe, or the files of a plan.
-    Import(Box<Draft>),
-    /// A network, and its import if the recording is still there.
-    Network(Box<Trained>, Option<Box<Draft>>),
-    /// A checkpoint, which is for the trainer, and its import if the recording is still there.
-    Checkpoint(PathBuf, Box<MeasuredCheckpointFile>, Option<Box<Draft>>),
+    /// Import of a recipe.
+    Recipe(Box<Draft>),
+    /// Import of a plan.
+    Import(Box<Draft>, Box<Reopened>),
+    /// Import of a plan of which files are missing.
+    Missing(Box<Reopened>),
+    /// A network, and its import or the reason for which there is none; `None` for a simulated array.
+    Network(Box<NetworkFile>, Option<Result<Box<Opened>, String>>),
+    /// A checkpoint, which is for the worker.
+    Checkpoint(PathBuf),
+    /// No file is missing.
+    Nothing,
 }
 
-/// News of files being opened.
+/// Event of files being opened.
 #[derive(Debug)]
 pub(super) enum OpeningEvent {
     /// Progress of reading this file.
     Reading(Progress),
-    /// The files are open, or why not.
+    /// The files, or the reason for which they cannot be opened.
     Opened(Result<Opened, String>),
 }
 
@@ -65,8 +80,10 @@ pub(super) enum OpeningEvent {
 #[derive(Debug)]
 pub(super) struct Opening {
     job: Job<OpeningEvent>,
-    /// Names of the files under way, and how far they are read.
+    /// Names of the files under way, and the progress of reading them.
     pub(super) under_way: Option<(String, Option<Progress>)>,
+    /// True while the files of a plan are being opened.
+    pub(super) is_reopening: bool,
 }
 
 impl Opening {
@@ -74,16 +91,20 @@ impl Opening {
         Self {
             job: Job::prompt("opening", wake),
             under_way: None,
+            is_reopening: false,
         }
     }
 
-    /// Opens files; those still being opened are let go.
+    /// Opens files; those still being opened are abandoned.
     pub(super) fn start(&mut self, to_open: ToOpen) {
         let paths = match &to_open {
             ToOpen::Files(files) if files.new.is_empty() => files.open.clone(),
             ToOpen::Files(files) => files.new.clone(),
-            ToOpen::Plan(plan) => vec![plan.import.data.clone()],
+            ToOpen::Import(reopened) | ToOpen::Found(reopened, ..) => vec![reopened.recorded.plan.import.data.clone()],
+            ToOpen::Missing(path) => vec![path.clone()],
+            ToOpen::Sample(_) => vec![PathBuf::from("sample recording")],
         };
+        self.is_reopening = matches!(to_open, ToOpen::Import(_) | ToOpen::Found(..) | ToOpen::Missing(_));
         let names: Vec<String> = paths.iter().map(|path| file_name(path)).collect();
         self.under_way = Some((names.join(", "), None));
         self.job.start(
@@ -95,10 +116,10 @@ impl Opening {
     /// Opens them no longer.
     pub(super) fn cancel(&mut self) {
         self.job.abandon();
-        self.under_way = None;
+        (self.under_way, self.is_reopening) = (None, false);
     }
 
-    /// The contents that were opened, once they are.
+    /// Returns the contents of the files once they are read.
     pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
         while let Some(event) = self.job.next_event() {
             match event {
@@ -108,7 +129,7 @@ impl Opening {
                     }
                 }
                 OpeningEvent::Opened(opened) => {
-                    self.under_way = None;
+                    (self.under_way, self.is_reopening) = (None, false);
                     return Some(opened);
                 }
             }
@@ -127,7 +148,17 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         }
     };
     let files = match to_open {
-        ToOpen::Plan(plan) => return Ok(Opened::Import(inspected(*plan, Draft::of_recipe, &mut watch)?)),
+        ToOpen::Import(reopened) => return reopen(*reopened, &mut watch),
+        ToOpen::Found(mut reopened, missing, found) => {
+            reopened.relocate(&missing, &found)?;
+            return reopen(*reopened, &mut watch);
+        }
+        // The window has reported what is wrong with the file.
+        ToOpen::Missing(path) => return Ok(missing_of_checkpoint(&path).unwrap_or(Opened::Nothing)),
+        ToOpen::Sample(folder) => Files {
+            new: vec![write_sample(&folder)?],
+            ..Files::default()
+        },
         ToOpen::Files(files) => files,
     };
     for path in &files.new {
@@ -224,79 +255,57 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
 }
 
 /// The import of a plan.
-fn inspected(
-    plan: Plan,
-    draft: fn(Plan, Vec<InspectedFile>) -> Draft,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Box<Draft>, String> {
+fn inspected(plan: Plan, draft: fn(Plan, Vec<InspectedFile>) -> Draft, watch: Watch<'_>) -> Result<Box<Draft>, String> {
     let files = plan.import.inspect(Path::new(""), watch);
     Ok(Box::new(draft(plan, files.map_err(|error| in_window(&error))?)))
 }
 
-fn open_document(
-    kind: DocumentKind,
-    path: &Path,
-    watch: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-) -> Result<Opened, String> {
+/// Opens the files of an import again, if all are there.
+fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
+    if !reopened.missing().is_empty() {
+        return Ok(Opened::Missing(Box::new(reopened)));
+    }
+    reopened.compare()?;
+    let draft = inspected(reopened.recorded.plan.clone(), Draft::of_recipe, watch)?;
+    Ok(Opened::Import(draft, Box::new(reopened)))
+}
+
+fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
     match kind {
         DocumentKind::Recipe => {
             let plan = RecipeFile::load(path).map_err(|error| error.to_string())?;
-            Ok(Opened::Import(inspected(plan, Draft::of_recipe, watch)?))
+            match reopen(Reopened::from(plan), watch)? {
+                Opened::Import(draft, _) => Ok(Opened::Recipe(draft)),
+                opened => Ok(opened),
+            }
         }
-        DocumentKind::MeasuredNetwork => {
-            let file = MeasuredNetworkFile::load(path).map_err(|error| error.to_string())?;
-            let draft = inspected(file.plan.clone(), Draft::of_recipe, watch).ok();
-            let trained = opened_network(file, watch);
-            Ok(Opened::Network(Box::new(trained), draft))
+        DocumentKind::Network => {
+            let file = NetworkFile::load(path).map_err(|error| error.to_string())?;
+            let recorded = file.recorded.clone();
+            let import = recorded.map(|recorded| reopen(Reopened::from(recorded), watch).map(Box::new));
+            Ok(Opened::Network(Box::new(file), import))
         }
-        DocumentKind::MeasuredCheckpoint => {
-            let file = MeasuredCheckpointFile::load(path).map_err(|error| error.to_string())?;
-            let draft = inspected(file.plan.clone(), Draft::of_recipe, watch).ok();
-            Ok(Opened::Checkpoint(path.to_owned(), Box::new(file), draft))
-        }
-        DocumentKind::Network => Err(format!(
-            "'{}' has a network of a simulated sensor: open it in the Live view, which decodes with it",
-            path.display()
-        )),
-        DocumentKind::Checkpoint => Err(format!(
-            "'{}' is a training on a simulated sensor: open it in the Train view",
-            path.display()
-        )),
+        DocumentKind::Checkpoint => match missing_of_checkpoint(path) {
+            Ok(opened @ Opened::Missing(_)) => Ok(opened),
+            // The worker reports what is wrong with the file.
+            _ => Ok(Opened::Checkpoint(path.to_owned())),
+        },
         other => Err(format!(
-            "'{}' is a {other}: give a recording (CSV, .npy, .npz or .mat), a recipe, or a network of own data",
+            "'{}' is a {other}: open a recording (CSV, .npy, .npz or .mat), a recipe, a network or a checkpoint",
             path.display()
         )),
     }
 }
 
-/// The network of a file, with its answers to the test samples if the recording can be read again.
-fn opened_network(file: MeasuredNetworkFile, watch: &mut dyn FnMut(Progress) -> ControlFlow<()>) -> Trained {
-    let sets = file.plan.sets(Path::new(""), file.settings.seed, watch);
-    let tested = sets.map_err(|error| in_window(&error)).and_then(|sets| {
-        if (sets.test.channels(), sets.test.outputs()) != (file.inputs.len(), file.targets.len()) {
-            return Err("it has other columns now".to_owned());
-        }
-        let answers = file.network.decouple(&sets.test);
-        let tested = Tested::new(sets.test, answers, Positions::of(&sets.recording), &file.targets);
-        if tested.errors() == file.errors {
-            Ok(tested)
-        } else {
-            Err("its test samples are others now".to_owned())
-        }
+/// Returns the recordings that are missing for the training in the checkpoint at `path`.
+fn missing_of_checkpoint(path: &Path) -> Result<Opened, String> {
+    let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+    let reopened = file.recorded.clone().map(|recorded| Reopened {
+        checkpoint: Some(Box::new(file)),
+        ..Reopened::from(recorded)
     });
-    let (tested, remark) = match tested {
-        Ok(tested) => (Some(tested), None),
-        Err(reason) => (
-            None,
-            Some(format!(
-                "The errors are those in the file. There are no charts of test samples, for the recording cannot be used \
-                 again: {reason}."
-            )),
-        ),
-    };
-    Trained {
-        remarks: Vec::from_iter(remark),
-        tested: tested.map(Into::into),
-        ..Trained::of_file(file.into())
-    }
+    Ok(match reopened {
+        Some(reopened) if !reopened.missing().is_empty() => Opened::Missing(Box::new(reopened)),
+        _ => Opened::Nothing,
+    })
 }

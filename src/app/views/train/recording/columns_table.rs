@@ -1,4 +1,4 @@
-//! The columns of all files: what they look like, and what they mean.
+//! Table of the columns of all files with their meanings.
 
 use std::{cell::Cell, rc::Rc};
 
@@ -7,13 +7,11 @@ use eframe::egui::{ComboBox, Label, RichText, Sense, Ui, WidgetInfo, accesskit::
 use super::{
     column_cells::{figure_ui, meaning_ui, missing_texts, range_texts, remark, unit_ui},
     draft::{Draft, file_name},
+    editor::RecordingEditor,
     histogram::paint_histogram,
-    import_form::invitation_ui,
-    state::OwnDataView,
 };
 use crate::{
     app::{
-        shared::Effect,
         theme::{Palette, Theme, space, type_size},
         widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView},
     },
@@ -47,24 +45,20 @@ enum Change {
     Unit(usize, usize, String),
 }
 
-/// Shows the columns, or how to begin.
-pub(super) fn columns_ui(ui: &mut Ui, view: &mut OwnDataView, effects: &mut Vec<Effect>) {
-    let is_busy = view.phase.is_busy();
-    let Some(draft) = &view.draft else {
-        invitation_ui(ui, view, effects);
-        return;
-    };
-    let mut change = None;
-    ui.add_enabled_ui(!is_busy, |ui| change = table_ui(ui, draft));
-    let (Some(change), Some(draft)) = (change, &mut view.draft) else {
-        return;
-    };
-    match change {
-        Change::Meaning(file, column, meaning) => draft.choose(file, column, meaning),
-        Change::All(file, meaning) => draft.choose_all(file, meaning),
-        Change::Unit(file, column, unit) => draft.set_unit(file, column, &unit),
+impl RecordingEditor {
+    /// Shows the columns of all files; changes their meanings and units.
+    pub(super) fn columns_table_ui(&mut self, ui: &mut Ui, is_busy: bool) {
+        let Some(draft) = &mut self.draft else { return };
+        let mut change = None;
+        ui.add_enabled_ui(!is_busy, |ui| change = table_ui(ui, draft));
+        match change {
+            None => return,
+            Some(Change::Meaning(file, column, meaning)) => draft.choose(file, column, meaning),
+            Some(Change::All(file, meaning)) => draft.choose_all(file, meaning),
+            Some(Change::Unit(file, column, unit)) => draft.set_unit(file, column, &unit),
+        }
+        ui.request_repaint();
     }
-    ui.request_repaint();
 }
 
 fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {

@@ -6,23 +6,23 @@ use crate::{
     import::{Cure, ImportError},
 };
 
-/// What a rule of division does to the errors.
-pub(super) fn flattery(by: SplitBy) -> &'static str {
+/// Returns a sentence on the bias of test errors by a rule of division.
+pub(super) fn bias(by: SplitBy) -> &'static str {
     match by {
-        SplitBy::Time => "The last part of the recording tests: nothing of its time was trained on.",
-        SplitBy::Group => "Whole groups test: nothing of their press or session was trained on.",
+        SplitBy::Time => "The last part of the recording is held out for testing.",
+        SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",
         SplitBy::Random => {
-            "A random split flatters where neighbouring rows are alike: the test has neighbours of what was trained. \
-             Compare with a split by group, or by time if there are no groups."
+            "A random split is optimistic when neighbouring rows are similar. Compare with a split by group, or by time \
+             if there are no groups."
         }
     }
 }
 
-/// An error of the import, with its cure in the fields of the window.
+/// Returns an error of the import, with its cure in terms of the window.
 pub(super) fn in_window(error: &ImportError) -> String {
     error.with_cure(|cure| match cure {
         Cure::CallMissing(text) => {
-            format!("correct it, or say under “Rows” that it means missing: \"{text}\"")
+            format!("correct it, or add it to the missing cells under “Filter”: \"{text}\"")
         }
         Cure::NameTimes => "make the columns of their times “time” in both".to_owned(),
         Cure::NameJoinedTime => "make the column of its times “time”".to_owned(),
@@ -95,7 +95,7 @@ mod tests {
         ];
         for text in cases {
             assert!(
-                !text.contains("--") && (text.contains("“") || text.contains("“Rows”")),
+                !text.contains("--") && (text.contains("“") || text.contains("“Filter”")),
                 "{text}"
             );
         }

@@ -41,16 +41,16 @@ pub(super) fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning, width: f32) 
 
 fn explanation(meaning: Meaning) -> &'static str {
     match meaning {
-        Meaning::Input => "The sensor gives it: the network reads it.",
-        Meaning::Target => "The network learns to tell it from the inputs.",
+        Meaning::Input => "Reading of the sensor: an input of the network.",
+        Meaning::Target => "Predicted by the network from the inputs.",
         Meaning::Time => "Time of the row, by which files are joined and samples are put in order.",
-        Meaning::Group => "Equal values belong together, such as one press or one session, and are never divided.",
+        Meaning::Group => "Rows of equal value, such as one press or one session, stay together in one set.",
         Meaning::RowWire => "Number of the row-wire that was read, from 1.",
-        Meaning::Unused => "It is left out.",
+        Meaning::Unused => "Not used.",
     }
 }
 
-/// The unit, to be changed in place. What is typed counts at once: a row that scrolls out of view tells of no end. Returns it
+/// The unit, to be changed in place. What is typed counts at once: a row that scrolls out of view reports no end of typing. Returns it
 /// if it has changed.
 pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option<String> {
     let id = ui.scope_id().with(("unit", name));
@@ -93,7 +93,7 @@ pub(super) fn figure_ui(ui: &mut Ui, texts: &[String], label: &str, colour: Colo
     response
 }
 
-/// The ends of a range, the most exact text first: with as many decimals as tell them apart well, with fewer, and at last
+/// The ends of a range, the most exact text first: with decimals that distinguish them well, with fewer, and at last
 /// rounded, with the width where they would look the same.
 pub(super) fn range_texts(min: f64, max: f64) -> Vec<String> {
     let span = max - min;
@@ -127,7 +127,7 @@ pub(super) fn missing_texts(missing: usize, rows: usize) -> Vec<String> {
     vec![missing.to_string(), format!("{} %", format_number(percent))]
 }
 
-/// A remark on what is unusual about a column, and whether it hinders its use.
+/// Returns a remark on an unusual column, and true if the column cannot be used as it is.
 pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, bool)> {
     if let Some((line, text)) = &summary.first_text {
         let others = match summary.texts {
@@ -143,7 +143,7 @@ pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, 
         return Some(("empty".to_owned(), true));
     }
     if summary.is_constant {
-        return Some(("constant: it tells nothing".to_owned(), true));
+        return Some(("constant: carries no information".to_owned(), true));
     }
     summary
         .duplicate_of

@@ -1,31 +1,17 @@
 use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
-use super::{
-    draft::{Draft, file_name},
-    state::OwnDataView,
-};
+use super::draft::{Draft, file_name};
 use crate::app::{
-    shared::{Effect, FileTask, FileWords, Purpose},
+    shared::{Effect, FileTask, FileWords},
     widgets::{dim_ui, ghost_button},
 };
 
-const POSITIONS: FileWords = FileWords {
+pub(super) const POSITIONS: FileWords = FileWords {
     kind: "file of positions",
     description: "A table of text with the header target,x,y: the name of each target, and where it lies on the skin in \
                   millimetres.",
     extensions: &["csv", "txt", "tsv"],
 };
-
-impl OwnDataView {
-    /// Task of choosing the file of positions.
-    pub(super) fn positions_task(&self) -> FileTask {
-        FileTask {
-            words: POSITIONS,
-            suggestion: String::new(),
-            purpose: Purpose::Choose(self.positions_choices.clone()),
-        }
-    }
-}
 
 /// The file of positions, if there is one.
 pub(super) fn positions_summary(draft: &Draft) -> String {
@@ -33,7 +19,7 @@ pub(super) fn positions_summary(draft: &Draft) -> String {
     positions.map_or_else(|| "none".to_owned(), |path| file_name(path))
 }
 
-/// The file that says where targets lie on the skin.
+/// The choice of the file with the positions of targets.
 pub(super) fn positions_ui(ui: &mut Ui, task: FileTask, effects: &mut Vec<Effect>) {
     dim_ui(
         ui,
