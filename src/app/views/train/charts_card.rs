@@ -7,12 +7,11 @@ use super::{
     press::readings_ui,
     scrub::{self, scrub_bar_ui},
     state::TrainView,
-    target_choice::target_choice_ui,
 };
 use crate::{
     app::{
         plotting::{Pointer, cells_ui, legend_behind_ui, legend_ui, plots_ui},
-        shared::{Effect, Offers, Phase, Shared, SourceKind},
+        shared::{Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
         theme::{Theme, space},
         widgets::{invitation_ui, tabs_ui},
     },
@@ -63,7 +62,9 @@ pub fn charts_card_ui(
         ui.horizontal(|ui| {
             match shared.recorded_test() {
                 None => error_bars_ui(ui, &mut view.has_error_bars),
-                Some(test) => view.target = target_choice_ui(ui, "Target", &test.problem.targets, view.target_of(test)),
+                Some(test) => {
+                    target_choice_ui(ui, "Target", "target of the charts", &test.problem.targets, &mut view.target);
+                }
             }
             legend_behind_ui(ui, keys)
         })

@@ -16,7 +16,6 @@ mod sample_card;
 mod scrub;
 mod state;
 mod surfaces;
-mod target_choice;
 mod view;
 mod workbench;
 

@@ -4,9 +4,8 @@ use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
         glossary,
-        shared::Phase,
+        shared::{Phase, target_choice_ui},
         theme::{Theme, space},
-        views::train::target_choice::target_choice_ui,
         widgets::{TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
     },
     decoupling::DecoderKind,
@@ -133,8 +132,8 @@ fn measured_ui(
     let palette = Theme::of(ui).palette;
     // Without noise there is no limit but rounding, and nothing to be compared with it.
     let limit = limit.filter(|limit| !limit.is_rounding());
-    if !problem.has_nodes && problem.targets.len() > 1 {
-        *target = target_choice_ui(ui, "RMSE and R² of", &problem.targets, *target);
+    if !problem.has_nodes {
+        target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
     let figures = Figure::of(problem, limit.is_some());

@@ -13,6 +13,10 @@ use crate::{
     sensor::counted,
 };
 
+const fn figure<'a>(heading: &'a str, widest: &'a str) -> TableColumn<'a> {
+    TableColumn::figure(heading).width(ColumnWidth::Fits(widest))
+}
+
 /// The values of the test set whose errors the chosen bar of the histogram holds: nodes, or samples of a recording. The one
 /// under the pointer lights up; a click goes to its snapshot.
 pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
@@ -80,8 +84,10 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         ],
         Some(_) => vec![figure("Sample", "100000"), error],
     };
-    let table = TableView::new("nodes in bar", &columns).clickable();
-    match table.show(ui, places.len(), row) {
+    match TableView::new("nodes in bar", &columns)
+        .clickable()
+        .show(ui, places.len(), row)
+    {
         Some(TableClick::Point(at)) => {
             let here = places.get(at).filter(|(place, _)| place.snapshot == view.snapshot);
             let node = here.and_then(|(place, _)| place.node);
@@ -98,8 +104,4 @@ pub fn bar_nodes_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         }
         Some(TableClick::Sort(_)) | None => {}
     }
-}
-
-const fn figure<'a>(heading: &'a str, widest: &'a str) -> TableColumn<'a> {
-    TableColumn::figure(heading).width(ColumnWidth::Fits(widest))
 }

@@ -5,11 +5,10 @@ use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 use super::{
     draft::{Draft, file_name},
     editor::RecordingEditor,
-    remarks::sentence,
 };
 use crate::{
     app::{
-        shared::{Effect, FileTask, FileWords, Shared},
+        shared::{Effect, FileTask, FileWords, Shared, sentence},
         widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
     },
     sensor::counted,

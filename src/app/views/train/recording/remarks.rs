@@ -1,13 +1,12 @@
 //! Sentences about splits and imports.
 
 use crate::{
-    app::widgets::fields::capitalised,
     dataset::SplitBy,
     import::{Cure, ImportError},
 };
 
 /// Returns a sentence on the bias of test errors by a rule of division.
-pub(super) fn bias(by: SplitBy) -> &'static str {
+pub(in crate::app::views::train) fn bias(by: SplitBy) -> &'static str {
     match by {
         SplitBy::Time => "The last part of the recording is held out for testing.",
         SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",
@@ -30,22 +29,6 @@ pub(super) fn in_window(error: &ImportError) -> String {
         Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
         other => other.to_string(),
     })
-}
-
-/// The text with a full stop, and with a capital unless it begins with the name of a column or file.
-pub(super) fn sentence(text: &str) -> String {
-    const WORDS: [&str; 11] = [
-        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too", "twice",
-    ];
-    let first = text.split_whitespace().next().unwrap_or_default();
-    let mut sentence = text.to_owned();
-    if WORDS.contains(&first) {
-        sentence = capitalised(&sentence);
-    }
-    if !sentence.ends_with(['.', '!', '?']) {
-        sentence.push('.');
-    }
-    sentence
 }
 
 #[cfg(test)]

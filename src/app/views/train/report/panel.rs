@@ -6,19 +6,19 @@ use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
         glossary,
-        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
+        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
         theme::{Theme, space, type_size},
         views::train::{
-            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
+            state::TrainView,
         },
         widgets::{
-            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
+            Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui,
         },
     },
-    decoupling::DecoderKind,
+    dataset::SplitBy,
     evaluation::{
-        Baselines, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings,
-        TestErrors, error_remarks,
+        Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
     },
     export::{format_duration, format_number},
     figure::trade_words::frame_time,
@@ -109,97 +109,6 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 /// The name of the network's row.
 const NETWORK: &str = "network";
 
-/// Measures of error that the table shows: all but the worst node, which is shown below.
-fn is_in_table(measure: ErrorMeasure) -> bool {
-    measure != ErrorMeasure::WorstMm
-}
-
-fn column(measure: ErrorMeasure) -> TableColumn<'static> {
-    let term = match measure {
-        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
-        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
-        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
-        ErrorMeasure::ZMm => Some(glossary::Z_MM),
-        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
-        _ => None,
-    };
-    let heading = match measure {
-        ErrorMeasure::RangePercent => "% of range",
-        measure => measure.heading().0,
-    };
-    match term {
-        Some(term) => TableColumn::figure(term.name).meaning(term.hint),
-        None => TableColumn::figure(heading).meaning(measure.definition()),
-    }
-}
-
-fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
-    let palette = Theme::of(ui).palette;
-    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let measures = shown.iter().map(|&place| column(table.measures[place]));
-    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
-    // The error by which the network is judged.
-    let judged = table
-        .measures
-        .iter()
-        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
-    let mut rows = Vec::new();
-    for block in &table.blocks {
-        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
-        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
-        let row = |row: &ErrorRow| {
-            let name = match &block.target {
-                Some(target) => format!("{}, {}", target.title(), row.name),
-                None => row.name.to_owned(),
-            };
-            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
-                .named(name)
-                .meaning(row_meaning(row.name))
-                .colour(match row.name {
-                    NETWORK => palette.accent,
-                    "published" | "reference" => palette.dim,
-                    _ => palette.text,
-                })
-                .strong(row.name == NETWORK)
-                .mark(if beats(row.name, judged(row), of_network) {
-                    BETTER
-                } else {
-                    ""
-                })
-        };
-        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
-        rows.extend(block.rows.iter().map(row));
-    }
-    TableView::new("errors", &columns).show_all(ui, rows);
-}
-
-/// Definition of a row of the error table.
-fn row_meaning(name: &str) -> &'static str {
-    match name {
-        "training mean" => DecoderKind::Mean.meaning(),
-        "linear map" => glossary::LINEAR_MAP.hint,
-        "ridge" => DecoderKind::Ridge.meaning(),
-        NETWORK => {
-            "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
-        }
-        "reference" => glossary::REFERENCE.hint,
-        "published" => glossary::PUBLISHED.hint,
-        _ => "",
-    }
-}
-
-/// Meaning of the mark at a baseline.
-const BETTER: &str = "Better than the network.";
-
-/// Returns true for a baseline with a smaller error than the network.
-fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
-    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
-    is_baseline
-        && error
-            .zip(of_network)
-            .is_some_and(|(baseline, network)| baseline < network)
-}
-
 /// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
@@ -208,15 +117,32 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
         (Some(settings), Some(errors), Some(baselines)) => {
             verdict_on_nodes_ui(ui, (run, result, reason), &settings, errors, &baselines);
         }
-        _ => {
-            let flaw = result.flaw.as_ref().map(ToString::to_string);
-            for remark in flaw.iter().chain(&result.remarks) {
-                note_ui(ui, &sentence(remark));
-            }
-        }
+        _ => verdict_on_targets_ui(ui, run, result),
     }
     if shared.setup().is_ok_and(|setup| setup != run.asked) {
         dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+/// What the errors of a recording do not show, or by how much the network is better than ridge regression.
+fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let flaw = result.flaw.as_ref().map(|flaw| capitalised(&flaw.to_string()));
+    for remark in flaw.iter().chain(&result.remarks) {
+        note_ui(ui, &sentence(remark));
+    }
+    let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
+    let ratios = network.iter().zip(ridge).map(|(network, ridge)| ridge.rmse / network.rmse);
+    let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
+    let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
+    if let (true, Some(low), Some(high)) = (flaw.is_none(), extreme(f64::min), extreme(f64::max))
+        && ratios.iter().all(|ratio| *ratio > 1.0)
+    {
+        let times = if low == high { low } else { format!("{low} to {high}") };
+        dim_ui(ui, &format!("{times} times as accurate as ridge regression."));
+    }
+    let plan = run.setup.plan();
+    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
+        note_ui(ui, bias(SplitBy::Random));
     }
 }
 
@@ -230,19 +156,19 @@ fn verdict_on_nodes_ui(
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(flaw) = &result.flaw {
-        Some(sentence(&flaw.to_string()))
+        Some(flaw.to_string())
     } else if let Some((row, remark)) = of_network {
-        Some(sentence(&format!("{row}: {remark}")))
+        Some(format!("{row}: {remark}"))
     } else if errors.z_mm > baselines.linear.z_mm {
         let remedy = reason.remedy(&settings.training.method);
-        Some(sentence(&format!(
+        Some(format!(
             "a linear map of the resistances is better on z than this network: {remedy}"
-        )))
+        ))
     } else {
         None
     };
     if let Some(fault) = fault {
-        note_ui(ui, &fault);
+        note_ui(ui, &sentence(&capitalised(&fault)));
     } else if errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / errors.z_mm);
         let to_limit = baselines.reference.and_then(|limit| errors.times(&limit));
@@ -254,13 +180,6 @@ fn verdict_on_nodes_ui(
         };
         dim_ui(ui, &text);
     }
-}
-
-/// The text with a capital and a full stop.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).chain(['.']).collect()
 }
 
 /// Returns the worst node, if the user wants to see it.
