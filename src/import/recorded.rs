@@ -127,7 +127,7 @@ fn samples_crc32(sets: [&Dataset; 2]) -> String {
 /// Returns the path of a file, absolute, for a file in `folder`: see [`Recorded::relative_to`].
 pub(crate) fn relative_path(path: &Path, folder: &Path) -> PathBuf {
     let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-    relative(path, &folder, std::env::home_dir().as_deref())
+    relative(&normal(path), &normal(&folder), std::env::home_dir().as_deref())
 }
 
 /// Path of a file as seen from `folder`, both absolute; the name alone if the way leads into or out of `home` or has no common
