@@ -4,7 +4,10 @@ use std::{fs, num::NonZero};
 
 use decoupler::{
     app::Phase,
-    evaluation::experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
+    evaluation::{
+        RunSettings,
+        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
+    },
     export::ExperimentTable,
 };
 
@@ -50,6 +53,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
     };
     run_experiments(
         std::slice::from_ref(experiment),
+        &TrialSamples::Drawn,
         NonZero::<usize>::MIN,
         || false,
         record,

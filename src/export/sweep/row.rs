@@ -271,7 +271,9 @@ mod tests {
         });
         let cells = row(json!({"targets": ["fx", "fz"]}), report).cells();
         let of_results = cells.iter().filter(|(column, _)| matches!(column, Column::Result(_)));
-        let of_results: Vec<_> = of_results.map(|(column, text)| (column.heading(), text.as_str())).collect();
+        let of_results: Vec<_> = of_results
+            .map(|(column, text)| (column.heading(), text.as_str()))
+            .collect();
         let expected = [
             ("result.baselines.ridge.fx.rmse", "0.75"),
             ("result.targets.fx.rmse", "0.5"),

@@ -91,10 +91,12 @@ fn varying(merged: &MergedSweep) -> Vec<String> {
 
 fn cells(row: &SweepRow, options: &[String], results: &[Result]) -> Vec<SweepCell> {
     let of_options = options.iter().map(|option| SweepCell::of(row.options.get(option)));
-    let of_results = results.iter().map(|(_, place, field)| match (row.result.pointer(place), field) {
-        (Some(Value::Array(targets)), Some(field)) => SweepCell::of(mean(targets, field).as_ref()),
-        (value, _) => SweepCell::of(value),
-    });
+    let of_results = results
+        .iter()
+        .map(|(_, place, field)| match (row.result.pointer(place), field) {
+            (Some(Value::Array(targets)), Some(field)) => SweepCell::of(mean(targets, field).as_ref()),
+            (value, _) => SweepCell::of(value),
+        });
     let seconds = SweepCell::of(row.time.get("seconds"));
     of_options.chain(of_results).chain([seconds]).collect()
 }
