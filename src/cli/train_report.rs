@@ -312,7 +312,7 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, out)?;
+            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
             writeln!(out)?;
         }
         write!(out, "{}", error_table(&file.error_table()).aligned())?;
@@ -346,7 +346,16 @@ impl<'a> Trained<'a> {
         if self.decoders.is_empty() {
             return Ok(());
         }
-        write!(out, "\n{}", decoder_table(self.decoders, reference).aligned())?;
+        write!(
+            out,
+            "\n{}",
+            decoder_table(
+                &self.file.problem,
+                self.decoders,
+                self.file.scores.baselines.reference.as_ref()
+            )
+            .aligned()
+        )?;
         for report in self.decoders {
             let name = report.kind.name(report.precision);
             for remark in &report.remarks {

@@ -114,12 +114,13 @@ fn a_trial_is_the_run_that_its_settings_describe() {
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
-            assert_eq!(trial.errors, alone.node_scores().unwrap().network);
-            assert_eq!(trial.baselines, *alone.baselines().unwrap());
+            let scores = alone.scores().unwrap().nodes().unwrap();
+            assert_eq!(trial.errors, scores.network);
+            assert_eq!(trial.baselines, scores.baselines);
             let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
-            z_percent.push(alone.node_scores().unwrap().network.z_percent.unwrap());
+            z_percent.push(scores.network.z_percent.unwrap());
         }
         z_percent.sort_by(f64::total_cmp);
         let summary = cell.summary();

@@ -4,7 +4,7 @@ use std::{fs, path::Path, time::Instant};
 
 use decoupler::{
     app::{Effect, Phase},
-    export::{CheckpointFile, MeasuredCheckpointFile},
+    export::CheckpointFile,
     training::StopReason,
 };
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
@@ -13,7 +13,7 @@ use egui_kittest::kittest::Queryable as _;
 use crate::{
     configuring::choose_method,
     driver::{Driver, PATIENCE},
-    recordings::{cells, opened},
+    recordings::opened,
     training::{endless, start_endless},
 };
 
@@ -172,63 +172,24 @@ fn ask(driver: &mut Driver) {
     assert!(driver.has(QUESTION), "{:#?}", driver.texts());
 }
 
-/// Begins a training on own data that goes on for as long as one looks.
-fn start_endless_on_own_data(driver: &mut Driver) {
-    choose_method(driver, "Momentum, Eq. (11)");
+#[test]
+fn a_training_on_a_recording_is_saved_at_closing() {
+    let (mut driver, _path, folder) = opened(60);
+    choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.limit_epochs("1000000");
     driver.click("▶ Train");
-    driver.wait("an epoch", |driver| !cells(driver).is_empty());
-}
-
-#[test]
-fn two_trainings_are_both_asked_about_and_both_saved() {
-    let (mut driver, _path, folder) = opened(60);
-    start_endless_on_own_data(&mut driver);
-    driver.click_button("Train");
-    start_endless(&mut driver);
+    driver.wait_for_epochs(3);
     ask(&mut driver);
-    assert!(driver.has("Train: Training") && driver.has("Own data: Training"));
-    let savable = driver
-        .harness()
-        .query_all_by_label("can be saved as a checkpoint")
-        .count();
-    assert_eq!(savable, 2);
     driver.click_button(SAVE);
-    let [one, other] = ["one.checkpoint", "other.checkpoint"].map(|name| folder.path().join(name));
-    let mut give = |path: &Path| {
-        driver.harness().run_steps(5);
-        driver.type_into("File", &path.display().to_string());
-        driver.click_button("Save");
-    };
-    give(&one);
-    // Neither takes the file of the other.
-    give(&one);
-    give(&other);
-    wait_for_closing(&mut driver);
-    drop(driver);
-    assert_eq!(CheckpointFile::load(&one).unwrap().settings, endless().into());
-    let file = MeasuredCheckpointFile::load(&other).unwrap();
-    assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
-}
-
-#[test]
-fn a_training_that_ends_leaves_the_other_to_be_saved() {
-    let (mut driver, _path, folder) = opened(60);
-    start_endless_on_own_data(&mut driver);
-    driver.click_button("Train");
-    start_endless(&mut driver);
-    ask(&mut driver);
-    let before = [SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect());
-    driver.window_mut().apply(Effect::Stop);
-    driver.wait("the end of one", |driver| driver.says("has ended"));
-    assert_eq!([SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect()), before);
-    driver.click_button(SAVE);
-    driver.harness().run_steps(5);
     let path = folder.path().join("kept.checkpoint");
+    driver.harness().run_steps(5);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     wait_for_closing(&mut driver);
-    assert!(MeasuredCheckpointFile::load(&path).is_ok());
+    drop(driver);
+    let file = CheckpointFile::load(&path).unwrap();
+    assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
+    assert!(file.resume().unwrap().leader().latest().epoch >= 3);
 }
 
 #[test]

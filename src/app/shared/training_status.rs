@@ -2,22 +2,31 @@ use std::time::Duration;
 
 use eframe::egui::{Color32, RichText, Ui};
 
-use super::{Phase, RunView, Shared};
+use super::{Phase, RunView, Shared, SourceKind};
 use crate::{
     app::{
         theme::{Palette, Theme, type_size},
         widgets::{state_ui, status_progress_ui},
     },
+    evaluation::TestErrors,
     export::{format_duration, format_number, format_percent},
+    import::Progress,
     training::StopReason,
 };
 
-/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped.
+/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it how much of a
+/// recording is read.
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
-        let (colour, text) = phase_in_words(shared.phase, "Drawing samples", &palette);
+        let (colour, text) = phase_in_words(shared, &palette);
         state_ui(ui, colour, &text);
+        if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
+            if let Some(Progress { bytes, of: Some(of) }) = shared.reading {
+                status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
+            }
+            return;
+        }
         let Some(run) = shared
             .shown_run()
             .or(shared.run.as_ref().filter(|_| shared.phase.is_busy()))
@@ -35,11 +44,16 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     });
 }
 
-/// Colour and words of a phase; `preparing` are those of the work before a training.
-pub fn phase_in_words(phase: Phase, preparing: &str, palette: &Palette) -> (Color32, String) {
-    match phase {
+/// Colour and words of the phase.
+fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
+    let is_recording = shared.source == SourceKind::Recording;
+    match shared.phase {
+        Phase::Idle if is_recording && shared.recording.plan.is_err() => {
+            (palette.dim, "Ready: open a recording".to_owned())
+        }
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
-        Phase::Preparing => (palette.accent, preparing.to_owned()),
+        Phase::Preparing if is_recording => (palette.accent, "Reading the recording".to_owned()),
+        Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),
         Phase::Paused => (palette.warning, "Paused".to_owned()),
         Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),
@@ -56,7 +70,10 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
     let mut parts = vec![
         format!("Epoch {epochs_run} of {epochs}"),
-        format!("z error {}", format_percent(result.errors.percent())),
+        match result.errors {
+            TestErrors::Nodes(_) => format!("z error {}", format_percent(result.errors.percent())),
+            TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
+        },
         format!("mse {}", format_number(latest.training_mse)),
         format!(
             "{} {}",

@@ -17,7 +17,7 @@ use super::{job::Wake, shared::View};
 use crate::import::Plan;
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{TradeOffEnding, TradeOffPlan};
+pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult};
 

@@ -25,11 +25,13 @@ enum Figure {
 impl Figure {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
 
-    fn heading(self) -> &'static str {
+    /// Heading; `has_nodes` is false for the targets of a recording.
+    fn heading(self, has_nodes: bool) -> &'static str {
         match self {
-            Self::Error => "Z %",
+            Self::Error if has_nodes => "Z %",
+            Self::Error => "% of range",
             Self::ToLimit => "× limit",
-            Self::Frame => "a frame",
+            Self::Frame => "decoding",
             Self::Training => "training",
         }
     }
@@ -67,7 +69,16 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         .filter(|figure| has_limit || *figure != Figure::ToLimit)
         .collect();
     let names = TableColumn::text("").width(ColumnWidth::Rest);
-    let headings = figures.iter().map(|figure| TableColumn::figure(figure.heading()));
+<<<<<<< HEAD
+    let has_nodes = level.noise.is_some();
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading(has_nodes)));
+=======
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading(level.noise.is_some())));
+>>>>>>> w-other
     let columns: Vec<TableColumn<'_>> = std::iter::once(names).chain(headings).collect();
     let frame_us = |number: usize| level.points[number].report.cost.frame_us;
     let mut order: Vec<usize> = (0..level.points.len()).collect();

@@ -12,6 +12,7 @@ mod paper_figure;
 mod press;
 mod recording;
 mod report;
+mod sample_card;
 mod scrub;
 mod state;
 mod surfaces;

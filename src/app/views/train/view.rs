@@ -12,8 +12,8 @@ use super::{
 use crate::{
     app::{
         shared::{
-            Columns, Effect, Export, FileInUse, Matter, Notice, Offers, Phase, RunWish, Shared, Unfinished, View,
-            run_buttons_ui,
+            Columns, Effect, Export, FileInUse, Matter, Notice, Offers, Phase, RunWish, Shared, SourceKind, Unfinished,
+            View, run_buttons_ui,
         },
         theme::space,
         widgets::snapshot_ui,
@@ -80,22 +80,19 @@ impl View for TrainView {
         if offers.offer("Open files", !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
-        if offers.offer("Press the middle of the surface", shared.test().is_some())
+        if shared.source == SourceKind::Array
+            && offers.offer("Press the middle of the surface", shared.test().is_some())
             && let Some(test) = shared.test()
         {
             self.press.press_middle(test);
         }
-        let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        let has_next = self.snapshot + 1 < snapshots;
-        if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {
+        let what = snapshot_word(shared.source);
+        let has_next = self.snapshot + 1 < Self::snapshots(shared);
+        if offers.offer_keys(format!("Next test {what}"), Modifiers::NONE, Key::PageDown, has_next) {
             self.show_snapshot(self.snapshot + 1);
         }
-        if offers.offer_keys(
-            "Previous test snapshot",
-            Modifiers::NONE,
-            Key::PageUp,
-            self.snapshot > 0,
-        ) {
+        let name = format!("Previous test {what}");
+        if offers.offer_keys(name, Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
             self.show_snapshot(self.snapshot - 1);
         }
         self.offer_charts(offers, shared);
@@ -117,7 +114,10 @@ impl View for TrainView {
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let can_train = shared.phase != Phase::Died;
-        let hint = "draws the sets and trains the network";
+        let hint = match shared.source {
+            SourceKind::Array => "draws the sets and trains the network",
+            SourceKind::Recording => "reads the recording and trains the network",
+        };
         let wish = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
         effects.extend(wish.map(|wish| match wish {
             RunWish::Train => Effect::Train,
@@ -127,8 +127,8 @@ impl View for TrainView {
             RunWish::Stop => Effect::Stop,
         }));
         ui.add_space(space(4));
-        let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, snapshots) {
+        let what = snapshot_word(shared.source);
+        if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, Self::snapshots(shared)) {
             self.show_snapshot(snapshot);
         }
     }
@@ -163,6 +163,14 @@ impl View for TrainView {
     }
 }
 
+/// The word for what the test set consists of.
+fn snapshot_word(source: SourceKind) -> &'static str {
+    match source {
+        SourceKind::Array => "snapshot",
+        SourceKind::Recording => "sample",
+    }
+}
+
 /// The training that is being prepared, or has epochs that are nowhere saved.
 fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
     let training = |progress, saving| Unfinished {
@@ -173,7 +181,13 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
     };
     let run = shared.run.as_ref();
     match shared.phase {
-        Phase::Preparing => Some(training("its samples are being drawn".to_owned(), None)),
+        Phase::Preparing => {
+            let progress = match shared.source {
+                SourceKind::Array => "its samples are being drawn",
+                SourceKind::Recording => "its files are being read",
+            };
+            Some(training(progress.to_owned(), None))
+        }
         Phase::Training | Phase::Paused => {
             let run = run.filter(|run| !run.is_saved)?;
             let epochs = run.settings().training.stopping.epochs;

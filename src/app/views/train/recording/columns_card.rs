@@ -2,10 +2,10 @@
 
 use eframe::egui::{Align, Layout, RichText, Sense, Ui, WidgetInfo, accesskit::Role};
 
-use super::{checking::Checked, draft::Draft, editor::RecordingEditor, files_section::FILES, remarks::sentence};
+use super::{checking::Checked, draft::Draft, editor::RecordingEditor, files_section::FILES};
 use crate::{
     app::{
-        shared::{Effect, Shared},
+        shared::{Effect, Shared, sentence},
         theme::{Theme, semibold, space, type_size},
         widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui},
     },

@@ -5,11 +5,10 @@ use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 use super::{
     draft::{Draft, file_name},
     editor::RecordingEditor,
-    remarks::sentence,
 };
 use crate::{
     app::{
-        shared::{Effect, FileTask, FileWords, Shared},
+        shared::{Effect, FileTask, FileWords, Shared, sentence},
         widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
     },
     sensor::counted,
@@ -55,7 +54,7 @@ impl RecordingEditor {
             dim_ui(ui, &format!("Reading {name}…"));
             let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
             if let Some(share) = share {
-                progress_bar_ui(ui, "Reading", share, "");
+                progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
             }
         }
         self.buttons_ui(ui, effects);

@@ -1,7 +1,6 @@
 //! Sentences about splits and imports.
 
 use crate::{
-    app::widgets::fields::capitalised,
     dataset::SplitBy,
     import::{Cure, ImportError},
 };
@@ -30,22 +29,6 @@ pub(super) fn in_window(error: &ImportError) -> String {
         Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
         other => other.to_string(),
     })
-}
-
-/// The text with a full stop, and with a capital unless it begins with the name of a column or file.
-pub(super) fn sentence(text: &str) -> String {
-    const WORDS: [&str; 11] = [
-        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too", "twice",
-    ];
-    let first = text.split_whitespace().next().unwrap_or_default();
-    let mut sentence = text.to_owned();
-    if WORDS.contains(&first) {
-        sentence = capitalised(&sentence);
-    }
-    if !sentence.ends_with(['.', '!', '?']) {
-        sentence.push('.');
-    }
-    sentence
 }
 
 #[cfg(test)]

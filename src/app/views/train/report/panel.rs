@@ -6,17 +6,16 @@ use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
         glossary,
-        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
+        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui},
         theme::{Theme, space, type_size},
-        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
-        widgets::{
-            Landmark, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui,
+        views::train::{
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
         },
+        widgets::{Landmark, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui},
     },
     decoupling::DecoderKind,
     evaluation::{
-        Baselines, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings,
-        TestErrors, error_remarks,
+        Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
     },
     export::{format_duration, format_number},
     figure::trade_words::frame_time,
@@ -45,13 +44,13 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            if let Some(worst) = worst_node_ui(ui, result) {
-                view.go_to(worst, shared);
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             decoders_ui(ui, &mut view.decoders, shared.phase, limit);
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.starts);
+            spread_ui(ui, &run.problem, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -105,90 +104,6 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 
 /// The name of the network's row.
 const NETWORK: &str = "network";
-
-/// Measures of error that the table shows: all but the worst node, which is shown below.
-fn is_in_table(measure: ErrorMeasure) -> bool {
-    measure != ErrorMeasure::WorstMm
-}
-
-fn column(measure: ErrorMeasure) -> TableColumn<'static> {
-    let term = match measure {
-        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
-        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
-        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
-        ErrorMeasure::ZMm => Some(glossary::Z_MM),
-        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
-        _ => None,
-    };
-    let heading = match measure {
-        ErrorMeasure::RangePercent => "% of range",
-        measure => measure.heading().0,
-    };
-    let heading = term.map_or(heading, |term| term.name);
-    TableColumn::figure(heading).meaning(term.map_or(measure.definition(), |term| term.hint))
-}
-
-fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
-    let palette = Theme::of(ui).palette;
-    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let measures = shown.iter().map(|&place| column(table.measures[place]));
-    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
-    // The error by which the network is judged.
-    let judged = table
-        .measures
-        .iter()
-        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
-    let mut rows = Vec::new();
-    for block in &table.blocks {
-        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
-        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
-        let row = |row: &ErrorRow| {
-            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
-                .meaning(row_meaning(row.name))
-                .colour(match row.name {
-                    NETWORK => palette.accent,
-                    "published" | "reference" => palette.dim,
-                    _ => palette.text,
-                })
-                .strong(row.name == NETWORK)
-                .mark(if beats(row.name, judged(row), of_network) {
-                    BETTER
-                } else {
-                    ""
-                })
-        };
-        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
-        rows.extend(block.rows.iter().map(row));
-    }
-    TableView::new("errors", &columns).show_all(ui, rows);
-}
-
-/// Definition of a row of the error table.
-fn row_meaning(name: &str) -> &'static str {
-    match name {
-        "training mean" => DecoderKind::Mean.meaning(),
-        "linear map" => glossary::LINEAR_MAP.hint,
-        "ridge" => DecoderKind::Ridge.meaning(),
-        NETWORK => {
-            "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
-        }
-        "reference" => glossary::REFERENCE.hint,
-        "published" => glossary::PUBLISHED.hint,
-        _ => "",
-    }
-}
-
-/// Meaning of the mark at a baseline.
-const BETTER: &str = "Better than the network.";
-
-/// Returns true for a baseline with a smaller error than the network.
-fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
-    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
-    is_baseline
-        && error
-            .zip(of_network)
-            .is_some_and(|(baseline, network)| baseline < network)
-}
 
 /// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
@@ -307,7 +222,12 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", frame_time(1e6 * time.as_secs_f64())));
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {

@@ -6,26 +6,27 @@ use crate::{
         theme::{Theme, type_size},
         widgets::{described_table_ui, section_heading_ui},
     },
-    evaluation::{Spread, StartRecord, best_start},
+    evaluation::{Problem, Spread, StartRecord, best_start},
     export::{Cell, Table, TableColumn},
 };
 
 /// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
-pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
+pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
     let palette = Theme::of(ui).palette;
     section_heading_ui(ui, &format!("Spread over {} starts", starts.len()));
-    let z_percent: Vec<Option<f64>> = starts.iter().map(|start| start.z_percent).collect();
-    let spread = Spread::of(z_percent.iter().copied().flatten());
+    let percents: Vec<Option<f64>> = starts.iter().map(|start| start.z_percent).collect();
+    let spread = Spread::of(percents.iter().copied().flatten());
+    let of_test = problem.test_percent_name();
     if let Some(spread) = spread {
         strip_ui(
             ui,
             &StripChart {
-                label: "Spread of Z %",
-                axis: "Z % on the test set",
-                values: &z_percent,
+                label: &format!("Spread of {of_test}"),
+                axis: of_test,
+                values: &percents,
                 marked: best,
                 spread,
             },
@@ -34,7 +35,7 @@ pub fn spread_ui(ui: &mut Ui, starts: &[StartRecord]) {
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
-    described_table_ui(ui, "spread", &spread_table(&[("test Z %", spread), (error, errors)]));
+    described_table_ui(ui, "spread", &spread_table(&[(of_test, spread), (error, errors)]));
     let text = format!("Start {} is kept: it has the lowest {error}.", best + 1);
     ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
 }
