@@ -17,7 +17,7 @@
 //! | `import` | measured data out of files: tables, joins by time, meanings of columns (feature `files`) |
 //! | [`live`] | frames as they come: sources, re-zero, recorder, faults named from the residual |
 //! | `figure` | what a picture says, for the window and for print (feature `figures`) |
-//! | `export` | files for other programs (feature `files`); `export::bundle` writes networks (feature `bundle`), `export::figures` draws (feature `figures`) |
+//! | `export` | files for other programs (feature `files`); `export::bundle` writes decoders for other programs (feature `bundle`), `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
 //!

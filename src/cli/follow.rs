@@ -13,15 +13,14 @@ use super::{
     failure::Failure,
     follow_answers::{Answers, Form},
     follow_faults::Faults,
+    follow_lines::Parser,
     follow_report::Report,
     interruption::Graceful,
-    measured_decode::{Answered, MeasuredAnswers},
     parsers::number,
 };
 use crate::{
-    dataset::SimulationError,
     export::NetworkFile,
-    live::{Keeping, Line, LineParser, Lines, NextLine, ParsedLine, Source},
+    live::{Keeping, Line, Lines, NextLine, ParsedLine, Source},
 };
 
 // Decoding of frames as they come.
@@ -64,38 +63,6 @@ impl Follow {
             Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
             None => Ok(()),
         }
-    }
-
-    /// Decodes `input` with a network of own data until it ends, or until Ctrl-C.
-    pub(super) fn run_measured(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
-        if self.noise.is_some() {
-            return Err(wrong(
-                "--noise",
-                "a network of own data knows no sensor whose faults could be judged; leave it out",
-            ));
-        }
-        let mut answers = MeasuredAnswers::new(file, self.format.unwrap_or_default());
-        let source = self.source(input)?;
-        let begins_anywhere = source.begins_anywhere();
-        self.follow(source, 1, |Line { number, text, read_at }, report| {
-            match text.map(|text| answers.write(number, text)) {
-                Some(Ok(Answered::Yes)) => report.good(read_at.elapsed()),
-                Some(Ok(Answered::NoReadings)) => {}
-                Some(Ok(Answered::OtherColumns(source))) if !(begins_anywhere && number == 1) => {
-                    let input = report.source().clone();
-                    return Err(Failure::OtherColumns {
-                        input,
-                        line: number,
-                        source,
-                    });
-                }
-                Some(Ok(Answered::OtherColumns(reason))) => report.bad(&format_args!("line {number}: {reason}")),
-                Some(Ok(Answered::Bad(reason))) => report.bad(&format_args!("line {number}: {reason}")),
-                Some(Err(error)) => return Err(Failure::Output(error)),
-                None => report_too_long(number, report),
-            }
-            Ok(Kept::AsBefore)
-        })
     }
 
     /// Gives every line of `source` to `take`, until it ends or fails, or until Ctrl-C; of a device, `kept` lines are kept at
@@ -157,13 +124,19 @@ impl Follow {
 
     /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
     pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
+        let simulated = file.settings.simulated();
+        if simulated.is_none() && self.noise.is_some() {
+            let reason = "the network of a recording has no model of a sensor to judge its faults; leave it out";
+            return Err(wrong("--noise", reason));
+        }
         let source = self.source(input)?;
         let keeping = source.keeping();
-        let source_of_network = file.settings.simulated().expect("the network is of an array").source;
-        let (scene, scale) = (&source_of_network.scene, source_of_network.sensor.scale);
-        let mut parser = LineParser::new(scale, scene.rows, keeping == Keeping::All).map_err(SimulationError::from)?;
+        let mut parser = Parser::new(file, keeping == Keeping::All)?;
         let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
-        let mut faults = Faults::new(&source_of_network, self.noise)?;
+        let mut faults = match &simulated {
+            Some(settings) => Faults::new(&settings.source, self.noise)?,
+            None => Faults::none(),
+        };
         let mut checked: Option<Instant> = None;
         let input = source.clone();
         let end = self.follow(source, answers.rows(), |Line { number, text, read_at }, report| {
@@ -176,7 +149,7 @@ impl Follow {
                 Ok(ParsedLine::NoReadings) => return Ok(Kept::AsBefore),
                 Ok(parsed) => parsed,
                 Err(error) if error.is_final() && !(input.begins_anywhere() && number == 1) => {
-                    return Err(Failure::Line(input.clone(), error));
+                    return Err(error.failure(input.clone()));
                 }
                 Err(error) => {
                     report.bad(&error);
@@ -188,7 +161,7 @@ impl Follow {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
                     report.bad(&format_args!(
-                        "line {number}: resistances so far from the training range that the network has no answer"
+                        "line {number}: readings so far from the training range that the network has no answer"
                     ));
                     return Ok(Kept::AsBefore);
                 }

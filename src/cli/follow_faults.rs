@@ -62,6 +62,14 @@ impl Faults {
         })
     }
 
+    /// Looks for nothing, where there is no model of the sensor.
+    pub(super) fn none() -> Self {
+        Self {
+            watch: None,
+            is_told: true,
+        }
+    }
+
     /// The decoder that leaves out the wires of a named fault, if there is one, with the latest readings of every row read.
     pub(super) fn left_out(&mut self) -> Option<(&mut LeftOutDecoder, &[f64])> {
         let watch = self.watch.as_mut()?;
@@ -121,6 +129,6 @@ impl Faults {
 }
 
 fn tell(message: &str) {
-    // Nobody is left to tell if this fails.
+    // There is no one to report to if this fails.
     let _ = writeln!(stderr(), "warning: {message}");
 }

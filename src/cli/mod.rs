@@ -4,6 +4,7 @@
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
 
+mod answers;
 mod arguments;
 mod calibrate;
 mod checkpointing;
@@ -19,16 +20,17 @@ mod fine_tune;
 mod follow;
 mod follow_answers;
 mod follow_faults;
+mod follow_lines;
 mod follow_report;
 mod frames;
 mod import_arguments;
 mod inspect;
 mod interruption;
-mod measured_decode;
 mod output;
 mod outside_training;
 mod parse_error;
 mod parsers;
+mod readings;
 mod recording_report;
 mod reproduce;
 mod reproduce_report;

@@ -1,69 +1,76 @@
 use std::io::{Write, stderr};
 
-use crate::network::DecouplingNetwork;
+use crate::{
+    evaluation::{Channel, Problem},
+    network::DecouplingNetwork,
+};
 
-/// Lines that are told one by one; a damaged file may have thousands.
-const MOST_TOLD: usize = 10;
+/// Lines that are listed one by one; a damaged file may have thousands.
+const MOST_LISTED: usize = 10;
 
-/// Lines with readings or coordinates outside the range seen in training, where a network extrapolates.
-#[derive(Default)]
-pub(super) struct OutsideTraining {
+/// Lines with readings or targets outside the range seen in training, where a network extrapolates.
+pub(super) struct OutsideTraining<'a> {
+    problem: &'a Problem,
     lines: usize,
     outside: usize,
-    told: Vec<String>,
+    listed: Vec<String>,
 }
 
-/// Readings and coordinates of one line that are outside.
+/// Readings and targets of one line that are outside.
 pub(super) struct LineOutside {
     /// Number of readings; `None` if their range in training is not known.
     pub(super) readings: Option<usize>,
-    /// Number of coordinates.
-    pub(super) coordinates: usize,
+    /// Number of targets.
+    pub(super) targets: usize,
 }
 
-impl OutsideTraining {
+impl<'a> OutsideTraining<'a> {
+    pub(super) fn new(problem: &'a Problem) -> Self {
+        Self {
+            problem,
+            lines: 0,
+            outside: 0,
+            listed: Vec::new(),
+        }
+    }
+
     /// Counts what of a line is outside.
     pub(super) fn count(
         &mut self,
         network: &DecouplingNetwork,
         line: u64,
-        readings_ohm: &[f64],
-        coordinates_mm: &[f64],
+        readings: &[f64],
+        answer: &[f64],
     ) -> LineOutside {
         let (inputs, outputs) = (network.inputs(), network.outputs());
         let range = inputs.range();
         let outside = || {
             range
                 .into_iter()
-                .flat_map(|range| range.outside(inputs.quantity(), readings_ohm))
+                .flat_map(|range| range.outside(inputs.quantity(), readings))
         };
-        let far_outside = || outputs.far_outside(coordinates_mm);
+        let far_outside = || outputs.far_outside(answer);
         let of_line = LineOutside {
             readings: range.map(|_| outside().count()),
-            coordinates: far_outside().count(),
+            targets: far_outside().count(),
         };
         self.lines += 1;
-        if of_line.readings.unwrap_or(0) + of_line.coordinates == 0 {
+        if of_line.readings.unwrap_or(0) + of_line.targets == 0 {
             return of_line;
         }
         self.outside += 1;
-        if self.told.len() < MOST_TOLD {
+        if self.listed.len() < MOST_LISTED {
             let first_reading = outside().next().zip(range).map(|(channel, range)| {
-                let name = format!("r_{}", channel + 1);
-                described(&name, readings_ohm[channel], "ohm", range.extremes(channel))
+                let (name, extremes) = (&self.problem.inputs[channel], range.extremes(channel));
+                described(name, readings[channel], extremes)
             });
-            let first_coordinate = || {
-                let channel = far_outside().next()?;
-                let name = format!("{}_{}", ["x", "y", "z"][channel % 3], channel / 3 + 1);
-                Some(described(
-                    &name,
-                    coordinates_mm[channel],
-                    "mm",
-                    outputs.extremes(channel),
-                ))
+            let first_target = || {
+                let target = far_outside().next()?;
+                let (name, extremes) = (&self.problem.targets[target], outputs.extremes(target));
+                Some(described(name, answer[target], extremes))
             };
-            if let Some(first) = first_reading.or_else(first_coordinate) {
-                self.told.push(format!("line {line}: {first}"));
+            if let Some(first) = first_reading.or_else(first_target) {
+                self.listed.push(format!("line {line}: {first}"));
             }
         }
         of_line
@@ -71,24 +78,30 @@ impl OutsideTraining {
 
     /// Warns of the lines on standard error.
     pub(super) fn warn(&self) {
-        let Self { lines, outside, told } = self;
+        let Self {
+            lines, outside, listed, ..
+        } = self;
         if *outside == 0 {
             return;
         }
         let mut stderr = stderr().lock();
-        for line in told {
-            // Nobody is left to tell if this fails.
+        for line in listed {
+            // There is no one to report to if this fails.
             let _ = writeln!(stderr, "warning: {line}");
         }
         let _ = writeln!(
             stderr,
             "warning: {outside} of {lines} lines are outside the range seen in training, where the network \
-             extrapolates; the last two columns count such readings and coordinates: check these readings, or train with \
-             a scene that covers them"
+             extrapolates; the last two columns count such readings and targets: check these readings, or train with samples \
+             that cover them"
         );
     }
 }
 
-fn described(name: &str, value: f64, unit: &str, (low, high): (f64, f64)) -> String {
-    format!("{name} is {value:.4e} {unit}; in training it was from {low:.4e} to {high:.4e}")
+fn described(channel: &Channel, value: f64, (low, high): (f64, f64)) -> String {
+    let unit = channel.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+    format!(
+        "{} is {value:.4e}{unit}; in training it was from {low:.4e} to {high:.4e}",
+        channel.name
+    )
 }

@@ -264,7 +264,7 @@ fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<
     let mut failures = ends.into_iter().filter_map(Result::err);
     let Some(first) = failures.next() else { return Ok(()) };
     for other in failures {
-        // Nobody is left to read it if this fails.
+        // There is no one to report to if this fails.
         let _ = writeln!(stderr(), "{other}");
     }
     Err(first)

@@ -126,7 +126,8 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
         ("--samples", "10"),
         ("--loading", "indenter"),
         ("--preset", "best"),
-        ("--decoder", "rbf"),
+        ("--decoder", "newton"),
+        ("--recipe", "r.json"),
         ("--hidden", "99"),
         ("--starts", "9"),
         ("--seed", "99"),
@@ -147,11 +148,88 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
     let sensor = folder.path().join("sensor.csv");
     fs::write(&sensor, fs::read_to_string(&sensor).unwrap().replacen("0.", "0.1", 9)).unwrap();
     let message = failure("train --checkpoint d.json --resume --epochs 60", folder.path(), 1);
-    assert!(message.contains("are not those of the checkpoint"), "{message}");
+    assert!(
+        message.contains("has other samples than when the run was saved"),
+        "{message}"
+    );
 }
 
 #[test]
-fn a_network_of_own_data_decodes_files_and_lines_under_its_names() {
+fn files_of_a_checkpoint_that_have_moved_are_found_by_the_name_given() {
+    let folder = recordings();
+    let path = |name: &str| folder.path().join(name);
+    fs::create_dir_all(path("moved/again")).unwrap();
+    let part = TRAIN.replace("--epochs 60", "--epochs 5");
+    json(
+        &format!("{part} --checkpoint runs/c.json --json").replace("runs/", ""),
+        folder.path(),
+    );
+    fs::rename(path("c.json"), path("moved/c.json")).unwrap();
+    for name in ["sensor.csv", "states.csv"] {
+        fs::rename(path(name), path(&format!("moved/again/{name}"))).unwrap();
+    }
+    let resume = "train --checkpoint moved/c.json --resume --epochs 8";
+    let message = failure(resume, folder.path(), 1);
+    for expected in ["'moved/c.json'", "sensor.csv' is missing", "give --data FILE"] {
+        assert!(message.contains(expected), "{message}");
+    }
+    let message = failure(
+        &format!("{resume} --test-data moved/again/states.csv"),
+        folder.path(),
+        2,
+    );
+    assert!(
+        message.contains("--test-data: the checkpoint has no such file"),
+        "{message}"
+    );
+    // The joined file is in the same folder.
+    let resumed = json(&format!("{resume} --data moved/again/sensor.csv --json"), folder.path());
+    assert_eq!(resumed["epochs"], 8);
+    // By another name it takes the place of the argument.
+    fs::rename(path("moved/again/sensor.csv"), path("renamed.csv")).unwrap();
+    let renamed = format!("{resume} --data renamed.csv --join moved/again/states.csv");
+    json(
+        &format!("{renamed} --epochs 9 --json").replacen("--epochs 8 ", "", 1),
+        folder.path(),
+    );
+    fs::write(
+        path("renamed.csv"),
+        fs::read_to_string(path("renamed.csv"))
+            .unwrap()
+            .replacen("0.", "0.1", 9),
+    )
+    .unwrap();
+    let message = failure(&renamed, folder.path(), 1);
+    assert!(
+        message.contains("has other samples than when the run was saved"),
+        "{message}"
+    );
+}
+
+#[test]
+fn other_decoders_are_measured_on_a_recording_if_they_are_asked_for() {
+    let folder = recordings();
+    let report = json(&format!("{TRAIN} --json"), folder.path());
+    assert_eq!(report.get("decoders"), None);
+    let report = json(&format!("{TRAIN} --decoder mean,ridge,rbf --json"), folder.path());
+    let decoders = report["decoders"].as_object().unwrap();
+    assert_eq!(Vec::from_iter(decoders.keys()), ["mean", "rbf", "ridge"]);
+    for name in ["mean", "ridge"] {
+        let [one, other] = [&decoders[name], &report["baselines"]].map(|from| {
+            let targets = if from.is_object() && from.get("targets").is_some() {
+                &from["targets"]
+            } else {
+                &from[name]
+            };
+            targets[1]["rmse"].as_f64().unwrap()
+        });
+        assert!((one / other - 1.0).abs() < 1e-12, "{name}: {one} {other}");
+        assert!(decoders[name]["frame_us"].as_f64().unwrap() > 0.0);
+    }
+}
+
+#[test]
+fn the_network_of_a_recording_decodes_files_and_lines_under_its_names() {
     let folder = recordings();
     json(&format!("{TRAIN} --out n.json --json"), folder.path());
     let output = decoupler(
@@ -301,12 +379,15 @@ fn columns_are_matched_by_name_in_files_and_streams() {
 fn what_belongs_to_a_simulated_sensor_is_refused_with_a_reason() {
     let folder = recordings();
     for (arguments, cause) in [
-        ("--array 2x2_2x6", "--array: own data (--data) have no array"),
-        ("--noise 0.1", "--noise: own data (--data) have their own noise"),
-        ("--loading random", "--loading: own data (--data) have no scene"),
+        ("--array 2x2_2x6", "--array: a recording (--data) has no array"),
+        ("--noise 0.1", "--noise: a recording (--data) has noise of its own"),
+        ("--loading random", "--loading: a recording (--data) has no scene"),
         ("--samples 10", "--samples: all rows"),
         ("--rows known", "--row-wire"),
-        ("--decoder newton", "--decoder: own data"),
+        (
+            "--decoder newton",
+            "--decoder newton: it solves the equations of a simulated array",
+        ),
         ("--split group", "--group"),
         ("--targets states.c9", "there is no column 'states.c9'"),
     ] {

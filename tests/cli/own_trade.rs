@@ -1,4 +1,4 @@
-//! The trade-off of own data in the terminal: every decoder measured on the test samples, and what belongs to a simulated
+//! The trade-off of a recording in the terminal: every decoder measured on the test samples, and what belongs to a simulated
 //! sensor refused.
 
 use std::{fs, path::Path};
@@ -119,7 +119,7 @@ fn the_command_of_a_point_trains_its_network() {
     let of_recipe = json(of_recipe, folder.path());
     for report in [&of_arguments, &of_recipe] {
         let warnings = report["warnings"].to_string();
-        assert!(warnings.contains("random test samples flatter"), "{warnings}");
+        assert!(warnings.contains("random test samples are optimistic"), "{warnings}");
         let point = &report["points"][0];
         let command = point["command"].as_str().unwrap().strip_prefix("decoupler ").unwrap();
         // The shell takes the quotes away.
@@ -147,7 +147,7 @@ fn the_table_tells_the_errors_of_each_target_in_its_unit() {
         "% of range",
         "c4 (mm)",
         "c5 (N)",
-        "network_f32, 2, br",
+        "Network f32, br, 2 hidden",
         "Most accurate under 1000000000 us: ",
     ] {
         assert!(text.contains(expected), "{expected}: {text}");
@@ -163,10 +163,10 @@ fn what_belongs_to_a_simulated_sensor_is_refused_and_the_other_way_round() {
         (own("--samples 10"), "--where"),
         (own("--test-samples 10"), "--test-fraction"),
         (own("--preset best"), "no scene"),
-        (own("--noise 0,1e-3"), "their own noise"),
+        (own("--noise 0,1e-3"), "noise of its own"),
         (
             own("--decoder ridge,newton"),
-            "--decoder newton: it solves the equations of a simulated sensor",
+            "--decoder newton: it solves the equations of a simulated array",
         ),
         (own("--folds 3"), "on the test samples"),
         (own("--rows known"), "--row-wire"),

@@ -169,7 +169,7 @@ fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
     let mut outputs = [1, 5, 20].into_iter().map(interrupted_after);
     let (status, told, printed) = outputs.find(|(_, told, _)| told.contains("after epoch")).unwrap();
     assert_eq!(status, Some(130), "{told}");
-    assert!(told.contains("with --checkpoint FILE it could be resumed"), "{told}");
+    assert!(told.contains("use --checkpoint FILE to be able to resume"), "{told}");
     assert!(String::from_utf8(printed).unwrap().contains("stopped by you"));
     assert!(NetworkFile::load(&folder.path().join("n.json")).is_ok());
 }
@@ -303,9 +303,9 @@ fn threads_and_the_terminal_change_no_bit() {
         );
     }
     let files = [1, 2, 3].map(|threads| network(&folder.path().join(format!("{threads}.json"))));
-    let mut run = Run::prepare(files[0].settings).unwrap();
+    let mut run = Run::prepare(files[0].settings.simulated().unwrap()).unwrap();
     while run.step().is_none() {}
-    let mut library = NetworkFile::from_run(&run).unwrap();
+    let mut library = NetworkFile::from_run(&run, None).unwrap();
     library.training.seconds = 0.0;
     for file in files {
         assert_eq!(file, library);

@@ -7,13 +7,12 @@ use crate::{
     app::{
         glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui},
-        theme::{Theme, space, type_size},
+        theme::{space, type_size},
         views::train::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
         },
         widgets::{Landmark, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui},
     },
-    decoupling::DecoderKind,
     evaluation::{
         Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
     },
