@@ -28,7 +28,7 @@ pub(crate) fn sweep_specification(experiment: &Experiment) -> Result<Value, Spec
     if experiment.cross_validation.is_some() {
         return Err(SpecificationGap::CrossValidation);
     }
-    train_command(&experiment.base).map_err(SpecificationGap::Setting)?;
+    train_command(&experiment.base.into(), None).map_err(SpecificationGap::Setting)?;
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
     for axis in experiment.axes() {
