@@ -41,7 +41,7 @@ fn settings(rows: Rows, noise: f64) -> SimulatedSettings {
 fn decoder(file: &NetworkFile, kind: BundleDecoder) -> Result<ExportedDecoder<'_>, BundleError> {
     let (split, test) = file.settings.simulated().unwrap().draw().unwrap();
     let networks = Some(file.network.clone());
-    let fitted = fitted(file.settings.into(), split.training, networks, kind, &test)?;
+    let fitted = fitted(file.settings, split.training, networks, kind, &test)?;
     Ok(ExportedDecoder::new(file, fitted))
 }
 
