@@ -66,6 +66,8 @@ pub use recipe::{Joined, Recipe};
 pub use recorded::{FileChecksum, Recorded, file_crc32};
 pub use recording::{Dropped, FileReport, JoinReport, Recording};
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
+#[cfg(feature = "cli")]
+pub(crate) use stored_path::stored;
 pub use suggestion::{suggested_plan, suggested_plan_in_order};
 pub use table::{Excess, Table};
 pub use watch::{Progress, Watch};
